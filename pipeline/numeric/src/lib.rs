@@ -1,0 +1,27 @@
+//! Grids, named random streams, transforms and ordered arithmetic: the ground floor of every kernel.
+//!
+//! # Conventions (stated once, here)
+//! * SI units; names end in their unit.
+//! * A grid cell `(row r, col c)` is the point `x = x0 + (c + 1/2) cell_x`, `y = y0 + (rows - r - 1/2) cell_y`:
+//!   row 0 is north, x points east, y north, z up. `(x0, y0)` is the south-west corner. Heights between
+//!   centres are bilinear; beyond the outer centres they are undefined.
+//! * `NaN` marks a cell without data in floating-point grids.
+//! * Transforms are unnormalised forward (`exp(-2 pi i k n / N)`) and divided by `N` on the way back.
+//!
+//! # Same bits everywhere
+//! Kernels use `+ - * /`, `sqrt` and the `libm` crate only; sums run in a fixed order; the Fourier planner is the
+//! scalar one. Work is spread over threads only where each output element is computed by one task from inputs
+//! that are already complete, so that the number of threads changes no bit.
+
+pub mod fft;
+pub mod filters;
+pub mod grid;
+pub mod ops;
+pub mod resample;
+pub mod streams;
+pub mod sums;
+pub mod surface;
+
+pub use grid::{Geometry, Grid};
+pub use streams::{Stream, Streams};
+pub use surface::Surface;

@@ -1,0 +1,14 @@
+//! What crosses a boundary: the study envelope, parameter errors and kinds, rows of every Parquet table, the fit file,
+//! the manifest, MCAP topics and roughness classes. No algorithms, no file formats.
+
+pub mod class;
+pub mod fit;
+pub mod kind;
+pub mod manifest;
+pub mod study;
+pub mod tables;
+pub mod topics;
+
+pub use class::RoughnessClass;
+pub use kind::{Kind, ParameterError};
+pub use tables::{Cell, Column, ColumnType, Record, Table};

@@ -1,0 +1,1 @@
+//! `manifest.json` of a release.

@@ -1,0 +1,25 @@
+//! Table `covariance`.
+
+super::table! {
+    /// One row per lag bin of a fit: empirical covariance of the residual beside the fitted model as the estimator sees it.
+    "covariance" CovarianceRow {
+        keys {
+            /// Id of the fit.
+            fit_id: String,
+            /// Number of the bin, from 0.
+            bin: i64,
+        }
+        /// Mean lag of the pairs in the bin.
+        lag_m: f64 ["m"],
+        /// Azimuth of the sector's centre, clockwise from north; null for all directions together.
+        azimuth_deg: Option<f64> ["deg"],
+        /// Empirical covariance.
+        covariance_m2: f64 ["m2"],
+        /// Pairs of cells in the bin.
+        pairs: i64 ["1"],
+        /// Fitted model in the same bin, after the same detrending and trimming where the mode corrects for them.
+        model_m2: f64 ["m2"],
+        /// Fitted model itself, before detrending and trimming.
+        surface_model_m2: f64 ["m2"],
+    }
+}

@@ -1,0 +1,59 @@
+//! Table `missions`.
+
+super::table! {
+    /// One row per mission driven.
+    "missions" MissionRow {
+        keys {
+            /// Id of the terrain.
+            terrain_id: String,
+            /// Id of the mission on that terrain.
+            mission_id: String,
+        }
+        /// Label of the terrain.
+        group: Option<String> [""],
+        /// Id of the traverse stage.
+        traverse_id: String [""],
+        /// Vehicle.
+        vehicle: String [""],
+        /// Start point, easting.
+        start_x_m: f64 ["m"],
+        /// Start point, northing.
+        start_y_m: f64 ["m"],
+        /// Goal point, easting.
+        goal_x_m: f64 ["m"],
+        /// Goal point, northing.
+        goal_y_m: f64 ["m"],
+        /// Direction from start to goal, counterclockwise from east.
+        heading_deg: f64 ["deg"],
+        /// Random draws of start and heading that were needed.
+        draws: i64 ["1"],
+        /// `success`, `tipped`, `stuck`, `out_of_bounds` or `timeout`.
+        outcome: String [""],
+        /// Time from start to outcome.
+        time_s: f64 ["s"],
+        /// Length of the path driven, in plan, from the recorded samples.
+        path_length_m: f64 ["m"],
+        /// Straight distance from start to goal over path length; null unless successful.
+        efficiency: f64 ["1"],
+        /// Root mean square of the vertical acceleration, from the recorded heights differentiated twice.
+        rms_vertical_acceleration_m_s2: f64 ["m/s2"],
+        /// Root mean square of the derivative of the pitch angle.
+        rms_pitch_rate_deg_s: f64 ["deg/s"],
+        /// Root mean square of the derivative of the roll angle.
+        rms_roll_rate_deg_s: f64 ["deg/s"],
+        /// Root mean square of the angular velocity about the transverse body axis.
+        rms_body_pitch_rate_deg_s: f64 ["deg/s"],
+        /// Root mean square of the angular velocity about the longitudinal body axis.
+        rms_body_roll_rate_deg_s: f64 ["deg/s"],
+        /// Largest absolute pitch.
+        max_pitch_deg: f64 ["deg"],
+        /// Largest absolute roll.
+        max_roll_deg: f64 ["deg"],
+        /// Recorded samples.
+        samples: i64 ["1"],
+        /// Rate of the recorded samples.
+        sample_rate_hz: f64 ["Hz"],
+        /// MCAP recording in the release.
+        path: String [""],
+    }
+}

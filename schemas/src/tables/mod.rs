@@ -1,0 +1,254 @@
+//! Parquet tables of a release: one file per table, rows as plain structs, units and descriptions beside each column.
+//!
+//! A row type is declared once by [`table!`]; the column list, the reading order and the cells follow from it.
+
+pub mod covariance;
+pub mod fits;
+pub mod height_distribution;
+pub mod missions;
+pub mod psd;
+pub mod samples;
+pub mod terrains;
+
+pub use covariance::CovarianceRow;
+pub use fits::FitRow;
+pub use height_distribution::HeightDistributionRow;
+pub use missions::MissionRow;
+pub use psd::PsdRow;
+pub use samples::SampleRow;
+pub use terrains::TerrainRow;
+
+use serde::Serialize;
+
+/// Storage type of a column. Every column may hold nulls except key columns.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ColumnType {
+    /// UTF-8.
+    Text,
+    /// 64-bit float.
+    F64,
+    /// 64-bit signed integer.
+    I64,
+    /// Boolean.
+    Bool,
+}
+
+/// One column: part of the contract with readers.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Column {
+    /// Name, snake case, unit at the end.
+    pub name: &'static str,
+    /// Storage type.
+    pub column_type: ColumnType,
+    /// Key columns come first, sort the table and are never null.
+    pub key: bool,
+    /// Unit (`m`, `m/s2`, `deg`, `1` for pure numbers, empty for words).
+    pub unit: &'static str,
+    /// What it is.
+    pub description: &'static str,
+}
+
+/// One table: part of the contract with readers.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Table {
+    /// Folder name under `tables/`.
+    pub name: &'static str,
+    /// What a row is.
+    pub description: &'static str,
+    /// Columns in order.
+    pub columns: &'static [Column],
+}
+
+/// All tables, in the order of the report and of `schema`.
+pub const ALL: [&Table; 7] = [
+    &TerrainRow::TABLE,
+    &FitRow::TABLE,
+    &CovarianceRow::TABLE,
+    &PsdRow::TABLE,
+    &HeightDistributionRow::TABLE,
+    &MissionRow::TABLE,
+    &SampleRow::TABLE,
+];
+
+/// The table of that name.
+pub fn by_name(name: &str) -> Option<&'static Table> {
+    ALL.into_iter().find(|t| t.name == name)
+}
+
+/// One value of a row.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Cell {
+    /// No value.
+    Null,
+    /// Text.
+    Text(String),
+    /// Float. NaN is stored as null: a figure is known or it is not.
+    F64(f64),
+    /// Integer.
+    I64(i64),
+    /// Boolean.
+    Bool(bool),
+}
+
+/// A row type.
+pub trait Record: Serialize + serde::de::DeserializeOwned + Clone + Send {
+    /// Its table.
+    const TABLE: Table;
+    /// The row's values in column order.
+    fn cells(&self) -> Vec<Cell>;
+    /// A row from its values in column order; `None` when a value has the wrong type or a key is null.
+    fn from_cells(cells: Vec<Cell>) -> Option<Self>;
+}
+
+/// How a field type is stored.
+pub trait CellType: Sized {
+    /// Storage type.
+    const TYPE: ColumnType;
+    /// Value to cell.
+    fn to_cell(&self) -> Cell;
+    /// Cell to value.
+    fn from_cell(cell: Cell) -> Option<Self>;
+}
+
+impl CellType for String {
+    const TYPE: ColumnType = ColumnType::Text;
+    fn to_cell(&self) -> Cell {
+        Cell::Text(self.clone())
+    }
+    fn from_cell(cell: Cell) -> Option<Self> {
+        if let Cell::Text(v) = cell { Some(v) } else { None }
+    }
+}
+impl CellType for f64 {
+    const TYPE: ColumnType = ColumnType::F64;
+    fn to_cell(&self) -> Cell {
+        if self.is_nan() { Cell::Null } else { Cell::F64(*self) }
+    }
+    fn from_cell(cell: Cell) -> Option<Self> {
+        match cell {
+            Cell::F64(v) => Some(v),
+            Cell::Null => Some(f64::NAN),
+            _ => None,
+        }
+    }
+}
+impl CellType for i64 {
+    const TYPE: ColumnType = ColumnType::I64;
+    fn to_cell(&self) -> Cell {
+        Cell::I64(*self)
+    }
+    fn from_cell(cell: Cell) -> Option<Self> {
+        if let Cell::I64(v) = cell { Some(v) } else { None }
+    }
+}
+impl CellType for bool {
+    const TYPE: ColumnType = ColumnType::Bool;
+    fn to_cell(&self) -> Cell {
+        Cell::Bool(*self)
+    }
+    fn from_cell(cell: Cell) -> Option<Self> {
+        if let Cell::Bool(v) = cell { Some(v) } else { None }
+    }
+}
+impl<T: CellType> CellType for Option<T> {
+    const TYPE: ColumnType = T::TYPE;
+    fn to_cell(&self) -> Cell {
+        self.as_ref().map_or(Cell::Null, T::to_cell)
+    }
+    fn from_cell(cell: Cell) -> Option<Self> {
+        if cell == Cell::Null { Some(None) } else { T::from_cell(cell).map(Some) }
+    }
+}
+
+/// Floats of rows pass through JSON records of the work area, which has no NaN: null stands for it.
+pub(crate) mod nan_as_null {
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    pub fn serialize<T: AsField, S: Serializer>(value: &T, s: S) -> Result<S::Ok, S::Error> {
+        value.as_field().serialize(s)
+    }
+    pub fn deserialize<'de, T: AsField, D: Deserializer<'de>>(d: D) -> Result<T, D::Error> {
+        T::Field::deserialize(d).map(T::from_field)
+    }
+
+    /// The form a field takes in JSON.
+    pub trait AsField: Sized {
+        type Field: Serialize + for<'de> Deserialize<'de>;
+        fn as_field(&self) -> Self::Field;
+        fn from_field(field: Self::Field) -> Self;
+    }
+    impl AsField for f64 {
+        type Field = Option<f64>;
+        fn as_field(&self) -> Option<f64> {
+            (!self.is_nan()).then_some(*self)
+        }
+        fn from_field(field: Option<f64>) -> Self {
+            field.unwrap_or(f64::NAN)
+        }
+    }
+    macro_rules! as_itself {
+        ($($t:ty),*) => {$(impl AsField for $t {
+            type Field = $t;
+            fn as_field(&self) -> $t { self.clone() }
+            fn from_field(field: $t) -> Self { field }
+        })*};
+    }
+    as_itself!(String, i64, bool, Option<String>, Option<f64>, Option<i64>, Option<bool>);
+}
+
+/// Declares a row type and its table together.
+macro_rules! table {
+    (
+        $(#[doc = $table_doc:literal])+
+        $table:literal $row:ident {
+            $(keys { $($(#[doc = $key_doc:literal])+ $key:ident: $key_type:ty,)+ })?
+            $($(#[doc = $doc:literal])+ $field:ident: $type:ty [$unit:literal],)+
+        }
+    ) => {
+        $(#[doc = $table_doc])+
+        #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+        pub struct $row {
+            $($($(#[doc = $key_doc])+ #[serde(with = "crate::tables::nan_as_null")] pub $key: $key_type,)+)?
+            $($(#[doc = $doc])+ #[serde(with = "crate::tables::nan_as_null")] pub $field: $type,)+
+        }
+
+        impl $crate::tables::Record for $row {
+            const TABLE: $crate::tables::Table = $crate::tables::Table {
+                name: $table,
+                description: concat!($($table_doc),+).trim_ascii(),
+                columns: &[
+                    $($($crate::tables::Column {
+                        name: stringify!($key),
+                        column_type: <$key_type as $crate::tables::CellType>::TYPE,
+                        key: true,
+                        unit: "",
+                        description: concat!($($key_doc),+).trim_ascii(),
+                    },)+)?
+                    $($crate::tables::Column {
+                        name: stringify!($field),
+                        column_type: <$type as $crate::tables::CellType>::TYPE,
+                        key: false,
+                        unit: $unit,
+                        description: concat!($($doc),+).trim_ascii(),
+                    },)+
+                ],
+            };
+
+            fn cells(&self) -> Vec<$crate::tables::Cell> {
+                use $crate::tables::CellType;
+                vec![$($(self.$key.to_cell(),)+)? $(self.$field.to_cell(),)+]
+            }
+
+            fn from_cells(cells: Vec<$crate::tables::Cell>) -> Option<Self> {
+                use $crate::tables::CellType;
+                let mut cells = cells.into_iter();
+                Some(Self {
+                    $($($key: CellType::from_cell(cells.next()?)?,)+)?
+                    $($field: CellType::from_cell(cells.next()?)?,)+
+                })
+            }
+        }
+    };
+}
+pub(crate) use table;

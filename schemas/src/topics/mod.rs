@@ -1,0 +1,1 @@
+//! MCAP topics of a release.
