@@ -23,7 +23,7 @@ pub struct Kind {
 
 /// A parameter that was refused.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("`{key}`: {message}")]
+#[error("{}{message}", if key.is_empty() { String::new() } else { format!("`{key}` ") })]
 pub struct ParameterError {
     /// Dotted path of the parameter below its item (`layers.2.fractal_dimension`); empty for the item as a whole.
     pub key: String,
@@ -81,5 +81,9 @@ pub fn schema_of<T: JsonSchema>() -> Value {
 /// # Errors
 /// A [`ParameterError`] that names the key that does not fit.
 pub fn read_parameters<T: DeserializeOwned>(value: &Value) -> Result<T, ParameterError> {
-    T::deserialize(value).map_err(|e| ParameterError::new("", e.to_string()))
+    serde_path_to_error::deserialize(value).map_err(|e| {
+        let path = e.path().to_string();
+        let key = if path == "." { String::new() } else { path };
+        ParameterError::new(key, e.into_inner().to_string())
+    })
 }

@@ -1,1 +1,203 @@
-//! The envelope of a study file: what stands around the parameters of each item.
+//! The envelope of a study file: what stands around the parameters of each item. The parameters themselves belong to
+//! the kernels; a section's table is its envelope's keys and the kernel's keys together.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// `[study]`: the release as a whole.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct StudyHead {
+    /// Short name, [a-z0-9][a-z0-9.-]{0,63}.
+    pub name: String,
+    /// Title of the release; the name when absent.
+    #[serde(default)]
+    pub title: String,
+    /// A paragraph for readers of the release.
+    #[serde(default)]
+    pub description: String,
+    /// Seed of every random stream of the study.
+    pub seed: u64,
+    /// Date of the study, YYYY-MM-DD: the only date in any output.
+    pub date: String,
+    /// Licence of the release as an SPDX expression.
+    #[serde(default = "default_license")]
+    pub license: String,
+    /// People or groups that made the study.
+    #[serde(default)]
+    pub creators: Vec<String>,
+    /// Start of every mission's clock in MCAP files, ns since 1970-01-01 UTC.
+    #[serde(default = "default_epoch_ns")]
+    pub epoch_ns: u64,
+    /// Flavour of the MCAP files.
+    #[serde(default)]
+    pub mcap: McapFlavour,
+}
+
+fn default_license() -> String {
+    "CC-BY-4.0".to_owned()
+}
+
+fn default_epoch_ns() -> u64 {
+    1_700_000_000_000_000_000
+}
+
+/// Flavour of the MCAP files.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum McapFlavour {
+    /// Foxglove protobuf, for viewers.
+    #[default]
+    Viewer,
+}
+
+/// `[[dem]]`: a measured DEM.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct DemItem {
+    /// Id, [a-z0-9][a-z0-9.-]{0,63}, unique in the study.
+    pub id: String,
+    /// File, relative to the study file.
+    pub file: String,
+    /// Label for statistics.
+    #[serde(default)]
+    pub group: Option<String>,
+    /// Part to use, `[x0, y0, x1, y1]` in the DEM's own coordinates (m, or degrees for a geographic raster).
+    #[serde(default)]
+    pub window: Option<[f64; 4]>,
+    /// Cell size east-west and north-south, m, for files that carry none (.npy).
+    #[serde(default)]
+    pub cell_m: Option<[f64; 2]>,
+    /// Licence of the data.
+    #[serde(default)]
+    pub license: Option<String>,
+    /// Whom to name as the source.
+    #[serde(default)]
+    pub attribution: Option<String>,
+}
+
+/// `[[terrain]]` around a generator's parameters.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TerrainItem {
+    /// Id, [a-z0-9][a-z0-9.-]{0,63}, unique in the study.
+    pub id: String,
+    /// Generator (see `sastrugi kinds`).
+    pub kind: String,
+    /// Label for statistics.
+    #[serde(default)]
+    pub group: Option<String>,
+    /// Replicates `<id>-0001`, `<id>-0002` ...; one item with the plain id when absent.
+    #[serde(default)]
+    pub count: Option<u32>,
+    /// Explicit seed instead of the study's; replicate k uses `seed + k - 1`.
+    #[serde(default)]
+    pub seed: Option<u64>,
+    /// One item (or one set of replicates) per value of a parameter: `sweep.<parameter> = [...]`.
+    #[serde(default)]
+    pub sweep: BTreeMap<String, Vec<serde_json::Value>>,
+    /// Also write a 16-bit PNG of the heights.
+    #[serde(default)]
+    pub png16: bool,
+}
+
+/// `[[fit]]` around the fit's parameters.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FitItem {
+    /// Id, [a-z0-9][a-z0-9.-]{0,63}, unique in the study.
+    pub id: String,
+    /// Id of the DEM to fit.
+    pub dem: String,
+    /// One fit per value of a parameter: `sweep.<parameter> = [...]`.
+    #[serde(default)]
+    pub sweep: BTreeMap<String, Vec<serde_json::Value>>,
+}
+
+/// `[[texture]]` around a synthesis method's parameters.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TextureItem {
+    /// Id, [a-z0-9][a-z0-9.-]{0,63}, unique in the study.
+    pub id: String,
+    /// Id of the fit to match.
+    pub fit: String,
+    /// Synthesis method (see `sastrugi kinds`).
+    #[serde(default = "default_method")]
+    pub method: String,
+    /// Id of the terrain or DEM that the texture is added to; the texture stands alone when absent.
+    #[serde(default)]
+    pub onto: Option<String>,
+    /// Label for statistics.
+    #[serde(default)]
+    pub group: Option<String>,
+    /// Replicates `<id>-0001`, `<id>-0002` ...; one item with the plain id when absent.
+    #[serde(default)]
+    pub count: Option<u32>,
+    /// Explicit seed instead of the study's; replicate k uses `seed + k - 1`.
+    #[serde(default)]
+    pub seed: Option<u64>,
+    /// One item (or one set of replicates) per value of a parameter: `sweep.<parameter> = [...]`.
+    #[serde(default)]
+    pub sweep: BTreeMap<String, Vec<serde_json::Value>>,
+}
+
+fn default_method() -> String {
+    "fft_ma".to_owned()
+}
+
+/// `[[missions]]` around the rules for drawing missions.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MissionsItem {
+    /// Id, [a-z0-9][a-z0-9.-]{0,63}, unique in the study.
+    pub id: String,
+    /// Ids of the terrains, textures or DEMs to draw missions on; the id of a replicated item stands for all of them.
+    pub terrains: Vec<String>,
+    /// Explicit seed instead of the study's.
+    #[serde(default)]
+    pub seed: Option<u64>,
+}
+
+/// `[[traverse]]` around the parameters of a run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TraverseItem {
+    /// Id, [a-z0-9][a-z0-9.-]{0,63}, unique in the study; missions are recorded as `<id>-0001` ...
+    pub id: String,
+    /// Id of the missions to drive.
+    pub missions: String,
+    /// Vehicle (see `sastrugi kinds`).
+    pub vehicle: String,
+}
+
+/// `[roughness]`: how every heightfield is classified and described.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct RoughnessSection {
+    /// Largest Moore gradient of class `low`, m/m (50 levels of 0.75/128 cm per cm; Majhor and Bos, section 2.3).
+    pub low_max: f64,
+    /// Largest Moore gradient of class `semi`, m/m (140 levels per cm).
+    pub semi_max: f64,
+    /// Border left out of the class shares, m (Majhor and Bos, section 2.4).
+    pub border_m: f64,
+    /// Radius of the disk of the morphological closing, m (half diagonal of a Husky A200's outline).
+    pub closing_radius_m: f64,
+    /// Window of the moving average of the band RMS, m.
+    pub band_window_m: f64,
+}
+
+impl Default for RoughnessSection {
+    fn default() -> Self {
+        // 0.75/128 cm a level: Unreal Engine's Z scale of 0.75 % (Majhor and Bos, section 2.2).
+        let level_cm = 0.75 / 128.0;
+        Self {
+            low_max: 50.0 * level_cm,
+            semi_max: 140.0 * level_cm,
+            border_m: 5.0,
+            closing_radius_m: 0.57,
+            band_window_m: 2.0,
+        }
+    }
+}
