@@ -1,1 +1,14 @@
-//! Room under construction.
+//! Terrain generators: checked parameters and named random streams in, a heightfield out.
+//!
+//! One folder per generator, one line each in [`registry`]. Heights are metres on a grid whose south-west corner is the
+//! origin. Generators count posts from the south-west: post `i` east and `j` north stands for the surface point
+//! `(i cell, j cell)` of the generator's formula, and lies in column `i` and row `rows - 1 - j`.
+
+pub mod generator;
+pub mod multifractal;
+pub mod registry;
+pub mod size;
+pub mod weierstrass_mandelbrot;
+
+pub use generator::{Generator, Levels, TerrainError};
+pub use registry::{kinds, prepare};

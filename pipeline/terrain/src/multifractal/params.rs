@@ -1,0 +1,175 @@
+//! Parameters of the multifractal.
+
+use crate::size::Size;
+use crate::weierstrass_mandelbrot::{
+    DEFAULT_CELL_M, DEFAULT_FREQUENCIES, DEFAULT_FREQUENCY_RATIO, DEFAULT_SAMPLING_LENGTH_M, Mode,
+    RawWeierstrassMandelbrot, WeierstrassMandelbrot,
+};
+use sastrugi_schemas::ParameterError;
+use schemars::{JsonSchema, Schema};
+use serde::{Deserialize, Serialize};
+use std::f64::consts::TAU;
+
+/// How the product of the layers becomes 16-bit levels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Scaling {
+    /// `32768 + 32767 p / max|p|`: height 0 stays at the middle level.
+    Symmetric,
+    /// `32768 + 32767 (p - min p) / (max p - min p)`: the lowest height is 0, and half of the levels are used.
+    MinMax,
+}
+
+/// One layer of the product. What is not given stays at that layer's default.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(transform = nothing_is_required)]
+pub struct RawLayer {
+    /// Number of ridge directions M (Table 1: 16, 32, 64).
+    pub ridges: u32,
+    /// Fractal dimension D, between 2 and 3 (Table 1: 2.2, 2.45, and 2.3 or 2.45 or 2.6).
+    pub fractal_dimension: f64,
+    /// Elevation scaling G, m (Table 1: 1e-6, 8e-8, 1e-8). Without effect on the product, whose layers are scaled to one
+    /// range; kept because the paper lists it.
+    pub elevation_scale_m: f64,
+    /// Standard deviation of the Gaussian low-pass, cells (not published; 8, 8 and 1 is our reading).
+    pub sigma_px: f64,
+}
+
+/// Multifractal surface: the product of three filtered Weierstrass-Mandelbrot layers.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct RawMultifractal {
+    /// Size east and north, m; in place of `size_px`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub size_m: Option<[f64; 2]>,
+    /// Cells east and north; 1009 x 1009 when no size is given (Majhor and Bos, section 2.2).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub size_px: Option<[u32; 2]>,
+    /// Side of a cell, m (section 2.2).
+    pub cell_m: f64,
+    /// Highest frequency index n_max (Table 1); the mode may end the sum earlier.
+    pub frequencies: u32,
+    /// Ratio gamma of successive frequencies, above 1 (Table 1).
+    pub frequency_ratio: f64,
+    /// Sampling length L, m (Table 1).
+    pub sampling_length_m: f64,
+    /// Phases are uniform in 0 to this, rad. The paper prints pi, which adds the same corner spike to every layer; 2 pi
+    /// does not.
+    pub phase_max_rad: f64,
+    /// Which waves enter the layers.
+    pub mode: Mode,
+    /// Low-frequency layer.
+    pub low: RawLayer,
+    /// Mid-frequency layer.
+    pub mid: RawLayer,
+    /// High-frequency layer; the paper varies its fractal dimension (2.3, 2.45, 2.6).
+    pub high: RawLayer,
+    /// How the product becomes levels (not published; symmetric is our reading).
+    pub scaling: Scaling,
+    /// Vertical scale of the 16-bit levels, percent: a level is this / 128 cm (section 2.2: 0.75 %, 3.84 m in all).
+    pub z_scale_percent: f64,
+}
+
+impl Default for RawMultifractal {
+    fn default() -> Self {
+        let layer = |ridges, fractal_dimension, elevation_scale_m, sigma_px| RawLayer {
+            ridges,
+            fractal_dimension,
+            elevation_scale_m,
+            sigma_px,
+        };
+        Self {
+            size_m: None,
+            size_px: None,
+            cell_m: DEFAULT_CELL_M,
+            frequencies: DEFAULT_FREQUENCIES,
+            frequency_ratio: DEFAULT_FREQUENCY_RATIO,
+            sampling_length_m: DEFAULT_SAMPLING_LENGTH_M,
+            phase_max_rad: TAU,
+            mode: Mode::BandLimited,
+            low: layer(16, 2.2, 1e-6, 8.0),
+            mid: layer(32, 2.45, 8e-8, 8.0),
+            high: layer(64, 2.45, 1e-8, 1.0),
+            scaling: Scaling::Symmetric,
+            z_scale_percent: 0.75,
+        }
+    }
+}
+
+/// One checked layer.
+#[derive(Clone, Debug)]
+pub(super) struct Layer {
+    pub(super) name: &'static str,
+    pub(super) surface: WeierstrassMandelbrot,
+    pub(super) sigma_px: f64,
+}
+
+/// Checked parameters of the multifractal.
+#[derive(Clone, Debug)]
+pub struct Multifractal {
+    pub(super) raw: RawMultifractal,
+    pub(super) size: Size,
+    pub(super) layers: [Layer; 3],
+}
+
+impl TryFrom<RawMultifractal> for Multifractal {
+    type Error = ParameterError;
+
+    fn try_from(raw: RawMultifractal) -> Result<Self, ParameterError> {
+        ParameterError::positive("z_scale_percent", raw.z_scale_percent)?;
+        let layers = [
+            Layer::check("low", &raw, &raw.low)?,
+            Layer::check("mid", &raw, &raw.mid)?,
+            Layer::check("high", &raw, &raw.high)?,
+        ];
+        let size = layers[0].surface.size();
+        let raw = RawMultifractal { size_m: None, size_px: Some(size.px), ..raw };
+        Ok(Self { raw, size, layers })
+    }
+}
+
+impl Layer {
+    fn check(name: &'static str, common: &RawMultifractal, layer: &RawLayer) -> Result<Self, ParameterError> {
+        let surface = WeierstrassMandelbrot::try_from(layer.as_monofractal(common)).map_err(|e| place(e, name))?;
+        let side = surface.size().px[0].min(surface.size().px[1]);
+        let sigma_px = layer.sigma_px;
+        if (0.0..=f64::from(side)).contains(&sigma_px) {
+            Ok(Self { name, surface, sigma_px })
+        } else {
+            let message = format!("is {sigma_px}; it must lie between 0 and the shorter side of {side} cells");
+            Err(ParameterError::new("sigma_px", message).within(name))
+        }
+    }
+}
+
+impl RawLayer {
+    fn as_monofractal(&self, common: &RawMultifractal) -> RawWeierstrassMandelbrot {
+        RawWeierstrassMandelbrot {
+            size_m: common.size_m,
+            size_px: common.size_px,
+            cell_m: common.cell_m,
+            ridges: self.ridges,
+            frequencies: common.frequencies,
+            frequency_ratio: common.frequency_ratio,
+            fractal_dimension: self.fractal_dimension,
+            sampling_length_m: common.sampling_length_m,
+            elevation_scale_m: self.elevation_scale_m,
+            phase_max_rad: common.phase_max_rad,
+            mode: common.mode,
+        }
+    }
+}
+
+/// An error about a layer's own parameter says which layer; one about a common parameter does not.
+fn place(error: ParameterError, layer: &str) -> ParameterError {
+    match error.key.as_str() {
+        "ridges" | "fractal_dimension" | "elevation_scale_m" => error.within(layer),
+        _ => error,
+    }
+}
+
+/// A layer may be given in part.
+fn nothing_is_required(schema: &mut Schema) {
+    schema.remove("required");
+}

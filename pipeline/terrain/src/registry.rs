@@ -1,0 +1,103 @@
+//! The list of generators.
+
+use crate::generator::Generator;
+use crate::multifractal::{Multifractal, RawMultifractal};
+use crate::weierstrass_mandelbrot::{RawWeierstrassMandelbrot, WeierstrassMandelbrot};
+use sastrugi_schemas::kind::{read_parameters, schema_of};
+use sastrugi_schemas::{Kind, ParameterError};
+use schemars::JsonSchema;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use serde_json::{Map, Value};
+
+/// One generator.
+struct Entry {
+    kind: &'static str,
+    summary: &'static str,
+    source: &'static str,
+    parameters: fn() -> Value,
+    prepare: fn(&Value) -> Result<Box<dyn Generator>, ParameterError>,
+}
+
+const ENTRIES: [Entry; 2] = [
+    Entry {
+        kind: crate::weierstrass_mandelbrot::KIND,
+        summary: "monofractal sum of ridged plane waves, one fractal dimension everywhere",
+        source: "Majhor and Bos, Eq. 1-2; Ausloos and Berman (1985)",
+        parameters: schema_of::<RawWeierstrassMandelbrot>,
+        prepare: prepare_as::<RawWeierstrassMandelbrot, WeierstrassMandelbrot>,
+    },
+    Entry {
+        kind: crate::multifractal::KIND,
+        summary: "product of three filtered Weierstrass-Mandelbrot layers: smooth and rough areas side by side",
+        source: "Majhor and Bos, section 2.1 and Table 1",
+        parameters: schema_of::<RawMultifractal>,
+        prepare: prepare_as::<RawMultifractal, Multifractal>,
+    },
+];
+
+/// Every generator, with the JSON Schema of its parameters.
+pub fn kinds() -> Vec<Kind> {
+    let describe = |e: &Entry| Kind {
+        family: "terrain",
+        kind: e.kind,
+        summary: e.summary,
+        source: e.source,
+        parameters: (e.parameters)(),
+    };
+    ENTRIES.iter().map(describe).collect()
+}
+
+/// The generator `kind` with `params`: a JSON object (or null) of the parameters that differ from the defaults.
+///
+/// # Errors
+/// A [`ParameterError`] for an unknown kind, an unknown parameter, or a value out of range.
+pub fn prepare(kind: &str, params: &Value) -> Result<Box<dyn Generator>, ParameterError> {
+    match ENTRIES.iter().find(|e| e.kind == kind) {
+        Some(entry) => (entry.prepare)(params),
+        None => {
+            let known: Vec<String> = ENTRIES.iter().map(|e| format!("`{}`", e.kind)).collect();
+            let message = format!("`{kind}` is no terrain generator; the known ones are {}", known.join(", "));
+            Err(ParameterError::new("kind", message))
+        }
+    }
+}
+
+fn prepare_as<Raw, Checked>(params: &Value) -> Result<Box<dyn Generator>, ParameterError>
+where
+    Raw: Default + Serialize + DeserializeOwned + JsonSchema,
+    Checked: TryFrom<Raw, Error = ParameterError> + Generator + 'static,
+{
+    let raw: Raw = read_parameters(&over_defaults::<Raw>(params)?)?;
+    Ok(Box::new(Checked::try_from(raw)?))
+}
+
+/// The defaults with the given parameters laid over them, table by table: naming one parameter of a layer leaves the
+/// others at that layer's defaults.
+fn over_defaults<Raw: Default + Serialize>(params: &Value) -> Result<Value, ParameterError> {
+    let nothing = Map::new();
+    let given = match params {
+        Value::Object(given) => given,
+        Value::Null => &nothing,
+        other => return Err(ParameterError::new("", format!("is {other}; it must be a table of parameters"))),
+    };
+    let mut all = serde_json::to_value(Raw::default()).map_err(|e| ParameterError::new("", e.to_string()))?;
+    if let Value::Object(all) = &mut all {
+        lay_over(all, given);
+    }
+    Ok(all)
+}
+
+fn lay_over(all: &mut Map<String, Value>, given: &Map<String, Value>) {
+    for (key, value) in given {
+        match (all.get_mut(key), value) {
+            (Some(Value::Object(below)), Value::Object(above)) => lay_over(below, above),
+            _ => {
+                all.insert(key.clone(), value.clone());
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,53 @@
+use super::*;
+use sastrugi_numeric::Streams;
+use serde_json::json;
+
+#[test]
+fn val_unknown_kinds_list_the_known_ones() {
+    let error = prepare("fractal", &Value::Null).err().unwrap();
+    assert!(error.message.contains("`multifractal`") && error.message.contains("`weierstrass_mandelbrot`"));
+}
+
+#[test]
+fn val_part_of_a_layer_leaves_the_rest_at_its_defaults() {
+    let generator = prepare("multifractal", &json!({"mid": {"sigma_px": 4.0}})).unwrap();
+    let all = generator.parameters();
+    assert_eq!(
+        all["mid"],
+        json!({"ridges": 32, "fractal_dimension": 2.45, "elevation_scale_m": 8e-8, "sigma_px": 4.0})
+    );
+    assert_eq!(all["size_px"], json!([1009, 1009]));
+}
+
+#[test]
+fn prop_parameters_read_back_to_the_same_generator() {
+    for kind in kinds() {
+        let params = json!({"size_m": [1.6, 1.2], "cell_m": 0.05});
+        let first = prepare(kind.kind, &params).unwrap();
+        let second = prepare(kind.kind, &first.parameters()).unwrap();
+        assert_eq!(first.parameters(), second.parameters());
+        assert_eq!(first.geometry(), second.geometry());
+        let streams = Streams::for_seed(1, "terrain");
+        assert_eq!(first.generate(&streams).unwrap(), second.generate(&streams).unwrap());
+        assert_eq!(first.generate(&streams).unwrap().geometry, first.geometry());
+    }
+}
+
+#[test]
+fn val_unknown_parameters_and_no_tables_are_refused() {
+    for kind in kinds() {
+        assert!(prepare(kind.kind, &json!({"sizes_px": [9, 9]})).is_err());
+        assert!(prepare(kind.kind, &json!([1, 2])).is_err());
+    }
+    assert!(prepare("multifractal", &json!({"high": {"dimension": 2.3}})).is_err());
+    assert!(prepare("multifractal", &json!({"high": 2.3})).is_err());
+}
+
+#[test]
+fn val_schemas_describe_every_parameter() {
+    for kind in kinds() {
+        let properties = kind.parameters["properties"].as_object().unwrap();
+        assert!(properties.values().all(|p| p["description"].is_string()), "{}", kind.kind);
+        assert!(kind.parameters.get("required").is_none());
+    }
+}
