@@ -1,1 +1,17 @@
-//! Room under construction.
+//! Files: DEM formats, atomic writes, Parquet tables, MCAP recordings, and the release folder with its checksums.
+//!
+//! The only room that names `arrow`, `parquet`, `mcap`, `foxglove`, `prost`, `geotiff-*`, `tiff` and `png`. Nothing here
+//! computes: heights, rows and recordings come in and go out as they are.
+//!
+//! * Same input, same bytes, on any x86-64 CPU and for any number of threads.
+//! * A file appears under its name only when it is complete and on disk ([`atomic`]).
+//! * Errors tell data that cannot be used (`unusable_input()`) from a file system that failed.
+
+pub mod atomic;
+pub mod dem;
+pub mod digest;
+pub mod parquet;
+pub mod release;
+
+/// `sastrugi/<version>`: the name of the program in every file that has a place for it.
+pub const PROGRAM: &str = concat!("sastrugi/", env!("CARGO_PKG_VERSION"));

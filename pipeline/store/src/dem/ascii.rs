@@ -1,0 +1,192 @@
+//! ESRI ASCII grids: a header of words, then rows from the north.
+
+use super::{Crs, Dem, DemInfo, Format, NO_DATA, Refusal, cell_count};
+use sastrugi_numeric::{Geometry, Grid};
+use std::fmt::Write;
+
+/// Sizes of the usual global grids in arc seconds that no grid in metres has by chance (as degrees they have no short
+/// decimal form).
+const ARC_SECONDS: [f64; 10] = [1.0 / 9.0, 1.0 / 3.0, 1.0, 2.0, 3.0, 5.0, 6.0, 10.0, 15.0, 30.0];
+
+/// True when the first word is one of a header.
+pub(super) fn looks_like(bytes: &[u8]) -> bool {
+    words(bytes).next().is_some_and(|word| matches!(Key::of(word), Some(Key::Columns | Key::Rows)))
+}
+
+/// Words of the file, each with the number of bytes from its start to the file's end.
+fn words(bytes: &[u8]) -> impl Iterator<Item = &[u8]> {
+    let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    text.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty())
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Key {
+    Columns,
+    Rows,
+    XCorner,
+    YCorner,
+    XCentre,
+    YCentre,
+    Cell,
+    CellX,
+    CellY,
+    NoData,
+}
+
+impl Key {
+    fn of(word: &[u8]) -> Option<Self> {
+        match word.to_ascii_lowercase().as_slice() {
+            b"ncols" => Some(Self::Columns),
+            b"nrows" => Some(Self::Rows),
+            b"xllcorner" => Some(Self::XCorner),
+            b"yllcorner" => Some(Self::YCorner),
+            b"xllcenter" => Some(Self::XCentre),
+            b"yllcenter" => Some(Self::YCentre),
+            b"cellsize" => Some(Self::Cell),
+            b"dx" | b"xdim" => Some(Self::CellX),
+            b"dy" | b"ydim" => Some(Self::CellY),
+            b"nodata_value" | b"nodata" => Some(Self::NoData),
+            _ => None,
+        }
+    }
+}
+
+#[derive(Default)]
+struct Header {
+    rows: Option<u64>,
+    cols: Option<u64>,
+    corner: [Option<f64>; 2],
+    centre: [Option<f64>; 2],
+    cell: [Option<f64>; 2],
+    nodata: Option<f64>,
+}
+
+impl Header {
+    fn set(&mut self, key: Key, word: &[u8]) -> Result<(), Refusal> {
+        match key {
+            Key::Columns => self.cols = Some(count(word, "ncols")?),
+            Key::Rows => self.rows = Some(count(word, "nrows")?),
+            Key::XCorner => self.corner[0] = Some(number(word)?),
+            Key::YCorner => self.corner[1] = Some(number(word)?),
+            Key::XCentre => self.centre[0] = Some(number(word)?),
+            Key::YCentre => self.centre[1] = Some(number(word)?),
+            Key::Cell => self.cell = [Some(number(word)?); 2],
+            Key::CellX => self.cell[0] = Some(number(word)?),
+            Key::CellY => self.cell[1] = Some(number(word)?),
+            Key::NoData => self.nodata = Some(number(word)?),
+        }
+        Ok(())
+    }
+
+    fn geometry(&self) -> Result<Geometry, Refusal> {
+        let missing = |what: &str| Refusal::new(format!("the header of the ASCII grid lacks {what}"));
+        let (rows, cols) = (self.rows.ok_or_else(|| missing("nrows"))?, self.cols.ok_or_else(|| missing("ncols"))?);
+        cell_count(rows, cols)?;
+        let mut cell = [0.0; 2];
+        let mut origin = [0.0; 2];
+        for axis in 0..2 {
+            cell[axis] = self.cell[axis].ok_or_else(|| missing("cellsize"))?;
+            let centre = self.centre[axis].map(|c| c - 0.5 * cell[axis]);
+            origin[axis] = self.corner[axis].or(centre).ok_or_else(|| missing("xllcorner and yllcorner"))?;
+        }
+        Ok(Geometry { rows: rows as usize, cols: cols as usize, cell, origin })
+    }
+}
+
+fn quoted(word: &[u8]) -> String {
+    let start: String = String::from_utf8_lossy(word).chars().take(24).collect();
+    format!("\"{}\"", start.escape_debug())
+}
+
+fn number(word: &[u8]) -> Result<f64, Refusal> {
+    let parsed = std::str::from_utf8(word).ok().and_then(|text| text.parse().ok());
+    parsed.ok_or_else(|| Refusal::new(format!("the ASCII grid holds {} where a number belongs", quoted(word))))
+}
+
+fn count(word: &[u8], key: &str) -> Result<u64, Refusal> {
+    let parsed = std::str::from_utf8(word).ok().and_then(|text| text.parse().ok());
+    parsed.ok_or_else(|| Refusal::new(format!("{key} of the ASCII grid is {}; it must be a count", quoted(word))))
+}
+
+/// Reads an ESRI ASCII grid.
+pub(super) fn parse(bytes: &[u8]) -> Result<Dem, Refusal> {
+    let mut header = Header::default();
+    let mut words = words(bytes).peekable();
+    while let Some(key) = words.peek().copied().and_then(Key::of) {
+        words.next();
+        let value = words.next().ok_or_else(|| Refusal::new("the header of the ASCII grid breaks off"))?;
+        header.set(key, value)?;
+    }
+    let geometry = header.geometry()?;
+    let cells = geometry.len();
+    // Every value takes a character and a separator.
+    if cells as u64 * 2 - 1 > bytes.len() as u64 {
+        let (rows, cols) = (geometry.rows, geometry.cols);
+        return Err(Refusal::new(format!("claims {rows} rows of {cols} columns in {} bytes", bytes.len())));
+    }
+    let (values, integers) = read_values(words, cells, header.nodata)?;
+    let (crs, notes) = guess_crs(&geometry);
+    let dtype = if integers { "int32" } else { "float32" };
+    let info = DemInfo { format: Format::EsriAscii, dtype, nodata: header.nodata, crs, pixel_is_point: false, notes };
+    Ok(Dem { grid: Grid::new(geometry, values), info })
+}
+
+fn read_values<'a>(
+    words: impl Iterator<Item = &'a [u8]>,
+    cells: usize,
+    nodata: Option<f64>,
+) -> Result<(Vec<f64>, bool), Refusal> {
+    let mut values = Vec::with_capacity(cells);
+    let mut integers = true;
+    for word in words {
+        if values.len() == cells {
+            return Err(Refusal::new(format!("holds more than the {cells} values its header announces")));
+        }
+        let value = number(word)?;
+        integers &= word.iter().all(|b| matches!(b, b'0'..=b'9' | b'-' | b'+'));
+        values.push(if Some(value) == nodata { f64::NAN } else { value });
+    }
+    if values.len() < cells {
+        return Err(Refusal::new(format!("holds {} of the {cells} values its header announces", values.len())));
+    }
+    Ok((values, integers))
+}
+
+/// The format names no reference system; coordinates on the globe at a usual arc-second spacing are taken as degrees.
+fn guess_crs(g: &Geometry) -> (Crs, Vec<String>) {
+    let [width, height] = g.size();
+    let on_globe = g.origin[0] >= -180.01
+        && g.origin[0] + width <= 360.01
+        && g.origin[1] >= -90.01
+        && g.origin[1] + height <= 90.01;
+    let seconds = 3600.0 * g.cell[1];
+    if on_globe && ARC_SECONDS.iter().any(|s| (seconds / s - 1.0).abs() < 1e-5) {
+        let note = format!("coordinates are taken as degrees on WGS 84 (cells of {seconds:.4} arc seconds)");
+        return (Crs::wgs84(), vec![note]);
+    }
+    (Crs::default(), vec!["the format names no reference system; coordinates are taken as metres".to_owned()])
+}
+
+/// The grid as text: shortest decimal forms that read back to the same numbers.
+pub(super) fn render(grid: &Grid) -> Result<Vec<u8>, Refusal> {
+    super::free_of_no_data_value(grid)?;
+    let g = &grid.geometry;
+    let cell = if g.cell[0] == g.cell[1] {
+        format!("cellsize {}", g.cell[0])
+    } else {
+        format!("dx {}\ndy {}", g.cell[0], g.cell[1])
+    };
+    let mut text = format!(
+        "ncols {}\nnrows {}\nxllcorner {}\nyllcorner {}\n{cell}\nNODATA_value {NO_DATA}\n",
+        g.cols, g.rows, g.origin[0], g.origin[1]
+    );
+    for row in 0..g.rows {
+        for (col, &value) in grid.row(row).iter().enumerate() {
+            let separator = if col + 1 == g.cols { '\n' } else { ' ' };
+            let value = if value.is_nan() { NO_DATA } else { value };
+            // Writing to a string cannot fail.
+            let _ = write!(text, "{value}{separator}");
+        }
+    }
+    Ok(text.into_bytes())
+}

@@ -1,0 +1,334 @@
+//! Elevation rasters of many formats, read to one form and written from it.
+//!
+//! Heights are metres as the file states them; `NaN` stands for no data. Cells follow the grid convention of
+//! `sastrugi-numeric`: a PixelIsPoint raster is shifted by half a cell so that its posts become cell centres. What is
+//! read equals what GDAL reads, value for value.
+//!
+//! Every size a file claims is checked against [`MAX_CELLS`] and against the bytes that are there before memory is
+//! asked for.
+
+mod ascii;
+mod crs;
+mod geotiff;
+mod hgt;
+mod npy;
+mod obj;
+mod png;
+mod tiff_writer;
+
+#[cfg(test)]
+mod tests;
+
+pub use crs::{Crs, GeoKey};
+pub use png::{HeightScale, write_png_heights, write_png16};
+
+use crate::atomic;
+use sastrugi_numeric::Grid;
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// Most cells of a raster: 2 GiB of heights in memory.
+pub const MAX_CELLS: u64 = 1 << 28;
+/// Heights without data in the formats that need a number for it.
+pub const NO_DATA: f64 = -9999.0;
+
+/// A raster that was read.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Dem {
+    /// Heights, m; `NaN` without data.
+    pub grid: Grid,
+    /// What the file says about them.
+    pub info: DemInfo,
+}
+
+/// What a raster file says beside its heights.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DemInfo {
+    /// File format.
+    pub format: Format,
+    /// Type of the stored values, as rasterio and numpy name it: `float32`, `int16` ...
+    pub dtype: &'static str,
+    /// Value that stands for no data, when the file names one.
+    pub nodata: Option<f64>,
+    /// Coordinate reference system.
+    pub crs: Crs,
+    /// True when the file places its values at points (and the grid was shifted by half a cell to centre them).
+    pub pixel_is_point: bool,
+    /// Sentences a user must know.
+    pub notes: Vec<String>,
+}
+
+/// Raster formats.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    /// TIFF with or without GeoTIFF tags.
+    GeoTiff,
+    /// ESRI ASCII grid.
+    EsriAscii,
+    /// SRTM tile.
+    Hgt,
+    /// NumPy array.
+    Npy,
+    /// Greyscale PNG, 8 or 16 bit.
+    Png,
+    /// Wavefront mesh; written only.
+    Obj,
+}
+
+impl Format {
+    /// Name in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::GeoTiff => "geotiff",
+            Self::EsriAscii => "esri_ascii",
+            Self::Hgt => "hgt",
+            Self::Npy => "npy",
+            Self::Png => "png",
+            Self::Obj => "obj",
+        }
+    }
+
+    /// The format of a file name's ending.
+    pub fn of_name(path: &Path) -> Option<Self> {
+        let ending = path.extension()?.to_str()?.to_ascii_lowercase();
+        match ending.as_str() {
+            "tif" | "tiff" => Some(Self::GeoTiff),
+            "asc" => Some(Self::EsriAscii),
+            "hgt" => Some(Self::Hgt),
+            "npy" => Some(Self::Npy),
+            "png" => Some(Self::Png),
+            "obj" => Some(Self::Obj),
+            _ => None,
+        }
+    }
+
+    /// The format of a file: by its first bytes, and by its name where those say nothing.
+    fn of_file(path: &Path, bytes: &[u8]) -> Option<Self> {
+        match bytes {
+            [b'I', b'I', 42 | 43, 0, ..] | [b'M', b'M', 0, 42 | 43, ..] => Some(Self::GeoTiff),
+            [0x93, b'N', b'U', b'M', b'P', b'Y', ..] => Some(Self::Npy),
+            [0x89, b'P', b'N', b'G', ..] => Some(Self::Png),
+            _ if ascii::looks_like(bytes) => Some(Self::EsriAscii),
+            _ => Self::of_name(path),
+        }
+    }
+}
+
+/// Why a raster was not read or written.
+#[derive(Debug, thiserror::Error)]
+pub enum DemError {
+    /// There is no such file.
+    #[error("{}: no such file", path.display())]
+    Missing {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The file is not a raster of heights, or not a whole one.
+    #[error("{}: {reason}", path.display())]
+    Unusable {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// The grid does not fit the format.
+    #[error("{}: {reason}", path.display())]
+    Unfit {
+        /// The file that was asked for.
+        path: PathBuf,
+        /// What does not fit.
+        reason: String,
+    },
+    /// The file system failed.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What failed.
+        source: io::Error,
+    },
+}
+
+impl DemError {
+    /// True when the data that was given is the cause (missing or unusable), not the file system.
+    pub fn unusable_input(&self) -> bool {
+        matches!(self, Self::Missing { .. } | Self::Unusable { .. })
+    }
+
+    fn reading(path: &Path, source: io::Error) -> Self {
+        match source.kind() {
+            io::ErrorKind::NotFound => Self::Missing { path: path.to_owned() },
+            io::ErrorKind::IsADirectory => Refusal::new("is a folder, not a raster").about(path),
+            _ => Self::Io { path: path.to_owned(), source },
+        }
+    }
+}
+
+/// Why bytes are no usable raster.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+struct Refusal(String);
+
+impl Refusal {
+    fn new(reason: impl Into<String>) -> Self {
+        Self(reason.into())
+    }
+
+    fn about(self, path: &Path) -> DemError {
+        DemError::Unusable { path: path.to_owned(), reason: self.0 }
+    }
+}
+
+/// What a caller knows about a file that the file does not say.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct ReadOptions {
+    /// Cell size east-west and north-south, m, for formats that carry none (.npy, .png, TIFF without GeoTIFF tags).
+    pub cell_m: Option<[f64; 2]>,
+}
+
+/// Reads a raster.
+///
+/// # Errors
+/// See [`DemError`]: a missing file, one that is no single-band raster of heights, one without any data, or one whose
+/// cells are rotated.
+pub fn read(path: &Path) -> Result<Dem, DemError> {
+    read_with(path, &ReadOptions::default())
+}
+
+/// Reads a raster with what the caller knows about it.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_with(path: &Path, options: &ReadOptions) -> Result<Dem, DemError> {
+    let bytes = fs::read(path).map_err(|e| DemError::reading(path, e))?;
+    parse(path, bytes, options).and_then(checked).map_err(|refusal| refusal.about(path))
+}
+
+fn parse(path: &Path, bytes: Vec<u8>, options: &ReadOptions) -> Result<Dem, Refusal> {
+    if bytes.is_empty() {
+        return Err(Refusal::new("the file is empty"));
+    }
+    match Format::of_file(path, &bytes) {
+        Some(Format::GeoTiff) => geotiff::parse(bytes, options),
+        Some(Format::EsriAscii) => ascii::parse(&bytes),
+        Some(Format::Hgt) => hgt::parse(path, &bytes),
+        Some(Format::Npy) => npy::parse(&bytes, options),
+        Some(Format::Png) => png::parse(&bytes, options),
+        Some(Format::Obj) | None => {
+            Err(Refusal::new("is no raster that can be read; GeoTIFF, ESRI ASCII, .hgt, .npy and greyscale .png can"))
+        }
+    }
+}
+
+/// The checks that every format shares.
+fn checked(mut dem: Dem) -> Result<Dem, Refusal> {
+    let g = &dem.grid.geometry;
+    if !g.cell.iter().all(|c| c.is_finite() && *c > 0.0) || !g.origin.iter().all(|o| o.is_finite()) {
+        return Err(Refusal::new(format!("the cell size {:?} at {:?} is not usable", g.cell, g.origin)));
+    }
+    let infinite = dem.grid.values.iter().filter(|v| v.is_infinite()).count();
+    if infinite > 0 {
+        dem.grid.values.iter_mut().filter(|v| v.is_infinite()).for_each(|v| *v = f64::NAN);
+        dem.info.notes.push(format!("{infinite} infinite values are read as no data"));
+    }
+    if dem.grid.finite_count() == 0 {
+        return Err(Refusal::new(format!("none of the {} x {} cells holds data", g.rows, g.cols)));
+    }
+    Ok(dem)
+}
+
+/// Number of cells of a claimed size, when it is one that can be held.
+fn cell_count(rows: u64, cols: u64) -> Result<usize, Refusal> {
+    if rows == 0 || cols == 0 {
+        return Err(Refusal::new(format!("holds no cell ({rows} rows, {cols} columns)")));
+    }
+    let cells = rows.checked_mul(cols).filter(|&n| n <= MAX_CELLS).ok_or_else(|| {
+        Refusal::new(format!("claims {rows} rows of {cols} columns; at most {MAX_CELLS} cells can be read"))
+    })?;
+    usize::try_from(cells).map_err(|_| Refusal::new(format!("{cells} cells do not fit in memory")))
+}
+
+/// A height that equals the number for no data would be read as no data.
+fn free_of_no_data_value(grid: &Grid) -> Result<(), Refusal> {
+    if grid.values.contains(&NO_DATA) {
+        return Err(Refusal::new(format!("a height of {NO_DATA} m cannot be told from no data")));
+    }
+    Ok(())
+}
+
+/// Compression of a written GeoTIFF.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Compression {
+    /// As they are.
+    None,
+    /// Deflate with predictor.
+    #[default]
+    Deflate,
+}
+
+/// How a raster is written.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct WriteOptions {
+    /// Compression of a GeoTIFF; other formats have one way.
+    pub compression: Compression,
+}
+
+/// Writes heights in the format of the name's ending: `.tif` (float32, tiles of 256, no data -9999, PixelIsArea),
+/// `.asc`, `.npy` (float64), `.hgt` (whole metres, 1201 or 3601 posts), `.png` (16 bit, scaled) or `.obj` (mesh).
+/// Returns sentences on what the format lost.
+///
+/// # Errors
+/// [`DemError::Unfit`] when the format cannot hold the grid, [`DemError::Io`] when the file cannot be written.
+pub fn write(path: &Path, grid: &Grid, crs: &Crs, options: &WriteOptions) -> Result<Vec<String>, DemError> {
+    let unfit = |reason: Refusal| DemError::Unfit { path: path.to_owned(), reason: reason.0 };
+    let (bytes, notes) = match Format::of_name(path) {
+        Some(Format::GeoTiff) => (tiff_writer::heights(grid, crs, options.compression).map_err(unfit)?, vec![]),
+        Some(Format::EsriAscii) => (ascii::render(grid).map_err(unfit)?, lost_crs(crs)),
+        Some(Format::Hgt) => hgt::render(path, grid, crs).map_err(unfit)?,
+        Some(Format::Npy) => (npy::render(grid), vec!["a .npy file keeps no cell size, place or CRS".to_owned()]),
+        Some(Format::Png) => {
+            let scale = write_png_heights(path, grid)?;
+            return Ok(vec![scale.sentence()]);
+        }
+        Some(Format::Obj) => (obj::render(grid), lost_crs(crs)),
+        None => {
+            let reason = "ends in none of .tif, .asc, .hgt, .npy, .png, .obj".to_owned();
+            return Err(DemError::Unfit { path: path.to_owned(), reason });
+        }
+    };
+    save(path, &bytes)?;
+    Ok(notes)
+}
+
+fn lost_crs(crs: &Crs) -> Vec<String> {
+    let known = *crs != Crs::default();
+    known.then(|| "the format keeps no coordinate reference system".to_owned()).into_iter().collect()
+}
+
+fn save(path: &Path, bytes: &[u8]) -> Result<(), DemError> {
+    atomic::write(path, bytes).map_err(|source| DemError::Io { path: path.to_owned(), source })
+}
+
+/// Writes a class map: 8-bit GeoTIFF, no data 255.
+///
+/// # Errors
+/// The file cannot be written.
+pub fn write_classes(path: &Path, grid: &Grid<u8>, crs: &Crs) -> Result<(), DemError> {
+    let unfit = |reason: Refusal| DemError::Unfit { path: path.to_owned(), reason: reason.0 };
+    save(path, &tiff_writer::classes(grid, crs).map_err(unfit)?)
+}
+
+/// Reads a class map that [`write_classes`] wrote.
+///
+/// # Errors
+/// As [`read`]; also when the raster is not of 8-bit classes.
+pub fn read_classes(path: &Path) -> Result<Grid<u8>, DemError> {
+    let bytes = fs::read(path).map_err(|e| DemError::reading(path, e))?;
+    let dem = geotiff::parse(bytes, &ReadOptions::default()).map_err(|refusal| refusal.about(path))?;
+    if dem.info.dtype != "uint8" {
+        return Err(Refusal::new(format!("holds {} values, not classes", dem.info.dtype)).about(path));
+    }
+    let no_data = sastrugi_schemas::RoughnessClass::NO_DATA;
+    Ok(dem.grid.map(|v| if v.is_nan() { no_data } else { v as u8 }))
+}

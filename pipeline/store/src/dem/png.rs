@@ -1,0 +1,128 @@
+//! Greyscale PNG: heights as 16-bit levels, for game engines and image programs.
+
+use super::{Crs, Dem, DemError, DemInfo, Format, ReadOptions, Refusal, cell_count, geotiff, save};
+use sastrugi_numeric::Grid;
+use std::io::Cursor;
+use std::path::Path;
+
+/// Keyword of the text that tells how to turn levels into heights.
+const KEYWORD: &str = "sastrugi.height";
+
+/// How levels of a 16-bit PNG become heights: `offset_m + step_m * level`; level 0 is no data.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HeightScale {
+    /// Height of level 0, m.
+    pub offset_m: f64,
+    /// Height of one level, m.
+    pub step_m: f64,
+}
+
+impl HeightScale {
+    /// Levels 1 to 65535 over the grid's range.
+    fn of(grid: &Grid) -> Self {
+        let (low, high) = grid.range().unwrap_or((0.0, 0.0));
+        let step_m = if high > low { (high - low) / 65534.0 } else { 1.0 };
+        Self { offset_m: low - step_m, step_m }
+    }
+
+    fn level(self, height: f64) -> u16 {
+        if height.is_finite() { ((height - self.offset_m) / self.step_m).round().clamp(1.0, 65535.0) as u16 } else { 0 }
+    }
+
+    fn height(self, level: f64) -> f64 {
+        if level == 0.0 { f64::NAN } else { self.offset_m + self.step_m * level }
+    }
+
+    /// The scale as a sentence.
+    pub fn sentence(self) -> String {
+        format!("heights are {} m + {} m x level; level 0 is no data", self.offset_m, self.step_m)
+    }
+
+    fn parse(text: &str) -> Option<Self> {
+        let (offset, step) = text.split_once(' ')?;
+        let scale = Self { offset_m: offset.parse().ok()?, step_m: step.parse().ok()? };
+        (scale.offset_m.is_finite() && scale.step_m.is_finite()).then_some(scale)
+    }
+}
+
+/// Writes levels as they are.
+///
+/// # Errors
+/// The grid is too large for a PNG, or the file cannot be written.
+pub fn write_png16(path: &Path, grid: &Grid<u16>) -> Result<(), DemError> {
+    save(path, &encode(path, grid, None)?)
+}
+
+/// Writes heights as levels from the lowest (1) to the highest (65535) and returns the scale, which is also in the
+/// file's text.
+///
+/// # Errors
+/// As [`write_png16`].
+pub fn write_png_heights(path: &Path, grid: &Grid) -> Result<HeightScale, DemError> {
+    let scale = HeightScale::of(grid);
+    save(path, &encode(path, &grid.map(|v| scale.level(v)), Some(scale))?)?;
+    Ok(scale)
+}
+
+fn encode(path: &Path, grid: &Grid<u16>, scale: Option<HeightScale>) -> Result<Vec<u8>, DemError> {
+    let unfit = |reason: String| DemError::Unfit { path: path.to_owned(), reason };
+    let side = |n: usize| u32::try_from(n).map_err(|_| unfit(format!("{n} pixels a side are too many for a PNG")));
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, side(grid.cols())?, side(grid.rows())?);
+    encoder.set_color(png::ColorType::Grayscale);
+    encoder.set_depth(png::BitDepth::Sixteen);
+    let failed = |e: png::EncodingError| unfit(e.to_string());
+    if let Some(scale) = scale {
+        let text = format!("{} {}", scale.offset_m, scale.step_m);
+        encoder.add_text_chunk(KEYWORD.to_owned(), text).map_err(failed)?;
+    }
+    let mut writer = encoder.write_header().map_err(failed)?;
+    let data: Vec<u8> = grid.values.iter().flat_map(|v| v.to_be_bytes()).collect();
+    writer.write_image_data(&data).map_err(failed)?;
+    writer.finish().map_err(failed)?;
+    Ok(bytes)
+}
+
+/// Reads a greyscale PNG: heights where the text gives a scale, levels otherwise.
+pub(super) fn parse(bytes: &[u8], options: &ReadOptions) -> Result<Dem, Refusal> {
+    let refused = |e: png::DecodingError| Refusal::new(format!("is no PNG that can be read: {e}"));
+    let mut reader = png::Decoder::new(Cursor::new(bytes)).read_info().map_err(refused)?;
+    let info = reader.info();
+    let (rows, cols, depth) = (u64::from(info.height), u64::from(info.width), info.bit_depth);
+    let wide = match (info.color_type, depth) {
+        (png::ColorType::Grayscale, png::BitDepth::Sixteen) => true,
+        (png::ColorType::Grayscale, png::BitDepth::Eight) => false,
+        (colour, depth) => {
+            return Err(Refusal::new(format!("is a PNG of {colour:?} {depth:?}; heights are 8- or 16-bit grey")));
+        }
+    };
+    let scale = info.uncompressed_latin1_text.iter().find(|t| t.keyword == KEYWORD);
+    let scale = scale.and_then(|t| HeightScale::parse(&t.text));
+    let cells = cell_count(rows, cols)?;
+    // Deflate stores at best 1032 bytes in one.
+    if cells as u64 > (bytes.len() as u64).saturating_mul(1032) {
+        return Err(Refusal::new(format!("claims {rows} rows of {cols} columns in {} bytes", bytes.len())));
+    }
+    let mut data = vec![0; cells * if wide { 2 } else { 1 }];
+    reader.next_frame(&mut data).map_err(refused)?;
+    let levels: Vec<f64> = if wide {
+        data.chunks_exact(2).map(|v| f64::from(u16::from_be_bytes([v[0], v[1]]))).collect()
+    } else {
+        data.iter().map(|&v| f64::from(v)).collect()
+    };
+    let mut notes = vec![];
+    if scale.is_none() {
+        notes.push("the PNG states no height scale; levels are taken as metres".to_owned());
+    }
+    let values = levels.into_iter().map(|level| scale.map_or(level, |s| s.height(level))).collect();
+    let geometry = geotiff::unplaced(rows as usize, cols as usize, options, &mut notes);
+    let info = DemInfo {
+        format: Format::Png,
+        dtype: if wide { "uint16" } else { "uint8" },
+        nodata: None,
+        crs: Crs::default(),
+        pixel_is_point: false,
+        notes,
+    };
+    Ok(Dem { grid: Grid::new(geometry, values), info })
+}

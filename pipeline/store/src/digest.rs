@@ -1,0 +1,132 @@
+//! SHA-256 of files and of decoded content.
+//!
+//! A content hash covers what a reader decodes (heights, rows, messages), not the compressed bytes, so that a new
+//! compressor does not read as new data. Every part of it is preceded by its length or has a fixed one.
+
+use sastrugi_numeric::Grid;
+use sha2::{Digest, Sha256};
+use std::fs::File;
+use std::io::{self, Read, Write};
+use std::path::Path;
+
+const BUFFER: usize = 1 << 18;
+
+/// Hash of decoded content under construction.
+#[derive(Clone)]
+pub struct ContentHash(Sha256);
+
+impl ContentHash {
+    /// A hash for one kind of content, as `heights` or `table missions`.
+    pub fn new(kind: &str) -> Self {
+        let mut hash = Self(Sha256::new());
+        hash.text(kind);
+        hash
+    }
+
+    /// Bytes after their length.
+    pub fn bytes(&mut self, bytes: &[u8]) {
+        self.u64(bytes.len() as u64);
+        self.0.update(bytes);
+    }
+
+    /// Text after its length.
+    pub fn text(&mut self, text: &str) {
+        self.bytes(text.as_bytes());
+    }
+
+    /// Bytes of a fixed number.
+    pub fn raw(&mut self, bytes: &[u8]) {
+        self.0.update(bytes);
+    }
+
+    /// A number, little-endian.
+    pub fn u64(&mut self, value: u64) {
+        self.0.update(value.to_le_bytes());
+    }
+
+    /// A float by its bits, little-endian.
+    pub fn f64(&mut self, value: f64) {
+        self.u64(value.to_bits());
+    }
+
+    /// The hash in hexadecimal.
+    pub fn finish(self) -> String {
+        hex(&self.0.finalize())
+    }
+}
+
+/// Content hash of heights as a release stores them: shape, place and single-precision values, no data as one NaN.
+pub fn heights(grid: &Grid) -> String {
+    let mut hash = ContentHash::new("heights");
+    geometry(&mut hash, grid);
+    for row in grid.values.chunks(grid.cols().max(1)) {
+        let bytes: Vec<u8> = row.iter().flat_map(|&v| canonical_f32(v).to_le_bytes()).collect();
+        hash.raw(&bytes);
+    }
+    hash.finish()
+}
+
+/// Content hash of a class map.
+pub fn classes(grid: &Grid<u8>) -> String {
+    let mut hash = ContentHash::new("classes");
+    geometry(&mut hash, grid);
+    hash.raw(&grid.values);
+    hash.finish()
+}
+
+fn geometry<T>(hash: &mut ContentHash, grid: &Grid<T>) {
+    let g = &grid.geometry;
+    hash.u64(g.rows as u64);
+    hash.u64(g.cols as u64);
+    for v in g.cell.iter().chain(&g.origin) {
+        hash.f64(*v);
+    }
+}
+
+fn canonical_f32(value: f64) -> f32 {
+    if value.is_nan() { f32::NAN } else { value as f32 }
+}
+
+/// SHA-256 of bytes, in hexadecimal.
+pub fn of_bytes(bytes: &[u8]) -> String {
+    hex(&Sha256::digest(bytes))
+}
+
+/// SHA-256 of text, in hexadecimal.
+pub fn of_text(text: &str) -> String {
+    of_bytes(text.as_bytes())
+}
+
+/// Size and SHA-256 of a file.
+///
+/// # Errors
+/// The file cannot be read.
+pub fn of_file(path: &Path) -> io::Result<(u64, String)> {
+    copy(&mut File::open(path)?, &mut io::sink())
+}
+
+/// Copies a stream and returns its length and SHA-256.
+///
+/// # Errors
+/// Reading or writing failed.
+pub fn copy(from: &mut impl Read, to: &mut impl Write) -> io::Result<(u64, String)> {
+    let mut hash = Sha256::new();
+    let mut buffer = vec![0; BUFFER];
+    let mut total = 0;
+    loop {
+        match from.read(&mut buffer) {
+            Ok(0) => return Ok((total, hex(&hash.finalize()))),
+            Ok(n) => {
+                hash.update(&buffer[..n]);
+                to.write_all(&buffer[..n])?;
+                total += n as u64;
+            }
+            Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
+            Err(e) => return Err(e),
+        }
+    }
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|b| format!("{b:02x}")).collect()
+}

@@ -1,0 +1,476 @@
+//! Parquet tables of a release: rows of `sastrugi-schemas` out and in.
+//!
+//! Units and descriptions stand in each field's metadata, provenance in the file's (`sastrugi.study_sha256`, `.seed`,
+//! `.version`, `.license`, `.table`). Rows are sorted by their keys, which are never null; a float that is `NaN` is
+//! stored as null. Memory is bounded by one row group, whatever the number of rows.
+
+use crate::PROGRAM;
+use crate::atomic::AtomicFile;
+use crate::digest::ContentHash;
+use arrow_array::builder::{BooleanBuilder, Float64Builder, Int64Builder, StringBuilder};
+use arrow_array::{Array, ArrayRef, BooleanArray, Float64Array, Int64Array, RecordBatch, StringArray};
+use arrow_schema::{ArrowError, DataType, Field, Schema, SchemaRef};
+use parquet::arrow::ArrowWriter;
+use parquet::arrow::arrow_reader::{ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder};
+use parquet::basic::{Compression, Encoding, ZstdLevel};
+use parquet::errors::ParquetError;
+use parquet::file::metadata::{KeyValue, SortingColumn};
+use parquet::file::properties::WriterProperties;
+use parquet::schema::types::ColumnPath;
+use sastrugi_schemas::{Cell, Column, ColumnType, Record, Table};
+use std::cmp::Ordering;
+use std::fs::File;
+use std::io;
+use std::marker::PhantomData;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Rows gathered before they are encoded.
+const BATCH_ROWS: usize = 4096;
+/// Rows of a row group: for the widest table about 12 MiB in memory.
+const ROW_GROUP_ROWS: usize = 1 << 16;
+/// Level of Zstandard: the fastest; higher ones gain 3 % on samples.
+const ZSTD_LEVEL: i32 = 1;
+
+/// Why a table was not written or read.
+#[derive(Debug, thiserror::Error)]
+pub enum TableError {
+    /// The file is no Parquet file, or not a whole one.
+    #[error("{}: {reason}", path.display())]
+    Unusable {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// The rows to write are not sorted by their keys, or a key comes twice.
+    #[error("{}: row {row} of table {table} does not come after the row before it in the order of its keys", path.display())]
+    Order {
+        /// The file.
+        path: PathBuf,
+        /// The table.
+        table: &'static str,
+        /// Number of the row, from 0.
+        row: u64,
+    },
+    /// The rows could not be encoded.
+    #[error("{}: the rows could not be encoded: {source}", path.display())]
+    Encoding {
+        /// The file.
+        path: PathBuf,
+        /// What failed.
+        source: ParquetError,
+    },
+    /// The file system failed.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What failed.
+        source: io::Error,
+    },
+}
+
+impl TableError {
+    /// True when the file that was given is the cause (missing or unusable), not the file system.
+    pub fn unusable_input(&self) -> bool {
+        match self {
+            Self::Unusable { .. } => true,
+            Self::Io { source, .. } => source.kind() == io::ErrorKind::NotFound,
+            Self::Order { .. } | Self::Encoding { .. } => false,
+        }
+    }
+
+    fn unusable(path: &Path, reason: impl ToString) -> Self {
+        Self::Unusable { path: path.to_owned(), reason: reason.to_string() }
+    }
+
+    fn io(path: &Path, source: io::Error) -> Self {
+        Self::Io { path: path.to_owned(), source }
+    }
+}
+
+/// Provenance of a table, in its file's metadata.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct TableMetadata {
+    /// SHA-256 of the study.
+    pub study_sha256: String,
+    /// Seed of the study.
+    pub seed: u64,
+    /// Version of the program.
+    pub version: String,
+    /// Licence of the release, SPDX.
+    pub license: String,
+}
+
+impl TableMetadata {
+    fn pairs(&self, table: &str) -> Vec<KeyValue> {
+        let pair = |key: &str, value: &str| KeyValue::new(format!("sastrugi.{key}"), value.to_owned());
+        vec![
+            pair("table", table),
+            pair("study_sha256", &self.study_sha256),
+            pair("seed", &self.seed.to_string()),
+            pair("version", &self.version),
+            pair("license", &self.license),
+        ]
+    }
+}
+
+/// What was written.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct TableSummary {
+    /// Number of rows.
+    pub rows: u64,
+    /// Hash of the decoded rows: names of table and columns, then every value in order.
+    pub content_sha256: String,
+}
+
+/// The Arrow schema of a table.
+fn schema(table: &Table) -> SchemaRef {
+    let field = |column: &Column| {
+        let metadata = [("unit", column.unit), ("description", column.description)];
+        Field::new(column.name, data_type(column.column_type), !column.key).with_metadata(metadata)
+    };
+    let metadata = [("description", table.description)];
+    Arc::new(Schema::new(table.columns.iter().map(field).collect::<Vec<_>>()).with_metadata(metadata))
+}
+
+fn data_type(column: ColumnType) -> DataType {
+    match column {
+        ColumnType::Text => DataType::Utf8,
+        ColumnType::F64 => DataType::Float64,
+        ColumnType::I64 => DataType::Int64,
+        ColumnType::Bool => DataType::Boolean,
+    }
+}
+
+fn properties(table: &Table, metadata: &TableMetadata) -> Result<WriterProperties, ParquetError> {
+    let sorting = |index: usize| SortingColumn { column_idx: index as i32, descending: false, nulls_first: false };
+    let keys = table.columns.iter().take_while(|c| c.key).count();
+    let mut builder = WriterProperties::builder()
+        .set_created_by(PROGRAM.to_owned())
+        .set_compression(Compression::ZSTD(ZstdLevel::try_new(ZSTD_LEVEL)?))
+        .set_max_row_group_row_count(Some(ROW_GROUP_ROWS))
+        .set_sorting_columns(Some((0..keys).map(sorting).collect()))
+        .set_key_value_metadata(Some(metadata.pairs(table.name)));
+    // Measured floats seldom repeat: byte planes compress better than a dictionary.
+    for column in table.columns.iter().filter(|c| c.column_type == ColumnType::F64) {
+        let path = ColumnPath::from(column.name);
+        builder = builder
+            .set_column_dictionary_enabled(path.clone(), false)
+            .set_column_encoding(path, Encoding::BYTE_STREAM_SPLIT);
+    }
+    Ok(builder.build())
+}
+
+/// Writes one table row by row. The file appears when [`TableWriter::finish`] has succeeded.
+pub struct TableWriter<R: Record> {
+    path: PathBuf,
+    writer: ArrowWriter<AtomicFile>,
+    schema: SchemaRef,
+    columns: Vec<ColumnBuilder>,
+    waiting: usize,
+    rows: u64,
+    previous: Vec<Cell>,
+    content: ContentHash,
+    record: PhantomData<R>,
+}
+
+impl<R: Record> TableWriter<R> {
+    /// Starts the table `R::TABLE` in a file.
+    ///
+    /// # Errors
+    /// The file cannot be made.
+    pub fn create(path: &Path, metadata: &TableMetadata) -> Result<Self, TableError> {
+        let encoding = |source| TableError::Encoding { path: path.to_owned(), source };
+        let table = R::TABLE;
+        let schema = schema(&table);
+        let file = AtomicFile::create(path).map_err(|e| TableError::io(path, e))?;
+        let properties = properties(&table, metadata).map_err(encoding)?;
+        let writer = ArrowWriter::try_new(file, schema.clone(), Some(properties)).map_err(encoding)?;
+        Ok(Self {
+            path: path.to_owned(),
+            writer,
+            schema,
+            columns: table.columns.iter().map(|c| ColumnBuilder::new(c.column_type)).collect(),
+            waiting: 0,
+            rows: 0,
+            previous: vec![],
+            content: content_hash(&table),
+            record: PhantomData,
+        })
+    }
+
+    /// Appends a row, which must come after the previous one in the order of the keys.
+    ///
+    /// # Errors
+    /// [`TableError::Order`], or the file cannot be written.
+    pub fn push(&mut self, row: &R) -> Result<(), TableError> {
+        let mut cells = row.cells();
+        let keys = R::TABLE.columns.iter().take_while(|c| c.key).count();
+        if keys > 0 && self.rows > 0 && compare(&self.previous, &cells[..keys]) != Ordering::Less {
+            return Err(TableError::Order { path: self.path.clone(), table: R::TABLE.name, row: self.rows });
+        }
+        for (column, cell) in self.columns.iter_mut().zip(&cells) {
+            column.push(cell);
+            hash_cell(&mut self.content, cell);
+        }
+        cells.truncate(keys);
+        self.previous = cells;
+        self.rows += 1;
+        self.waiting += 1;
+        if self.waiting == BATCH_ROWS { self.encode() } else { Ok(()) }
+    }
+
+    /// Number of rows so far.
+    pub fn rows(&self) -> u64 {
+        self.rows
+    }
+
+    fn encode(&mut self) -> Result<(), TableError> {
+        self.waiting = 0;
+        let arrays = self.columns.iter_mut().map(ColumnBuilder::finish).collect();
+        let batch = RecordBatch::try_new(self.schema.clone(), arrays).map_err(ParquetError::from);
+        let written = batch.and_then(|batch| self.writer.write(&batch));
+        written.map_err(|source| TableError::Encoding { path: self.path.clone(), source })
+    }
+
+    /// Completes the file and brings it to disk under its name.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn finish(mut self) -> Result<TableSummary, TableError> {
+        if self.waiting > 0 {
+            self.encode()?;
+        }
+        let Self { path, writer, rows, content, .. } = self;
+        let file = writer.into_inner().map_err(|source| TableError::Encoding { path: path.clone(), source })?;
+        file.commit().map_err(|e| TableError::io(&path, e))?;
+        Ok(TableSummary { rows, content_sha256: content.finish() })
+    }
+}
+
+fn compare(a: &[Cell], b: &[Cell]) -> Ordering {
+    let pairs = a.iter().zip(b).map(|(a, b)| match (a, b) {
+        (Cell::Text(a), Cell::Text(b)) => a.cmp(b),
+        (Cell::I64(a), Cell::I64(b)) => a.cmp(b),
+        (Cell::Bool(a), Cell::Bool(b)) => a.cmp(b),
+        (Cell::F64(a), Cell::F64(b)) => a.total_cmp(b),
+        _ => Ordering::Equal,
+    });
+    pairs.fold(Ordering::Equal, Ordering::then)
+}
+
+fn content_hash(table: &Table) -> ContentHash {
+    let mut hash = ContentHash::new("table");
+    hash.text(table.name);
+    hash.u64(table.columns.len() as u64);
+    for column in table.columns {
+        hash.text(column.name);
+    }
+    hash
+}
+
+fn hash_cell(hash: &mut ContentHash, cell: &Cell) {
+    match cell {
+        Cell::Null => hash.raw(&[0]),
+        Cell::Text(v) => {
+            hash.raw(&[1]);
+            hash.text(v);
+        }
+        Cell::F64(v) => {
+            hash.raw(&[2]);
+            hash.f64(*v);
+        }
+        Cell::I64(v) => {
+            hash.raw(&[3]);
+            hash.raw(&v.to_le_bytes());
+        }
+        Cell::Bool(v) => hash.raw(&[4, u8::from(*v)]),
+    }
+}
+
+enum ColumnBuilder {
+    Text(StringBuilder),
+    F64(Float64Builder),
+    I64(Int64Builder),
+    Bool(BooleanBuilder),
+}
+
+impl ColumnBuilder {
+    fn new(column: ColumnType) -> Self {
+        match column {
+            ColumnType::Text => Self::Text(StringBuilder::new()),
+            ColumnType::F64 => Self::F64(Float64Builder::new()),
+            ColumnType::I64 => Self::I64(Int64Builder::new()),
+            ColumnType::Bool => Self::Bool(BooleanBuilder::new()),
+        }
+    }
+
+    /// Appends a value; one of another type (which a row type cannot produce) counts as null.
+    fn push(&mut self, cell: &Cell) {
+        match (self, cell) {
+            (Self::Text(b), Cell::Text(v)) => b.append_value(v),
+            (Self::F64(b), Cell::F64(v)) => b.append_value(*v),
+            (Self::I64(b), Cell::I64(v)) => b.append_value(*v),
+            (Self::Bool(b), Cell::Bool(v)) => b.append_value(*v),
+            (Self::Text(b), _) => b.append_null(),
+            (Self::F64(b), _) => b.append_null(),
+            (Self::I64(b), _) => b.append_null(),
+            (Self::Bool(b), _) => b.append_null(),
+        }
+    }
+
+    fn finish(&mut self) -> ArrayRef {
+        match self {
+            Self::Text(b) => Arc::new(b.finish()),
+            Self::F64(b) => Arc::new(b.finish()),
+            Self::I64(b) => Arc::new(b.finish()),
+            Self::Bool(b) => Arc::new(b.finish()),
+        }
+    }
+}
+
+/// Rows of a table, read one batch at a time.
+pub struct TableReader<R: Record> {
+    path: PathBuf,
+    batches: ParquetRecordBatchReader,
+    batch: Vec<ColumnValues>,
+    row: usize,
+    rows: usize,
+    record: PhantomData<R>,
+}
+
+impl<R: Record> TableReader<R> {
+    /// Opens a file of the table `R::TABLE`.
+    ///
+    /// # Errors
+    /// The file is missing, no Parquet file, or has other columns than the table.
+    pub fn open(path: &Path) -> Result<Self, TableError> {
+        let builder = open(path, &R::TABLE)?;
+        let batches = builder.with_batch_size(BATCH_ROWS).build().map_err(|e| TableError::unusable(path, e))?;
+        Ok(Self { path: path.to_owned(), batches, batch: vec![], row: 0, rows: 0, record: PhantomData })
+    }
+
+    /// Loads the next batch that has rows; false at the end.
+    fn advance(&mut self) -> Result<bool, TableError> {
+        while self.row == self.rows {
+            let Some(batch) = self.batches.next() else { return Ok(false) };
+            let batch = batch.map_err(|e: ArrowError| TableError::unusable(&self.path, e))?;
+            let values = batch.columns().iter().map(ColumnValues::of).collect::<Option<Vec<_>>>();
+            self.batch = values.ok_or_else(|| TableError::unusable(&self.path, "holds a column of an unknown type"))?;
+            (self.row, self.rows) = (0, batch.num_rows());
+        }
+        Ok(true)
+    }
+
+    fn read(&mut self) -> Result<R, TableError> {
+        let cells = self.batch.iter().map(|column| column.cell(self.row)).collect();
+        self.row += 1;
+        R::from_cells(cells).ok_or_else(|| TableError::unusable(&self.path, "holds a null where a value is required"))
+    }
+}
+
+impl<R: Record> Iterator for TableReader<R> {
+    type Item = Result<R, TableError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        match self.advance() {
+            Ok(true) => Some(self.read()),
+            Ok(false) => None,
+            Err(error) => Some(Err(error)),
+        }
+    }
+}
+
+enum ColumnValues {
+    Text(StringArray),
+    F64(Float64Array),
+    I64(Int64Array),
+    Bool(BooleanArray),
+}
+
+impl ColumnValues {
+    fn of(array: &ArrayRef) -> Option<Self> {
+        let any = array.as_any();
+        match array.data_type() {
+            DataType::Utf8 => any.downcast_ref().cloned().map(Self::Text),
+            DataType::Float64 => any.downcast_ref().cloned().map(Self::F64),
+            DataType::Int64 => any.downcast_ref().cloned().map(Self::I64),
+            DataType::Boolean => any.downcast_ref().cloned().map(Self::Bool),
+            _ => None,
+        }
+    }
+
+    fn cell(&self, row: usize) -> Cell {
+        match self {
+            Self::Text(a) if a.is_valid(row) => Cell::Text(a.value(row).to_owned()),
+            Self::F64(a) if a.is_valid(row) => Cell::F64(a.value(row)),
+            Self::I64(a) if a.is_valid(row) => Cell::I64(a.value(row)),
+            Self::Bool(a) if a.is_valid(row) => Cell::Bool(a.value(row)),
+            _ => Cell::Null,
+        }
+    }
+}
+
+fn open(path: &Path, table: &Table) -> Result<ParquetRecordBatchReaderBuilder<File>, TableError> {
+    let file = File::open(path).map_err(|e| TableError::io(path, e))?;
+    let builder = ParquetRecordBatchReaderBuilder::try_new(file).map_err(|e| TableError::unusable(path, e))?;
+    let found = builder.schema();
+    for (column, expected) in schema(table).fields().iter().enumerate() {
+        let Some(field) = found.fields().get(column) else {
+            let reason = format!("table {} lacks the column {}", table.name, expected.name());
+            return Err(TableError::unusable(path, reason));
+        };
+        if field != expected {
+            let reason = format!(
+                "column {column} of table {} is {}, not {} as this version describes it",
+                table.name,
+                describe(field),
+                describe(expected)
+            );
+            return Err(TableError::unusable(path, reason));
+        }
+    }
+    if found.fields().len() > table.columns.len() {
+        let reason =
+            format!("table {} has {} columns too many", table.name, found.fields().len() - table.columns.len());
+        return Err(TableError::unusable(path, reason));
+    }
+    Ok(builder)
+}
+
+fn describe(field: &Field) -> String {
+    let unit = field.metadata().get("unit").map_or("", String::as_str);
+    format!("{} ({}, unit \"{unit}\", {})", field.name(), field.data_type(), nullability(field))
+}
+
+fn nullability(field: &Field) -> &'static str {
+    if field.is_nullable() { "nullable" } else { "never null" }
+}
+
+/// All rows of a file.
+///
+/// # Errors
+/// As [`TableReader::open`]; also when the rows cannot be decoded.
+pub fn read_table<R: Record>(path: &Path) -> Result<Vec<R>, TableError> {
+    TableReader::open(path)?.collect()
+}
+
+/// Calls `f` with every row of a file.
+///
+/// # Errors
+/// As [`read_table`].
+pub fn for_each_row<R: Record>(path: &Path, f: impl FnMut(R)) -> Result<(), TableError> {
+    let mut f = f;
+    TableReader::open(path)?.try_for_each(|row| row.map(&mut f))
+}
+
+/// Checks that a file has a table's columns, types, units and descriptions; returns its number of rows.
+///
+/// # Errors
+/// As [`TableReader::open`].
+pub fn check_table(path: &Path, table: &Table) -> Result<u64, TableError> {
+    let builder = open(path, table)?;
+    Ok(builder.metadata().file_metadata().num_rows().unsigned_abs())
+}

@@ -1,0 +1,183 @@
+//! The release folder: assembled aside, sealed with a manifest and checksums, given its name by one rename, and checked.
+
+mod builder;
+mod verify;
+
+#[cfg(test)]
+mod tests;
+
+pub use builder::{Head, ReleaseBuilder};
+pub use verify::{Problem, ProblemKind, VerifyReport, verify};
+
+use crate::parquet::{TableError, TableReader};
+use sastrugi_schemas::Record;
+use sastrugi_schemas::manifest::{FORMAT, Manifest, PROGRAM};
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// Name of the manifest in a release.
+pub const MANIFEST: &str = "manifest.json";
+/// Name of the list of checksums in a release, in the form of `sha256sum`.
+pub const SUMS: &str = "SHA256SUMS";
+/// Folder of the tables in a release.
+pub const TABLES: &str = "tables";
+
+/// Why a release was not made, opened or checked.
+#[derive(Debug, thiserror::Error)]
+pub enum ReleaseError {
+    /// The folder is missing or holds neither manifest nor checksums.
+    #[error("{}: no release: {reason}", path.display())]
+    NotARelease {
+        /// The folder.
+        path: PathBuf,
+        /// What is missing or wrong.
+        reason: String,
+    },
+    /// The folder to write holds files that are not of a release, and is left alone.
+    #[error("{}: the folder is not empty and no release; it is left alone", path.display())]
+    Occupied {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// A path in the release is not usable.
+    #[error("\"{path}\" cannot be a file of a release: {reason}")]
+    Path {
+        /// The path.
+        path: String,
+        /// Why.
+        reason: &'static str,
+    },
+    /// A table could not be read.
+    #[error(transparent)]
+    Table(#[from] TableError),
+    /// The manifest could not be written as JSON.
+    #[error("the manifest could not be written: {0}")]
+    Json(#[from] serde_json::Error),
+    /// The file system failed.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The file or folder.
+        path: PathBuf,
+        /// What failed.
+        source: io::Error,
+    },
+}
+
+impl ReleaseError {
+    /// True when the data that was given is the cause (missing or unusable), not the file system.
+    pub fn unusable_input(&self) -> bool {
+        match self {
+            Self::NotARelease { .. } => true,
+            Self::Table(error) => error.unusable_input(),
+            Self::Io { source, .. } => source.kind() == io::ErrorKind::NotFound,
+            Self::Occupied { .. } | Self::Path { .. } | Self::Json(_) => false,
+        }
+    }
+
+    fn io(path: &Path) -> impl FnOnce(io::Error) -> Self {
+        let path = path.to_owned();
+        move |source| Self::Io { path, source }
+    }
+
+    fn not_a_release(path: &Path, reason: impl Into<String>) -> Self {
+        Self::NotARelease { path: path.to_owned(), reason: reason.into() }
+    }
+}
+
+/// A sealed release.
+#[derive(Clone, Debug)]
+pub struct Release {
+    folder: PathBuf,
+    manifest: Manifest,
+}
+
+impl Release {
+    /// Opens a release without checking its files (see [`verify`]).
+    ///
+    /// # Errors
+    /// [`ReleaseError::NotARelease`] when the folder has no manifest of ours.
+    pub fn open(folder: &Path) -> Result<Self, ReleaseError> {
+        let path = folder.join(MANIFEST);
+        let text = fs::read(&path).map_err(|e| match e.kind() {
+            io::ErrorKind::NotFound | io::ErrorKind::NotADirectory => {
+                ReleaseError::not_a_release(folder, format!("there is no {MANIFEST} in it"))
+            }
+            _ => ReleaseError::io(&path)(e),
+        })?;
+        let manifest = parse_manifest(&text).map_err(|reason| ReleaseError::not_a_release(folder, reason))?;
+        Ok(Self { folder: folder.to_owned(), manifest })
+    }
+
+    /// Its manifest.
+    pub fn manifest(&self) -> &Manifest {
+        &self.manifest
+    }
+
+    /// Its folder.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// Where a file of the manifest lies.
+    pub fn path(&self, artifact: &str) -> PathBuf {
+        self.folder.join(artifact)
+    }
+
+    /// The files of a table, sorted; none when the table has no rows.
+    pub fn table_files(&self, table: &str) -> Vec<PathBuf> {
+        let of_table = |path: &&str| table_of(path) == Some(table);
+        self.manifest.artifacts.iter().map(|a| a.path.as_str()).filter(of_table).map(|p| self.path(p)).collect()
+    }
+
+    /// All rows of a table.
+    ///
+    /// # Errors
+    /// A file cannot be read or has other columns.
+    pub fn rows<R: Record>(&self) -> Result<Vec<R>, ReleaseError> {
+        let mut rows = vec![];
+        self.for_each_row(|row| rows.push(row))?;
+        Ok(rows)
+    }
+
+    /// Calls `f` with every row of a table, file by file.
+    ///
+    /// # Errors
+    /// As [`Release::rows`].
+    pub fn for_each_row<R: Record>(&self, mut f: impl FnMut(R)) -> Result<(), ReleaseError> {
+        for file in self.table_files(R::TABLE.name) {
+            TableReader::open(&file)?.try_for_each(|row| row.map(&mut f))?;
+        }
+        Ok(())
+    }
+}
+
+fn parse_manifest(bytes: &[u8]) -> Result<Manifest, String> {
+    let manifest: Manifest = serde_json::from_slice(bytes).map_err(|e| format!("its {MANIFEST} is not ours: {e}"))?;
+    if manifest.program != PROGRAM || manifest.format != FORMAT {
+        return Err(format!("its {MANIFEST} is of {} format {}", manifest.program, manifest.format));
+    }
+    Ok(manifest)
+}
+
+/// Name of the table that a path belongs to.
+fn table_of(path: &str) -> Option<&str> {
+    let rest = path.strip_prefix(TABLES)?.strip_prefix('/')?;
+    let (table, file) = rest.split_once('/')?;
+    file.ends_with(".parquet").then_some(table)
+}
+
+/// Refuses a path that would leave the release, or that `sha256sum` cannot list plainly.
+fn check_path(path: &str) -> Result<(), ReleaseError> {
+    let refuse = |reason| Err(ReleaseError::Path { path: path.to_owned(), reason });
+    if path == MANIFEST || path == SUMS {
+        return refuse("the name is taken");
+    }
+    if path.chars().any(|c| c.is_control() || c == '\\') {
+        return refuse("it has a control character or backslash");
+    }
+    if path.split('/').any(|part| part.is_empty() || part.starts_with('.')) {
+        return refuse("it has an empty or hidden part");
+    }
+    Ok(())
+}

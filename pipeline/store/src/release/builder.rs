@@ -1,0 +1,259 @@
+//! Assembly of a release in a folder of its own, and its sealing.
+
+use super::{MANIFEST, Release, ReleaseError, SUMS, TABLES, check_path};
+use crate::atomic::sync_folder;
+use crate::digest;
+use crate::parquet::{TableMetadata, TableWriter};
+use sastrugi_schemas::Record;
+use sastrugi_schemas::manifest::{Artifact, FORMAT, FailedItem, Manifest, Origin, PROGRAM};
+use std::ffi::OsString;
+use std::fmt::Write as _;
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+
+/// What a release says of itself.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Head {
+    /// Name of the study.
+    pub name: String,
+    /// SHA-256 of the study as it was run.
+    pub study_sha256: String,
+    /// Seed of the study.
+    pub seed: u64,
+    /// Version of the program.
+    pub version: String,
+    /// Licence of the release, SPDX.
+    pub license: String,
+}
+
+impl Head {
+    /// The same in the metadata of tables.
+    pub fn table_metadata(&self) -> TableMetadata {
+        TableMetadata {
+            study_sha256: self.study_sha256.clone(),
+            seed: self.seed,
+            version: self.version.clone(),
+            license: self.license.clone(),
+        }
+    }
+}
+
+/// A release under construction.
+#[derive(Debug)]
+pub struct ReleaseBuilder {
+    staging: PathBuf,
+    head: Head,
+    artifacts: Vec<Artifact>,
+    failed: Vec<FailedItem>,
+}
+
+impl ReleaseBuilder {
+    /// Starts a release beside its place: in `<dest>.assembling-<study>`, which is emptied when a killed run left it.
+    ///
+    /// # Errors
+    /// [`ReleaseError::Occupied`] when `dest` holds something that is no release; the folder cannot be made.
+    pub fn beside(dest: &Path, head: Head) -> Result<Self, ReleaseError> {
+        check_dest(dest)?;
+        let study: String = head.study_sha256.chars().take(12).collect();
+        Self::create(&with_suffix(dest, &format!(".assembling-{study}")), head)
+    }
+
+    /// Starts a release in a folder that is the caller's to empty, on the same file system as its place.
+    ///
+    /// # Errors
+    /// The folder cannot be made.
+    pub fn create(staging: &Path, head: Head) -> Result<Self, ReleaseError> {
+        remove_folder(staging)?;
+        fs::create_dir_all(staging).map_err(ReleaseError::io(staging))?;
+        Ok(Self { staging: staging.to_owned(), head, artifacts: vec![], failed: vec![] })
+    }
+
+    /// The folder under construction.
+    pub fn staging(&self) -> &Path {
+        &self.staging
+    }
+
+    /// Files so far.
+    pub fn artifacts(&self) -> &[Artifact] {
+        &self.artifacts
+    }
+
+    /// Copies a file into the release.
+    ///
+    /// # Errors
+    /// The path is not usable, or a file cannot be read or written.
+    pub fn add_file(&mut self, path: &str, source: &Path, origin: Origin) -> Result<(), ReleaseError> {
+        let target = self.target(path)?;
+        let mut from = File::open(source).map_err(ReleaseError::io(source))?;
+        let mut to = File::create(&target).map_err(ReleaseError::io(&target))?;
+        let (bytes, sha256) = digest::copy(&mut from, &mut to).map_err(ReleaseError::io(&target))?;
+        self.artifacts.push(Artifact { path: path.to_owned(), bytes, sha256, origin });
+        Ok(())
+    }
+
+    /// Writes a text file into the release.
+    ///
+    /// # Errors
+    /// As [`ReleaseBuilder::add_file`].
+    pub fn write_text(&mut self, path: &str, text: &str, origin: Origin) -> Result<(), ReleaseError> {
+        let target = self.target(path)?;
+        fs::write(&target, text).map_err(ReleaseError::io(&target))?;
+        let (bytes, sha256) = (text.len() as u64, digest::of_text(text));
+        self.artifacts.push(Artifact { path: path.to_owned(), bytes, sha256, origin });
+        Ok(())
+    }
+
+    /// Lists a file that was written into [`ReleaseBuilder::staging`] by someone else (the report).
+    ///
+    /// # Errors
+    /// As [`ReleaseBuilder::add_file`].
+    pub fn adopt(&mut self, path: &str, origin: Origin) -> Result<(), ReleaseError> {
+        let target = self.target(path)?;
+        let (bytes, sha256) = digest::of_file(&target).map_err(ReleaseError::io(&target))?;
+        self.artifacts.push(Artifact { path: path.to_owned(), bytes, sha256, origin });
+        Ok(())
+    }
+
+    /// Writes one file `part-<part>.parquet` of a table from rows sorted by key; nothing when there is no row.
+    ///
+    /// # Errors
+    /// The rows are not sorted, or the file cannot be written.
+    pub fn write_table<R: Record>(
+        &mut self,
+        part: &str,
+        rows: impl IntoIterator<Item = R>,
+        origin: Origin,
+    ) -> Result<(), ReleaseError> {
+        let mut rows = rows.into_iter().peekable();
+        if rows.peek().is_none() {
+            return Ok(());
+        }
+        let path = format!("{TABLES}/{}/part-{part}.parquet", R::TABLE.name);
+        let target = self.target(&path)?;
+        let mut writer = TableWriter::<R>::create(&target, &self.head.table_metadata())?;
+        for row in rows {
+            writer.push(&row)?;
+        }
+        let summary = writer.finish()?;
+        let content_sha256 = Some(summary.content_sha256);
+        self.adopt(&path, Origin { content_sha256, records: Some(summary.rows), ..origin })
+    }
+
+    /// Lists an item that failed.
+    pub fn failed(&mut self, item: FailedItem) {
+        self.failed.push(item);
+    }
+
+    /// Where a file of the release goes; its folder is made.
+    fn target(&self, path: &str) -> Result<PathBuf, ReleaseError> {
+        check_path(path)?;
+        if self.artifacts.iter().any(|a| a.path == path) {
+            return Err(ReleaseError::Path { path: path.to_owned(), reason: "it is there twice" });
+        }
+        let target = self.staging.join(path);
+        if let Some(folder) = target.parent() {
+            fs::create_dir_all(folder).map_err(ReleaseError::io(folder))?;
+        }
+        Ok(target)
+    }
+
+    /// Writes manifest and checksums, brings everything to disk and gives the release its name. A release that is
+    /// there already is replaced.
+    ///
+    /// # Errors
+    /// [`ReleaseError::Occupied`] when `dest` holds something that is no release; the file system failed.
+    pub fn seal(mut self, dest: &Path) -> Result<Release, ReleaseError> {
+        check_dest(dest)?;
+        self.artifacts.sort_by(|a, b| a.path.cmp(&b.path));
+        self.failed.sort_by(|a, b| (&a.stage, &a.item).cmp(&(&b.stage, &b.item)));
+        let Head { name, study_sha256, seed, version, license } = self.head;
+        let manifest = Manifest {
+            program: PROGRAM.to_owned(),
+            version,
+            format: FORMAT,
+            name,
+            study_sha256,
+            seed,
+            license,
+            artifacts: self.artifacts,
+            failed: self.failed,
+        };
+        let json = serde_json::to_string_pretty(&manifest)? + "\n";
+        let in_staging = |name: &str, text: &str| {
+            let path = self.staging.join(name);
+            fs::write(&path, text).map_err(ReleaseError::io(&path))
+        };
+        in_staging(MANIFEST, &json)?;
+        in_staging(SUMS, &sums(&manifest, &digest::of_text(&json)))?;
+        sync_tree(&self.staging)?;
+        put_in_place(&self.staging, dest)?;
+        Ok(Release { folder: dest.to_owned(), manifest })
+    }
+}
+
+/// The text of `SHA256SUMS`: every file of the manifest and the manifest itself, by path.
+pub(super) fn sums(manifest: &Manifest, manifest_sha256: &str) -> String {
+    let mut lines: Vec<(&str, &str)> =
+        manifest.artifacts.iter().map(|a| (a.path.as_str(), a.sha256.as_str())).collect();
+    lines.push((MANIFEST, manifest_sha256));
+    lines.sort_unstable();
+    lines.iter().fold(String::new(), |mut text, (path, sha256)| {
+        // Writing to a string cannot fail.
+        let _ = writeln!(text, "{sha256}  {path}");
+        text
+    })
+}
+
+/// Refuses a place that holds something that is no release.
+fn check_dest(dest: &Path) -> Result<(), ReleaseError> {
+    let occupied = || ReleaseError::Occupied { path: dest.to_owned() };
+    match fs::read_dir(dest).map(|mut entries| entries.next().is_none()) {
+        Ok(true) => Ok(()),
+        Ok(false) => Release::open(dest).map(drop).map_err(|_| occupied()),
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(()),
+        Err(e) if e.kind() == std::io::ErrorKind::NotADirectory => Err(occupied()),
+        Err(e) => Err(ReleaseError::io(dest)(e)),
+    }
+}
+
+/// `dest` with a suffix to its name, in the same folder.
+fn with_suffix(dest: &Path, suffix: &str) -> PathBuf {
+    let mut name = dest.file_name().map_or_else(|| OsString::from("release"), OsString::from);
+    name.push(suffix);
+    dest.with_file_name(name)
+}
+
+fn remove_folder(folder: &Path) -> Result<(), ReleaseError> {
+    match fs::remove_dir_all(folder) {
+        Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(ReleaseError::io(folder)(e)),
+        _ => Ok(()),
+    }
+}
+
+fn put_in_place(staging: &Path, dest: &Path) -> Result<(), ReleaseError> {
+    let aside = with_suffix(dest, ".replaced");
+    remove_folder(&aside)?;
+    if dest.exists() {
+        fs::rename(dest, &aside).map_err(ReleaseError::io(dest))?;
+    }
+    fs::rename(staging, dest).map_err(ReleaseError::io(dest))?;
+    let parent = match dest.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    };
+    sync_folder(parent).map_err(ReleaseError::io(parent))?;
+    remove_folder(&aside)
+}
+
+/// Brings every file and folder of a tree to disk.
+fn sync_tree(folder: &Path) -> Result<(), ReleaseError> {
+    for entry in fs::read_dir(folder).map_err(ReleaseError::io(folder))? {
+        let path = entry.map_err(ReleaseError::io(folder))?.path();
+        if path.is_dir() {
+            sync_tree(&path)?;
+        } else {
+            File::open(&path).and_then(|f| f.sync_all()).map_err(ReleaseError::io(&path))?;
+        }
+    }
+    sync_folder(folder).map_err(ReleaseError::io(folder))
+}

@@ -1,0 +1,153 @@
+use super::*;
+use sastrugi_schemas::manifest::{FailedItem, Origin};
+use sastrugi_schemas::tables::{CovarianceRow, PsdRow};
+use std::fs::OpenOptions;
+use std::io::{Read, Seek, SeekFrom, Write};
+
+fn head() -> Head {
+    Head {
+        name: "demo".to_owned(),
+        study_sha256: "ab".repeat(32),
+        seed: 7,
+        version: "0.1.0".to_owned(),
+        license: "CC-BY-4.0".to_owned(),
+    }
+}
+
+fn rows(n: i64) -> Vec<PsdRow> {
+    let row = |bin: i64| PsdRow {
+        terrain_id: "a".to_owned(),
+        bin,
+        frequency_cycles_m: 0.1 * bin as f64,
+        psd_m4: if bin == 3 { f64::NAN } else { 1.0 / (1.0 + bin as f64) },
+        modes: bin * 8,
+    };
+    (0..n).map(row).collect()
+}
+
+fn sealed(dest: &Path) -> Release {
+    let mut builder = ReleaseBuilder::beside(dest, head()).unwrap();
+    builder.write_text("README.md", "# Demo\n", Origin::default()).unwrap();
+    builder.write_text("fit/a.json", "{}\n", Origin { stage: "fit".to_owned(), ..Origin::default() }).unwrap();
+    builder.write_table("0000", rows(9000), Origin::default()).unwrap();
+    builder.write_table::<CovarianceRow>("0000", vec![], Origin::default()).unwrap();
+    builder.seal(dest).unwrap()
+}
+
+#[test]
+fn val_a_release_opens_verifies_and_gives_its_rows_back() {
+    let folder = tempfile::tempdir().unwrap();
+    let dest = folder.path().join("release");
+    sealed(&dest);
+    let release = Release::open(&dest).unwrap();
+    assert_eq!(verify(&dest).unwrap().problems, vec![]);
+    let back: Vec<PsdRow> = release.rows().unwrap();
+    assert_eq!(back.len(), 9000);
+    assert!(back[3].psd_m4.is_nan());
+    assert_eq!(back[8999], rows(9000)[8999]);
+    assert!(release.table_files("covariance").is_empty());
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "nothing is left beside the release");
+}
+
+#[test]
+fn prop_same_release_same_bytes() {
+    let folder = tempfile::tempdir().unwrap();
+    let (a, b) = (folder.path().join("a"), folder.path().join("b"));
+    sealed(&a);
+    sealed(&b);
+    sealed(&b);
+    assert_eq!(fs::read(a.join(SUMS)).unwrap(), fs::read(b.join(SUMS)).unwrap());
+}
+
+#[test]
+fn prop_every_flipped_byte_is_found_and_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let dest = folder.path().join("release");
+    let release = sealed(&dest);
+    let names: Vec<String> = release.manifest().artifacts.iter().map(|a| a.path.clone()).collect();
+    for name in names.iter().map(String::as_str).chain([MANIFEST, SUMS]) {
+        let length = fs::metadata(dest.join(name)).unwrap().len();
+        for at in (0..length).step_by((length as usize / 40).max(1)) {
+            flip(&dest.join(name), at);
+            let problems = verify(&dest).unwrap().problems;
+            assert!(problems.iter().any(|p| p.path == name), "{name} byte {at}: {problems:?}");
+            flip(&dest.join(name), at);
+        }
+    }
+    assert_eq!(verify(&dest).unwrap().problems, vec![]);
+}
+
+fn flip(path: &Path, at: u64) {
+    let mut file = OpenOptions::new().read(true).write(true).open(path).unwrap();
+    let mut byte = [0];
+    file.seek(SeekFrom::Start(at)).unwrap();
+    file.read_exact(&mut byte).unwrap();
+    file.seek(SeekFrom::Start(at)).unwrap();
+    file.write_all(&[byte[0] ^ 1]).unwrap();
+}
+
+#[test]
+fn val_missing_extra_and_truncated_files_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let dest = folder.path().join("release");
+    let release = sealed(&dest);
+    let names: Vec<String> = release.manifest().artifacts.iter().map(|a| a.path.clone()).collect();
+    let found = |path: &str, kind| verify(&dest).unwrap().problems.iter().any(|p| p.path == path && p.kind == kind);
+    for name in names.iter().map(String::as_str).chain([MANIFEST, SUMS]) {
+        let bytes = fs::read(dest.join(name)).unwrap();
+        fs::remove_file(dest.join(name)).unwrap();
+        assert!(found(name, ProblemKind::Missing), "{name}");
+        fs::write(dest.join(name), &bytes[..bytes.len() - 1]).unwrap();
+        assert!(!verify(&dest).unwrap().problems.is_empty(), "{name}");
+        fs::write(dest.join(name), &bytes).unwrap();
+    }
+    fs::create_dir(dest.join("more")).unwrap();
+    fs::write(dest.join("more/file"), "x").unwrap();
+    assert!(found("more/file", ProblemKind::Extra));
+}
+
+#[test]
+fn val_other_folders_are_left_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let dest = folder.path().join("mine");
+    fs::create_dir(&dest).unwrap();
+    ReleaseBuilder::beside(&dest, head()).unwrap().seal(&dest).unwrap();
+    fs::remove_file(dest.join(MANIFEST)).unwrap();
+    assert!(matches!(ReleaseBuilder::beside(&dest, head()), Err(ReleaseError::Occupied { .. })));
+    assert!(dest.join(SUMS).exists());
+    let error = verify(&folder.path().join("nowhere")).unwrap_err();
+    assert!(error.unusable_input());
+    assert!(matches!(verify(folder.path()), Err(ReleaseError::NotARelease { .. })));
+}
+
+#[test]
+fn val_a_changed_table_description_is_found() {
+    let folder = tempfile::tempdir().unwrap();
+    let dest = folder.path().join("release");
+    sealed(&dest);
+    let path = dest.join("tables/psd/part-0000.parquet");
+    let error = crate::parquet::check_table(&path, &CovarianceRow::TABLE).unwrap_err();
+    assert!(error.to_string().contains("terrain_id"), "{error}");
+    assert_eq!(crate::parquet::check_table(&path, &PsdRow::TABLE).unwrap(), 9000);
+}
+
+#[test]
+fn val_paths_stay_inside() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut builder = ReleaseBuilder::create(&folder.path().join("s"), head()).unwrap();
+    for path in ["../x", "/x", "a//b", ".hidden", MANIFEST, "a/../b", "a\nb", ""] {
+        let result = builder.write_text(path, "", Origin::default());
+        assert!(matches!(result, Err(ReleaseError::Path { .. })), "{path:?}");
+    }
+    builder.write_text("a", "", Origin::default()).unwrap();
+    assert!(builder.write_text("a", "", Origin::default()).is_err());
+    builder.failed(FailedItem {
+        stage: "terrain".to_owned(),
+        item: "b".to_owned(),
+        error: "no".to_owned(),
+        parameters: serde_json::Value::Null,
+    });
+    let dest = folder.path().join("d");
+    builder.seal(&dest).unwrap();
+    assert_eq!(Release::open(&dest).unwrap().manifest().failed.len(), 1);
+}

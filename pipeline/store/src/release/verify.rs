@@ -1,0 +1,193 @@
+//! Checking a release against its own checksums, manifest and table descriptions.
+
+use super::builder::sums;
+use super::{MANIFEST, ReleaseError, SUMS, parse_manifest, table_of};
+use crate::digest;
+use crate::parquet::check_table;
+use rayon::prelude::*;
+use sastrugi_schemas::manifest::{Artifact, Manifest};
+use sastrugi_schemas::tables;
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt;
+use std::fs;
+use std::io;
+use std::path::Path;
+
+/// What [`verify`] found.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct VerifyReport {
+    /// Files checked.
+    pub files: u64,
+    /// Bytes checked.
+    pub bytes: u64,
+    /// What is wrong, by path; empty for a good release.
+    pub problems: Vec<Problem>,
+}
+
+/// Something wrong with a file of a release.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Problem {
+    /// Path in the release.
+    pub path: String,
+    /// What kind.
+    pub kind: ProblemKind,
+    /// One fragment with the figures.
+    pub message: String,
+}
+
+impl fmt::Display for Problem {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: {}", self.path, self.message)
+    }
+}
+
+/// Kinds of problems.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum ProblemKind {
+    /// Listed, but not there.
+    Missing,
+    /// There, but not listed.
+    Extra,
+    /// Of another size than listed.
+    Size,
+    /// Of another hash than listed.
+    Checksum,
+    /// A table with other columns, types, units or number of rows.
+    Table,
+    /// Manifest and checksums contradict each other, or cannot be read.
+    Inconsistent,
+}
+
+/// Checks every file of a release: checksums, missing and extra files, sizes, columns and row counts of tables, and
+/// that manifest and checksums agree.
+///
+/// # Errors
+/// [`ReleaseError::NotARelease`] when the folder holds neither manifest nor checksums; the file system failed.
+pub fn verify(folder: &Path) -> Result<VerifyReport, ReleaseError> {
+    let manifest_text = read_if_there(&folder.join(MANIFEST))?;
+    let sums_text = read_if_there(&folder.join(SUMS))?;
+    if manifest_text.is_none() && sums_text.is_none() {
+        return Err(ReleaseError::not_a_release(folder, format!("there is neither {MANIFEST} nor {SUMS} in it")));
+    }
+    let mut report = VerifyReport::default();
+    let mut problem = |path: &str, kind, message: String| {
+        report.problems.push(Problem { path: path.to_owned(), kind, message });
+    };
+    for (name, text) in [(MANIFEST, &manifest_text), (SUMS, &sums_text)] {
+        if text.is_none() {
+            problem(name, ProblemKind::Missing, "the file is missing".to_owned());
+        }
+    }
+    let manifest = manifest_text.as_deref().and_then(|text| match parse_manifest(text) {
+        Ok(manifest) => Some(manifest),
+        Err(reason) => {
+            problem(MANIFEST, ProblemKind::Inconsistent, reason);
+            None
+        }
+    });
+    let listed = sums_text.as_deref().map(parse_sums).unwrap_or_default();
+    if let (Some(manifest), Some(bytes), Some(text)) = (&manifest, &manifest_text, &sums_text)
+        && sums(manifest, &digest::of_bytes(bytes)).as_bytes() != text
+    {
+        problem(SUMS, ProblemKind::Inconsistent, format!("does not list what {MANIFEST} lists, line for line"));
+    }
+
+    let there = files_of(folder)?;
+    let artifacts = expected(manifest.as_ref(), &listed);
+    let names: BTreeSet<&str> = artifacts.keys().map(String::as_str).chain([MANIFEST, SUMS]).collect();
+    for path in there.iter().filter(|path| !names.contains(path.as_str())) {
+        problem(path, ProblemKind::Extra, "the file is not listed".to_owned());
+    }
+    let checks: Vec<(u64, Option<Problem>)> =
+        artifacts.par_iter().map(|(_, artifact)| check(folder, artifact)).collect::<Result<_, _>>()?;
+    report.files = checks.len() as u64;
+    report.bytes = checks.iter().map(|(bytes, _)| bytes).sum();
+    report.problems.extend(checks.into_iter().filter_map(|(_, problem)| problem));
+    report.problems.sort();
+    Ok(report)
+}
+
+fn read_if_there(path: &Path) -> Result<Option<Vec<u8>>, ReleaseError> {
+    match fs::read(path) {
+        Ok(bytes) => Ok(Some(bytes)),
+        Err(e) if matches!(e.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => Ok(None),
+        Err(e) => Err(ReleaseError::io(path)(e)),
+    }
+}
+
+/// Hash by path; lines that are none of ours are left to the comparison with the manifest.
+fn parse_sums(text: &[u8]) -> BTreeMap<String, String> {
+    let text = String::from_utf8_lossy(text);
+    text.lines().filter_map(|line| line.split_once("  ")).map(|(sha, path)| (path.to_owned(), sha.to_owned())).collect()
+}
+
+/// What should be there: as the manifest says, or as the checksums say where the manifest is lost. The manifest's own
+/// line, which only the checksums have, comes along.
+fn expected(manifest: Option<&Manifest>, listed: &BTreeMap<String, String>) -> BTreeMap<String, Artifact> {
+    let unsized_artifact = |(path, sha256): (&String, &String)| {
+        let artifact = Artifact { path: path.clone(), sha256: sha256.clone(), bytes: u64::MAX, ..Artifact::default() };
+        (path.clone(), artifact)
+    };
+    match manifest {
+        Some(manifest) => {
+            let own = listed.get_key_value(MANIFEST).map(unsized_artifact);
+            manifest.artifacts.iter().map(|a| (a.path.clone(), a.clone())).chain(own).collect()
+        }
+        None => listed.iter().filter(|(path, _)| *path != MANIFEST).map(unsized_artifact).collect(),
+    }
+}
+
+/// Checks one file; returns its size and the first thing that is wrong.
+fn check(folder: &Path, artifact: &Artifact) -> Result<(u64, Option<Problem>), ReleaseError> {
+    let path = folder.join(&artifact.path);
+    let problem = |kind, message| Some(Problem { path: artifact.path.clone(), kind, message });
+    let size = match fs::symlink_metadata(&path) {
+        Ok(found) if found.is_file() => found.len(),
+        Ok(_) => return Ok((0, problem(ProblemKind::Missing, "is not a plain file".to_owned()))),
+        Err(e) if matches!(e.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => {
+            return Ok((0, problem(ProblemKind::Missing, "the file is missing".to_owned())));
+        }
+        Err(e) => return Err(ReleaseError::io(&path)(e)),
+    };
+    if artifact.bytes != u64::MAX && size != artifact.bytes {
+        let message = format!("has {size} bytes instead of {}", artifact.bytes);
+        return Ok((size, problem(ProblemKind::Size, message)));
+    }
+    let (_, sha256) = digest::of_file(&path).map_err(ReleaseError::io(&path))?;
+    if sha256 != artifact.sha256 {
+        let message = format!("has the SHA-256 {sha256} instead of {}", artifact.sha256);
+        return Ok((size, problem(ProblemKind::Checksum, message)));
+    }
+    let table = check_rows(&path, artifact).err().and_then(|message| problem(ProblemKind::Table, message));
+    Ok((size, table))
+}
+
+/// Checks a table's columns and number of rows.
+fn check_rows(path: &Path, artifact: &Artifact) -> Result<(), String> {
+    let Some(name) = table_of(&artifact.path) else { return Ok(()) };
+    let table = tables::by_name(name).ok_or_else(|| format!("there is no table {name} in this version"))?;
+    let rows = check_table(path, table).map_err(|e| e.to_string())?;
+    match artifact.origin.records {
+        Some(expected) if expected != rows => Err(format!("has {rows} rows instead of {expected}")),
+        _ => Ok(()),
+    }
+}
+
+/// Paths of everything below a folder that is not a folder, with `/` between folders.
+fn files_of(folder: &Path) -> Result<BTreeSet<String>, ReleaseError> {
+    let mut files = BTreeSet::new();
+    let mut folders = vec![(folder.to_owned(), String::new())];
+    while let Some((folder, prefix)) = folders.pop() {
+        for entry in fs::read_dir(&folder).map_err(ReleaseError::io(&folder))? {
+            let entry = entry.map_err(ReleaseError::io(&folder))?;
+            let name = format!("{prefix}{}", entry.file_name().to_string_lossy());
+            let kind = entry.file_type().map_err(ReleaseError::io(&folder))?;
+            if kind.is_dir() {
+                folders.push((entry.path(), format!("{name}/")));
+            } else {
+                files.insert(name);
+            }
+        }
+    }
+    Ok(files)
+}
