@@ -1,1 +1,25 @@
-//! Room under construction.
+//! Texture of a measured surface, and synthetic texture that matches it.
+//!
+//! A DEM is split at an outer scale into a background (moving average) and a residual; the residual's covariance is
+//! estimated from every pair of cells with data and a covariance model is fitted to it ([`fit`]); random fields with
+//! that covariance are made ([`synth`]) and laid onto base terrains ([`onto`]).
+//!
+//! Source: Vecherin, Meyer, Quinn, Letcher and Parker, Simulation of snow texture for autonomous vehicle numerical
+//! modeling, GVSETS 2022; see `docs/papers/vecherin.md` for where we depart from it and why.
+//!
+//! Symbols used throughout: lag h = (rows south, columns east) in cells and rho = |h| in m; sigma and b, standard
+//! deviation and range of the texture in m; covariance in m2, not semivariance; M, cells along a side of the torus on
+//! which covariances are filtered or fields are made.
+
+pub mod covariance;
+pub mod detrend;
+pub mod fit;
+mod onto;
+pub mod outliers;
+pub mod registry;
+pub mod synth;
+
+pub use fit::{FitError, FitOutcome, FitParameters, FitSettings, fit};
+pub use onto::{OntoError, onto};
+pub use registry::{kinds, prepare};
+pub use synth::{Synthesis, SynthesisError, TextureOutcome};

@@ -1,0 +1,114 @@
+//! Exact covariance of a raster with holes: every pair of cells with data, at every lag up to a bound.
+//!
+//! `C(h) = S(h) / N(h)`, `S(h) = sum of z(i) z(i + h)`, `N(h)` the number of pairs, over all i where both cells have
+//! data. S and N are autocorrelations of the data (0 where there is none) and of the mask, hence two Fourier transforms
+//! (Marcotte, 1996, Computers & Geosciences 22, 1175). No mean is taken off: a caller who wants that does it before.
+//!
+//! The raster is cut into strips of rows that overlap by the largest lag; what two neighbouring strips share is counted
+//! twice and taken off once. So memory is bounded by the strip, not by the raster: about 40 bytes per padded strip cell.
+//! Rounding: about 1e-15 of the zero-lag sum; pair counts are exact.
+
+use sastrugi_numeric::fft::{RealFft2, smooth_length};
+
+/// Rows that a strip adds, unless four times the largest lag is more.
+const STRIP_ROWS: usize = 256;
+
+/// Pair sums of a raster for lags `(drow, dcol)` with `|drow| <= max_lag[0]`, `|dcol| <= max_lag[1]`.
+#[derive(Clone, Debug)]
+pub struct MaskedCovariance {
+    /// Largest lag in cells, north-south and east-west.
+    pub max_lag: [usize; 2],
+    /// Sum of products for `drow` in `0..=max_lag[0]` (outer) and `dcol` in `-max_lag[1]..=max_lag[1]` (inner).
+    sums: Vec<f64>,
+    /// Number of pairs, in the same order.
+    pairs: Vec<u64>,
+}
+
+impl MaskedCovariance {
+    /// Number of pairs and sum of their products at a lag in cells; `None` beyond the largest lag.
+    pub fn at(&self, drow: isize, dcol: isize) -> Option<(u64, f64)> {
+        // The estimate is even in the lag; one of two opposite lags is read.
+        let (drow, dcol) = if (drow, dcol) < (0, 0) { (-drow, -dcol) } else { (drow, dcol) };
+        let [max_row, max_col] = self.max_lag.map(|l| l as isize);
+        let stored = drow <= max_row && dcol.abs() <= max_col;
+        let index = (drow * (2 * max_col + 1) + dcol + max_col) as usize;
+        stored.then(|| (self.pairs[index], self.sums[index]))
+    }
+
+    /// Covariance at a lag in cells: the 2-D map. `None` beyond the largest lag or without pairs.
+    pub fn covariance(&self, drow: isize, dcol: isize) -> Option<f64> {
+        self.at(drow, dcol).filter(|(pairs, _)| *pairs > 0).map(|(pairs, sum)| sum / pairs as f64)
+    }
+
+    /// One lag of each pair of opposite ones: `(drow, dcol)` with `drow > 0`, or `drow = 0` and `dcol >= 0`.
+    pub fn lags(&self) -> impl Iterator<Item = (isize, isize)> + use<> {
+        let [max_row, max_col] = self.max_lag.map(|l| l as isize);
+        (0..=max_row)
+            .flat_map(move |drow| (-max_col..=max_col).map(move |dcol| (drow, dcol)))
+            .filter(|&(r, c)| r > 0 || c >= 0)
+    }
+}
+
+/// Pair sums of row-major `values` in rows of `cols`; NaN is no data. Lags are cut to the raster's size.
+pub fn masked_covariance(values: &[f64], cols: usize, max_lag: [usize; 2]) -> MaskedCovariance {
+    let rows = values.len().checked_div(cols).unwrap_or(0);
+    let max_lag = [max_lag[0].min(rows.saturating_sub(1)), max_lag[1].min(cols.saturating_sub(1))];
+    let step = STRIP_ROWS.max(4 * max_lag[0]);
+    let mut total = StripSums::new(step.min(rows) + max_lag[0], cols, max_lag);
+    let mut shared = StripSums::new(max_lag[0], cols, max_lag);
+    for first in (0..rows).step_by(step) {
+        let next = first + step;
+        total.add(&values[first * cols..(next + max_lag[0]).min(rows) * cols]);
+        if next < rows {
+            shared.add(&values[next * cols..(next + max_lag[0]).min(rows) * cols]);
+        }
+    }
+    let (sums, pairs) = total.finish().zip(shared.finish()).map(|((s, n), (s2, n2))| (s - s2, n - n2)).unzip();
+    MaskedCovariance { max_lag, sums, pairs }
+}
+
+/// Power spectra of data and mask, added up over strips of one padded shape.
+struct StripSums {
+    fft: RealFft2,
+    shape: [usize; 2],
+    cols: usize,
+    max_lag: [usize; 2],
+    data_power: Vec<f64>,
+    mask_power: Vec<f64>,
+}
+
+impl StripSums {
+    fn new(strip_rows: usize, cols: usize, max_lag: [usize; 2]) -> Self {
+        let shape = [smooth_length(strip_rows + max_lag[0]), smooth_length(cols + max_lag[1])];
+        let half = shape[0] * (shape[1] / 2 + 1);
+        let fft = RealFft2::new(shape[0], shape[1]);
+        Self { fft, shape, cols, max_lag, data_power: vec![0.0; half], mask_power: vec![0.0; half] }
+    }
+
+    fn add(&mut self, strip: &[f64]) {
+        let padded = |f: fn(f64) -> f64| {
+            let mut field = vec![0.0; self.shape[0] * self.shape[1]];
+            for (out, row) in field.chunks_exact_mut(self.shape[1]).zip(strip.chunks_exact(self.cols)) {
+                out.iter_mut().zip(row).for_each(|(o, v)| *o = f(*v));
+            }
+            self.fft.forward(&field).values
+        };
+        let data = padded(|v| if v.is_nan() { 0.0 } else { v });
+        self.data_power.iter_mut().zip(&data).for_each(|(p, d)| *p += d.norm_sqr());
+        drop(data);
+        let mask = padded(|v| f64::from(u8::from(!v.is_nan())));
+        self.mask_power.iter_mut().zip(&mask).for_each(|(p, m)| *p += m.norm_sqr());
+    }
+
+    /// Sum of products and number of pairs at each stored lag.
+    fn finish(self) -> impl Iterator<Item = (f64, u64)> {
+        let Self { fft, shape: [rows, cols], max_lag, data_power, mask_power, .. } = self;
+        let sums = super::filtered::inverse_real(&fft, [rows, cols], &data_power);
+        let pairs = super::filtered::inverse_real(&fft, [rows, cols], &mask_power);
+        let [max_row, max_col] = max_lag.map(|l| l as isize);
+        (0..=max_row).flat_map(move |r| (-max_col..=max_col).map(move |c| (r, c))).map(move |(r, c)| {
+            let k = r as usize * cols + c.rem_euclid(cols as isize) as usize;
+            (sums[k], pairs[k].round() as u64)
+        })
+    }
+}

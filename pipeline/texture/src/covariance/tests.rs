@@ -1,0 +1,220 @@
+use super::masked::masked_covariance;
+use super::trimmed::TrimmedNormal;
+use super::*;
+
+const N: f64 = f64::NAN;
+/// A grid with holes.
+#[rustfmt::skip]
+const GRID: [f64; 99] = [
+    2.041, -2.556, N, -0.568, N, -0.216, -2.02, -0.232, -0.865, 3.323, 0.226,
+    -0.353, -0.281, N, -1.055, -0.391, 0.482, -0.239, 0.958, -0.2, 0.024, 1.546,
+    0.545, -0.505, -0.183, 0.541, 1.935, -0.27, -0.244, 1.002, -0.886, N, 0.883,
+    0.58, 0.092, N, N, 1.021, -0.96, -1.669, 0.276, N, -0.445, N,
+    N, -0.053, 1.406, N, 0.194, 1.112, N, -0.926, 0.584, 0.583, -0.215,
+    N, 0.229, -2.494, N, 0.491, N, 0.061, -0.964, 0.757, N, N,
+    0.71, 1.156, N, -0.498, 0.328, -0.609, 1.591, -1.191, 0.355, -1.048, 1.406,
+    -0.022, -0.372, N, 1.682, 0.753, 0.754, 1.138, N, -0.639, -0.8, -0.8,
+    1.37, -1.46, -0.596, -0.321, 0.225, 0.575, -1.249, -1.73, -0.004, 1.214, 0.757,
+];
+/// `[drow, dcol, pairs, sum of products]` of the grid less the mean of its data: an independent double loop (numpy).
+#[rustfmt::skip]
+const PAIR_SUMS: [(isize, isize, u64, f64); 45] = [
+    (0, -4, 42, 1.0396861090624996), (0, -3, 49, -8.55016841234375), (0, -2, 52, -3.673277226875001),
+    (0, -1, 58, -7.814783968437498), (0, 0, 80, 85.66889638749998), (0, 1, 58, -7.814783968437498),
+    (0, 2, 52, -3.673277226875001), (0, 3, 49, -8.55016841234375), (0, 4, 42, 1.0396861090624996),
+    (1, -4, 37, -2.54522272921875), (1, -3, 44, 5.039675136875), (1, -2, 45, 2.534780557031251),
+    (1, -1, 51, -12.31396802203125), (1, 0, 57, 0.6820078239062504), (1, 1, 50, -0.8137972171874991),
+    (1, 2, 44, 0.12368596187499886), (1, 3, 42, -5.106040065937502), (1, 4, 37, -10.039300691718749),
+    (2, -4, 32, -3.0965139424999997), (2, -3, 39, -2.904167888906249), (2, -2, 38, 3.2984526909375),
+    (2, -1, 44, -0.05961926312500254), (2, 0, 47, -0.2170652276562498), (2, 1, 44, -5.419582163125),
+    (2, 2, 41, 0.263040176406251), (2, 3, 34, -8.309265477187498), (2, 4, 30, 2.5776769046875003),
+    (3, -4, 26, -5.5625735884375), (3, -3, 26, -4.520525450937499), (3, -2, 30, -5.2519965328125),
+    (3, -1, 36, 3.292303325625), (3, 0, 38, 4.3166459784375), (3, 1, 37, 7.32054584578125),
+    (3, 2, 30, -0.7233804578125014), (3, 3, 27, -3.937607230781251), (3, 4, 27, 9.33244216921875),
+    (4, -4, 23, 2.63461267609375), (4, -3, 25, -6.036227346093752), (4, -2, 28, -6.642242935624999),
+    (4, -1, 33, 1.2249255401562507), (4, 0, 34, -0.07853152718749953), (4, 1, 33, -2.40467048484375),
+    (4, 2, 28, 2.052749851875), (4, 3, 26, 1.302430949062499), (4, 4, 24, 0.7129664337499995),
+];
+/// `(t, [(rho, T)])` with mpmath.
+#[rustfmt::skip]
+const TRIMMED: [(f64, [(f64, f64); 13]); 3] = [
+    (2.575829303548901, [
+        (-0.5, -0.43263605193407656), (0.0, 0.0), (0.05, 0.042763564384482526),
+        (0.1, 0.08555649470988298), (0.2, 0.17134864842126857), (0.3, 0.2576169834218374),
+        (0.5, 0.43263605193407656), (0.7, 0.613323617956951), (0.9, 0.8059138495473765),
+        (0.95, 0.8586573064715946), (0.99, 0.9061949495876308), (0.999, 0.9208572009536895),
+        (1.0, 0.9247558993726854),
+    ]),
+    (1.9599639845400538, [
+        (-0.5, -0.30387514622472844), (0.0, 0.0), (0.05, 0.028807817966554898),
+        (0.1, 0.057710400741570564), (0.2, 0.11618002299944998), (0.3, 0.17617400593784652),
+        (0.5, 0.30387514622472844), (0.7, 0.4477372754344528), (0.9, 0.6209976325249841),
+        (0.95, 0.6748282927129677), (0.99, 0.7299283552668521), (0.999, 0.751307885698061),
+        (1.0, 0.7588416170698973),
+    ]),
+    (1.644853626951473, [
+        (-0.5, -0.21339203703612197), (0.0, 0.0), (0.05, 0.01942565076290113),
+        (0.1, 0.038960981132834194), (0.2, 0.07880728826414433), (0.3, 0.12046627085505088),
+        (0.5, 0.21339203703612197), (0.7, 0.32768787495893836), (0.9, 0.4811730721145223),
+        (0.95, 0.5330714371828562), (0.99, 0.5897855234556301), (0.999, 0.6138507716133568),
+        (1.0, 0.6230154841346842),
+    ]),
+];
+/// `(b in m, cell in m, window in cells, covariance along an axis at 0, 1, ... cells)` of a unit exponential less its box mean.
+#[rustfmt::skip]
+const BOX_FILTERED: [(f64, f64, usize, [f64; 17]); 4] = [
+    (0.28, 0.06, 33, [
+        0.8587008467074513, 0.6658206385293235, 0.5101822143949848, 0.3846754954111608,
+        0.28359419908572187, 0.20236421923189768, 0.13732656332135565, 0.08556318388497698,
+        0.04475677207095555, 0.013077323522834805, -0.010910537236458906, -0.028324777838713906,
+        -0.040032828927134986, -0.04671375325762431, -0.04892334075189245, -0.04717539368762665,
+        -0.04207100330092017,
+    ]),
+    (1.0, 0.06, 33, [
+        0.4230474812198178, 0.3654481986943061, 0.3125234161212493, 0.2640971628847843,
+        0.22001116522222253, 0.18012126431559528, 0.14429441981933855, 0.11240584412381172,
+        0.08433601783175843, 0.05996738605984947, 0.039180523149703106, 0.02184949340182102,
+        0.007836007563214203, -0.0030182856830426597, -0.010902607383156016, -0.01605365796510322,
+        -0.018785571021655234,
+    ]),
+    (0.28, 0.1, 21, [
+        0.872381520676356, 0.5719928293652815, 0.36185833314961724, 0.21520808169605476,
+        0.11349415683254763, 0.04394095904809121, -0.0021582572656833193, -0.030638462559096268,
+        -0.04533265600989657, -0.0487740357996201, -0.04294541766128346, -0.030531248621169207,
+        -0.01857199778092854, -0.008960712688366939, -0.0019951718060740057, 0.0025878098176395853,
+        0.005224325073792813,
+    ]),
+    (1.0, 0.1, 21, [
+        0.44301350351412766, 0.3494028803126055, 0.26801313398117277, 0.19809607598436446,
+        0.13900697774350096, 0.0901731825601153, 0.05106229652033767, 0.02114436869886263,
+        -0.0001585465490591409, -0.013547694503263569, -0.019979891732055777, -0.02094961942214027,
+        -0.0193700462154964, -0.01665456527930012, -0.013596950130757984, -0.010651695825087307,
+        -0.008063613466590833,
+    ]),
+];
+
+/// The definition: a double loop over cells.
+fn brute_force(values: &[f64], cols: usize, drow: isize, dcol: isize) -> (u64, f64) {
+    let rows = (values.len() / cols) as isize;
+    let (mut pairs, mut sum) = (0, 0.0);
+    for r in 0..rows {
+        for c in 0..cols as isize {
+            let (r2, c2) = (r + drow, c + dcol);
+            if r2 < 0 || c2 < 0 || r2 >= rows || c2 >= cols as isize {
+                continue;
+            }
+            let product = values[r as usize * cols + c as usize] * values[r2 as usize * cols + c2 as usize];
+            if !product.is_nan() {
+                pairs += 1;
+                sum += product;
+            }
+        }
+    }
+    (pairs, sum)
+}
+
+fn noise(count: usize, missing: f64) -> Vec<f64> {
+    let mut s = sastrugi_numeric::Streams::for_seed(1, "covariance-test").stream("field");
+    (0..count).map(|_| if s.uniform() < missing { f64::NAN } else { s.normal() }).collect()
+}
+
+/// Absolute tolerance 1e-10; pair counts exact.
+#[test]
+fn val_masked_covariance_of_the_reference_grid() {
+    let data: Vec<f64> = GRID.into_iter().filter(|v| !v.is_nan()).collect();
+    let mean = data.iter().sum::<f64>() / data.len() as f64;
+    let centred = GRID.map(|v| v - mean);
+    let estimate = masked_covariance(&centred, 11, [4, 4]);
+    for (drow, dcol, pairs, sum) in PAIR_SUMS {
+        let (p, s) = estimate.at(drow, dcol).unwrap();
+        assert!(p == pairs && (s - sum).abs() < 1e-10, "{drow} {dcol}: {p} {s}");
+        assert_eq!(estimate.at(-drow, -dcol), Some((p, s)));
+    }
+    assert_eq!(estimate.at(5, 0), None);
+    assert_eq!(estimate.at(0, -5), None);
+}
+
+/// Several strips, whose seams must not be counted twice; lags beyond the raster are cut.
+#[test]
+fn val_masked_covariance_equals_the_definition() {
+    for (rows, cols, lag, missing) in
+        [(700, 13, [20, 9], 0.3), (300, 7, [70, 3], 0.05), (5, 4, [9, 9], 0.0), (1, 1, [2, 2], 1.0)]
+    {
+        let values = noise(rows * cols, missing);
+        let estimate = masked_covariance(&values, cols, lag);
+        for (drow, dcol) in estimate.lags() {
+            let (p, s) = estimate.at(drow, dcol).unwrap();
+            let (pairs, sum) = brute_force(&values, cols, drow, dcol);
+            assert!(p == pairs && (s - sum).abs() < 1e-10, "{rows}x{cols} {drow} {dcol}: {p} {s}, {pairs} {sum}");
+        }
+    }
+}
+
+/// Absolute tolerance 1e-10 (reference to 15 digits).
+#[test]
+fn val_trimmed_normal() {
+    for (t, rows) in TRIMMED {
+        let trimmed = TrimmedNormal::new(t);
+        for (rho, covariance) in rows {
+            let error = trimmed.covariance(rho) - covariance;
+            assert!(error.abs() < 1e-10, "t {t}, rho {rho}: {error:e}");
+        }
+    }
+}
+
+/// Two ways to the same number: Mehler's series (long enough for rho to 0.95) and the integral, to 1e-10.
+#[test]
+fn prop_series_equals_integral() {
+    for t in [0.6, 0.8, 1.2, 1.96, 3.0, 6.0] {
+        let trimmed = TrimmedNormal::new(t);
+        for k in 34..=38 {
+            let rho = f64::from(k) / 40.0;
+            let ((n, p), (n2, p2)) = (trimmed.series(rho), trimmed.integral(rho));
+            assert!((n - n2).abs() < 1e-10 && (p - p2).abs() < 1e-10, "t {t}, rho {rho}: {:e} {:e}", n - n2, p - p2);
+        }
+        assert!((trimmed.integral(1.0).0 - trimmed.integral(1.0 - 1e-12).0).abs() < 1e-5);
+    }
+}
+
+/// Slopes at rho = 0 of the specification: T'(0) = 0.576 and T(1) = 0.759 at 5 %.
+#[test]
+fn val_trimming_bends_the_shape() {
+    let trimmed = TrimmedNormal::new(1.959_963_984_540_054);
+    assert!((trimmed.covariance(1e-6) / 1e-6 - 0.576).abs() < 5e-4);
+    assert!((trimmed.covariance(1.0) - 0.759).abs() < 5e-4);
+}
+
+fn complete(cols: usize, window: crate::detrend::BoxWindow) -> (Vec<f64>, Vec<u32>, Vec<bool>) {
+    (vec![0.0; cols], vec![window.area() as u32; cols], vec![true; cols])
+}
+
+/// Relative tolerance 1e-12.
+#[test]
+fn val_box_filtered_exponential() {
+    for (range_m, cell_m, width, expected) in BOX_FILTERED {
+        let window = crate::detrend::BoxWindow { half: [width / 2; 2] };
+        let (values, count, used) = complete(10, window);
+        let cells = filtered::DetrendedCells { values: &values, cols: 10, count: &count, used: &used };
+        let filter = filtered::DetrendFilter::new(&cells, window, [cell_m; 2], [16; 2]);
+        let model = Covariance::new(model("exponential").unwrap(), 1.0, range_m).unwrap();
+        let residual = filter.residual_covariance(&model);
+        for (lag, e) in expected.into_iter().enumerate() {
+            for at in [[0, lag as isize], [-(lag as isize), 0]] {
+                assert!((residual.at(at) - e).abs() < 1e-12, "b {range_m}, lag {lag}: {}", residual.at(at));
+            }
+        }
+    }
+}
+
+#[test]
+fn val_a_fit_file_needs_a_known_model_and_its_parameters() {
+    let mut fit = FitFile { model: "exponential".into(), ..FitFile::default() };
+    let message = |fit: &FitFile| Covariance::of_fit(fit).err().unwrap().to_string();
+    assert_eq!(message(&fit), "`parameters.sigma_m` is missing from the fit file");
+    fit.parameters = [("sigma_m".to_owned(), 0.1), ("range_m".to_owned(), -1.0)].into();
+    assert_eq!(message(&fit), "`parameters.range_m` is -1; it must be a finite number above 0");
+    fit.parameters.insert("nugget_m2".into(), 0.0);
+    assert!(message(&fit).contains("is no parameter of model `exponential`"));
+    fit.model = "gauss".into();
+    assert_eq!(message(&fit), "`model` is `gauss`; known covariance models: exponential");
+}

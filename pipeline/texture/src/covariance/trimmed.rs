@@ -1,0 +1,151 @@
+//! Covariance of a normal pair of which only values within +-t are kept.
+//!
+//! For a unit bivariate normal with correlation rho, `T(rho) = N(rho) / P(rho)`,
+//! `N = E[X Y; |X| < t, |Y| < t]`, `P = Pr(|X| < t, |Y| < t)`: what the mean product of the pairs that survive trimming
+//! estimates. Trimming bends the shape of a covariance and not only its scale: at t = 1.96, T(1) = 0.759, but
+//! T'(0) = 0.576.
+//!
+//! * `|rho| <= 0.95`: Mehler's series (1866), `N = sum of a_n^2 rho^n` over odd n and `P = sum of p_n^2 rho^n` over even
+//!   n, where `a_n` and `p_n` are the coefficients of `x 1(|x| < t)` and `1(|x| < t)` in normalised Hermite polynomials
+//!   `h_n`: `p_0 = Pr(|X| < t)`, `p_n = -2 phi(t) h_(n-1)(t) / sqrt(n)`, `a_1 = p_0 - 2 t phi(t)`,
+//!   `a_n = -2 phi(t) [h_n(t) + sqrt(n / (n-1)) h_(n-2)(t)]`.
+//! * beyond: the derivatives of N and P with respect to rho (Price, 1958) integrated from rho = 1 down along
+//!   `rho = cos theta`, where every integrand is smooth:
+//!   `P(1) - P(rho) = integral of 2 (E+ - E-)`,
+//!   `N(1) - N(rho) = integral of P sin theta - 4 t phi(t) Pr(|X| < t | Y = t) sin theta + 2 t^2 (E+ + E-)`,
+//!   `E+- = exp(-t^2 / (1 +- cos theta)) / (2 pi)`.
+//!
+//! Error below 1e-10 for 0.6 <= t <= 6 (tests; trimming half of the values is t = 0.67). Cost: some 700 operations to prepare, about 5 / (1 - |rho|) per value.
+
+use sastrugi_statistics::normal;
+use std::f64::consts::PI;
+
+/// Correlation above which the series is left for the integral.
+const SERIES_MAX: f64 = 0.95;
+/// Terms of the series: 0.95^630 is 1e-14.
+const TERMS: usize = 630;
+/// Nodes of the integral over at most acos(0.95) = 0.32 rad.
+const NODES: usize = 20;
+
+/// Trimming of a unit normal at +-t.
+#[derive(Clone, Debug)]
+pub struct TrimmedNormal {
+    t: f64,
+    density: f64,
+    mass: f64,
+    second_moment: f64,
+    /// Squared coefficient of degree n: of the indicator for even n, of the trimmed variable for odd n.
+    squares: Vec<f64>,
+    nodes: Vec<(f64, f64)>,
+}
+
+impl TrimmedNormal {
+    /// Trimming at `t` standard deviations, `t > 0`.
+    pub fn new(t: f64) -> Self {
+        let (density, mass) = (normal::pdf(t), normal::central(t));
+        let second_moment = mass - 2.0 * t * density;
+        Self { t, density, mass, second_moment, squares: squares(t, density, mass), nodes: gauss_legendre(NODES) }
+    }
+
+    /// T: mean product of the pairs that survive; `rho` in [-1, 1] (values beyond are cut).
+    pub fn covariance(&self, rho: f64) -> f64 {
+        let (product, pairs) = self.moments(rho);
+        product / pairs
+    }
+
+    /// N and P.
+    pub fn moments(&self, rho: f64) -> (f64, f64) {
+        let size = rho.abs().min(1.0);
+        let (product, pairs) = if size <= SERIES_MAX { self.series(size) } else { self.integral(size) };
+        (product.copysign(rho), pairs)
+    }
+
+    /// `a_1^2`: slope of N at rho = 0.
+    pub fn linear_share(&self) -> f64 {
+        self.second_moment * self.second_moment
+    }
+
+    pub(super) fn series(&self, rho: f64) -> (f64, f64) {
+        let mut sums = [0.0; 2];
+        let mut power = 1.0;
+        for (n, square) in self.squares.iter().enumerate() {
+            sums[n % 2] += square * power;
+            power *= rho;
+            if power < 1e-14 {
+                break;
+            }
+        }
+        (sums[1], sums[0])
+    }
+
+    pub(super) fn integral(&self, rho: f64) -> (f64, f64) {
+        let end = libm::acos(rho);
+        if end == 0.0 {
+            return (self.second_moment, self.mass);
+        }
+        let (t, t2) = (self.t, self.t * self.t);
+        let (mut pairs_lost, mut product_lost) = (0.0, 0.0);
+        for &(node, weight) in &self.nodes {
+            let (theta, step) = (0.5 * end * (1.0 + node), 0.5 * end * weight);
+            let (sin, cos) = libm::sincos(theta);
+            let tan_half = sin / (1.0 + cos);
+            let same = libm::exp(-t2 / (1.0 + cos)) / (2.0 * PI);
+            let opposite = libm::exp(-t2 / (1.0 - cos)) / (2.0 * PI);
+            // Pr(|X| < t | Y = t): (1 -+ rho) / sqrt(1 - rho^2) are half-angle functions.
+            let inside = normal::cdf(t * tan_half) - normal::cdf(-t / tan_half);
+            pairs_lost += step * 2.0 * (same - opposite);
+            product_lost += step
+                * (2.0 * t2 * (same + opposite)
+                    - 4.0 * t * self.density * inside * sin
+                    - 2.0 * cos * (same - opposite));
+        }
+        let pairs = self.mass - pairs_lost;
+        // The integral of P over rho by parts: P(1) - rho P(rho) minus that of rho P'(rho), which is in product_lost.
+        let product = self.second_moment - (self.mass - rho * pairs) - product_lost;
+        (product, pairs)
+    }
+}
+
+/// Squared Hermite coefficients by degree.
+fn squares(t: f64, density: f64, mass: f64) -> Vec<f64> {
+    let mut squares = vec![mass * mass, (mass - 2.0 * t * density) * (mass - 2.0 * t * density)];
+    // Normalised Hermite polynomials of degrees n - 2 and n - 1 at t.
+    let (mut before, mut last) = (1.0, t);
+    for n in 2..TERMS {
+        let degree = n as f64;
+        let next = (t * last - (degree - 1.0).sqrt() * before) / degree.sqrt();
+        let coefficient =
+            if n % 2 == 0 { last / degree.sqrt() } else { next + (degree / (degree - 1.0)).sqrt() * before };
+        let scaled = 2.0 * density * coefficient;
+        squares.push(scaled * scaled);
+        (before, last) = (last, next);
+    }
+    squares
+}
+
+/// Nodes and weights of Gauss-Legendre quadrature on [-1, 1], by Newton's method on the recurrence.
+fn gauss_legendre(count: usize) -> Vec<(f64, f64)> {
+    let n = count as f64;
+    (0..count)
+        .map(|k| {
+            let mut x = libm::cos(PI * (k as f64 + 0.75) / (n + 0.5));
+            let mut slope = 1.0;
+            for _ in 0..8 {
+                let (value, derivative) = legendre(count, x);
+                slope = derivative;
+                x -= value / derivative;
+            }
+            (x, 2.0 / ((1.0 - x * x) * slope * slope))
+        })
+        .collect()
+}
+
+/// Legendre polynomial of degree `n` and its derivative at `x`.
+fn legendre(n: usize, x: f64) -> (f64, f64) {
+    let (mut before, mut last) = (1.0, x);
+    for k in 2..=n {
+        let k = k as f64;
+        (before, last) = (last, ((2.0 * k - 1.0) * x * last - (k - 1.0) * before) / k);
+    }
+    (last, n as f64 * (x * last - before) / (x * x - 1.0))
+}

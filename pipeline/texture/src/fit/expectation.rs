@@ -1,0 +1,124 @@
+//! What the estimator sees of a model: mean and covariance of the binned covariance after detrending and trimming.
+//!
+//! Mean: the model's covariance through the moving average ([`crate::covariance::filtered`]), then, lag by lag, through
+//! trimming ([`crate::covariance::trimmed`]), then over the bins as the data was.
+//!
+//! Covariance of two estimates at lags h and h' for a normal field (Bartlett, 1946), for N cells used:
+//! `B[C](h, h') = 1 / N * [Q(h - h') + Q(h + h')]`, `Q = sum over u of C(u) C(u + .)`.
+//! Trimming turns the products into other functions of the four heights. Their part of second order (second Wiener
+//! chaos) is how the trimmed covariance answers to small changes of the untrimmed one, `J B[C_f] J'`, J the derivative of
+//! the mean with respect to C_f(h) and C_f(0). The parts of higher order are taken from the trimmed field as if its
+//! products were those of a normal field, less their second order part: `(B[s^2 N] - B[a_1^2 C_f]) / (P P)` (symbols of
+//! [`crate::covariance::trimmed`]). At lag zero and 5 % this gives 0.770 s^4 per independent cell; exact is 0.735.
+//!
+//! Each bin is represented by at most [`BIN_LAGS`] of its lags.
+
+use crate::covariance::Covariance;
+use crate::covariance::bins::{LagBins, Member};
+use crate::covariance::filtered::{DetrendFilter, LagField};
+use crate::covariance::trimmed::TrimmedNormal;
+
+/// Lags that stand for a bin in the covariance of the bins.
+const BIN_LAGS: usize = 16;
+/// Relative step of difference quotients.
+const DIFFERENCE: f64 = 1e-4;
+/// Share of the variance added on the diagonal, so that rounding cannot make the matrix indefinite.
+const RIDGE: f64 = 1e-9;
+
+/// The estimator as a function of the model.
+pub struct Expectation<'a> {
+    /// The detrender.
+    pub filter: DetrendFilter,
+    /// The bins of the data.
+    pub bins: &'a LagBins,
+    /// Residuals beyond this were trimmed, m.
+    pub threshold_m: f64,
+    /// Number of residuals before trimming.
+    pub cells: usize,
+}
+
+impl Expectation<'_> {
+    /// Expected covariance of each bin, m2.
+    pub fn mean(&self, model: &Covariance) -> Vec<f64> {
+        let residual = self.filter.residual_covariance(model);
+        let variance = residual.at([0, 0]);
+        let trimmed = self.trimmed(variance);
+        self.bins.average(|lag| variance * trimmed.covariance(residual.at(lag) / variance))
+    }
+
+    /// Covariance of the bins' estimates, row-major, m4.
+    pub fn covariance(&self, model: &Covariance) -> Vec<f64> {
+        let residual = self.filter.residual_covariance(model);
+        let variance = residual.at([0, 0]);
+        let trimmed = self.trimmed(variance);
+        let products = residual.map(|c| variance * trimmed.moments(c / variance).0);
+        let linear = residual.map(|c| trimmed.linear_share() * c);
+        let [second, product_orders, linear_order] =
+            [&residual, &products, &linear].map(|field| self.bartlett(&self.filter.autocorrelation(field)));
+
+        let bin_covariance = self.bins.average(|lag| residual.at(lag));
+        let answers: Vec<[f64; 2]> =
+            (0..self.bins.len()).map(|k| self.answer(k, bin_covariance[k], variance)).collect();
+        let pairs: Vec<f64> = bin_covariance.iter().map(|c| trimmed.moments(c / variance).1).collect();
+        let n = self.bins.len();
+        let mut matrix = vec![0.0; n * n];
+        for i in 0..n {
+            for j in 0..n {
+                let ([ci, vi], [cj, vj]) = (answers[i], answers[j]);
+                let second_order =
+                    ci * cj * second[i * n + j] + ci * vj * second[i * n] + vi * cj * second[j] + vi * vj * second[0];
+                let higher = (product_orders[i * n + j] - linear_order[i * n + j]) / (pairs[i] * pairs[j]);
+                matrix[i * n + j] = second_order + higher;
+            }
+        }
+        (0..n).for_each(|k| matrix[k * n + k] *= 1.0 + RIDGE);
+        matrix
+    }
+
+    fn trimmed(&self, variance: f64) -> TrimmedNormal {
+        TrimmedNormal::new(self.threshold_m / variance.sqrt())
+    }
+
+    /// Derivatives of a bin's mean with respect to its own untrimmed covariance `c` and to the variance.
+    fn answer(&self, bin: usize, c: f64, variance: f64) -> [f64; 2] {
+        let mean = |c: f64, variance: f64| variance * self.trimmed(variance).covariance(c / variance);
+        let step = DIFFERENCE * variance;
+        if bin == 0 {
+            return [
+                0.0,
+                (mean(variance + step, variance + step) - mean(variance - step, variance - step)) / (2.0 * step),
+            ];
+        }
+        let own = (mean(c, variance) - mean(c - step, variance)) / step;
+        [own, (mean(c, variance + step) - mean(c, variance)) / step]
+    }
+
+    /// `B` between all bins from `Q`.
+    fn bartlett(&self, autocorrelation: &LagField) -> Vec<f64> {
+        let n = self.bins.len();
+        let lags: Vec<Vec<[isize; 2]>> =
+            self.bins.members.chunk_by(|a, b| a.bin == b.bin).map(representatives).collect();
+        let mut matrix = vec![0.0; n * n];
+        for i in 0..n {
+            for j in 0..=i {
+                let mean = mean_over_pairs(&lags[i], &lags[j], |[r, c], [s, d]| {
+                    autocorrelation.at([r - s, c - d]) + autocorrelation.at([r + s, c + d])
+                });
+                matrix[i * n + j] = mean / self.cells as f64;
+                matrix[j * n + i] = matrix[i * n + j];
+            }
+        }
+        matrix
+    }
+}
+
+/// At most [`BIN_LAGS`] lags of a bin, evenly spread.
+fn representatives(members: &[Member]) -> Vec<[isize; 2]> {
+    let count = members.len().min(BIN_LAGS);
+    (0..count).map(|k| members[(2 * k + 1) * members.len() / (2 * count)].lag).collect()
+}
+
+fn mean_over_pairs(a: &[[isize; 2]], b: &[[isize; 2]], f: impl Fn([isize; 2], [isize; 2]) -> f64) -> f64 {
+    let total: f64 = a.iter().map(|&x| b.iter().map(|&y| f(x, y)).sum::<f64>()).sum();
+    total / (a.len() * b.len()) as f64
+}

@@ -1,0 +1,140 @@
+//! Parameters of a fit.
+
+use crate::covariance::{self, Model};
+use crate::detrend::BoxWindow;
+use sastrugi_numeric::Geometry;
+use sastrugi_schemas::ParameterError;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::FitError;
+
+/// How the covariance is fitted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Mode {
+    /// The model is brought through the same detrending and trimming as the data before the two are compared.
+    #[default]
+    Corrected,
+    /// The published procedure: the model is compared with the residual's covariance as it is, and comes out too small
+    /// and too short.
+    Paper,
+}
+
+impl Mode {
+    /// Name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Corrected => "corrected",
+            Self::Paper => "paper",
+        }
+    }
+}
+
+/// Raw parameters of a fit, as a study states them.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct FitParameters {
+    /// `corrected` (default) or `paper` (Vecherin et al. 2022 as published).
+    pub mode: Mode,
+    /// Outer scale: width of the moving average that is taken for the background, m. Default 2 (Vecherin et al. 2022,
+    /// section 2); at least 3 cells, at most a third of the DEM.
+    pub outer_scale_m: f64,
+    /// Significance level at which residuals are trimmed on both sides, in (0, 0.5). Default 0.05 (Vecherin et al.
+    /// 2022, section 2).
+    pub trim: f64,
+    /// Covariance model. Default `exponential` (Vecherin et al. 2022, Eq. 9).
+    pub model: String,
+    /// Largest lag of the covariance, m. Default: half the outer scale, at least 3 cells.
+    pub max_lag_m: Option<f64>,
+    /// Cells count when more than this share of their window has data. Default 0.5; 0.9 in `paper` mode.
+    pub min_valid_share: Option<f64>,
+}
+
+/// Outer scale of the paper, m.
+const OUTER_SCALE_M: f64 = 2.0;
+/// Significance level of the paper.
+const TRIM: f64 = 0.05;
+/// Fewest cells across the outer scale.
+const WINDOW_CELLS_MIN: f64 = 3.0;
+/// Fewest cells in the largest lag, so that two parameters can be told from noise.
+const LAG_CELLS_MIN: f64 = 3.0;
+
+impl Default for FitParameters {
+    fn default() -> Self {
+        Self {
+            mode: Mode::Corrected,
+            outer_scale_m: OUTER_SCALE_M,
+            trim: TRIM,
+            model: "exponential".to_owned(),
+            max_lag_m: None,
+            min_valid_share: None,
+        }
+    }
+}
+
+/// Checked parameters of a fit.
+#[derive(Clone)]
+pub struct FitSettings {
+    parameters: FitParameters,
+    pub(super) model: &'static dyn Model,
+    pub(super) min_valid_share: f64,
+}
+
+impl TryFrom<FitParameters> for FitSettings {
+    type Error = ParameterError;
+
+    fn try_from(parameters: FitParameters) -> Result<Self, ParameterError> {
+        ParameterError::positive("outer_scale_m", parameters.outer_scale_m)?;
+        ParameterError::between("trim", parameters.trim, 0.0, 0.5)?;
+        if let Some(lag) = parameters.max_lag_m {
+            ParameterError::positive("max_lag_m", lag)?;
+        }
+        let share_default = if parameters.mode == Mode::Paper { 0.9 } else { 0.5 };
+        let share = parameters.min_valid_share.unwrap_or(share_default);
+        if !(0.0..1.0).contains(&share) {
+            return Err(ParameterError::new("min_valid_share", format!("is {share}; it must lie in [0, 1)")));
+        }
+        let model = covariance::model(&parameters.model)?;
+        Ok(Self { parameters, model, min_valid_share: share })
+    }
+}
+
+impl FitSettings {
+    /// The parameters with every default written out.
+    pub fn parameters(&self) -> FitParameters {
+        FitParameters { min_valid_share: Some(self.min_valid_share), ..self.parameters.clone() }
+    }
+
+    pub(super) fn mode(&self) -> Mode {
+        self.parameters.mode
+    }
+
+    pub(super) fn trim(&self) -> f64 {
+        self.parameters.trim
+    }
+
+    /// The window on a DEM of this shape.
+    pub(super) fn window(&self, dem: &Geometry) -> Result<BoxWindow, FitError> {
+        let outer_scale_m = self.parameters.outer_scale_m;
+        let [width_m, height_m] = dem.size();
+        let cell_m = dem.cell[0].max(dem.cell[1]);
+        let narrow_m = width_m.min(height_m);
+        if narrow_m < 2.0 * outer_scale_m {
+            return Err(FitError::DemTooSmall { width_m, height_m, needed_m: 2.0 * outer_scale_m });
+        }
+        if outer_scale_m > narrow_m / 3.0 {
+            return Err(FitError::OuterScaleTooLarge { outer_scale_m, largest_m: narrow_m / 3.0 });
+        }
+        if outer_scale_m < WINDOW_CELLS_MIN * cell_m {
+            return Err(FitError::OuterScaleTooSmall { outer_scale_m, cell_m, smallest_m: WINDOW_CELLS_MIN * cell_m });
+        }
+        Ok(BoxWindow::nearest(outer_scale_m, dem.cell))
+    }
+
+    /// Largest lag in m.
+    pub(super) fn max_lag_m(&self, dem: &Geometry) -> f64 {
+        let least = LAG_CELLS_MIN * dem.cell[0].max(dem.cell[1]);
+        self.parameters.max_lag_m.unwrap_or(0.5 * self.parameters.outer_scale_m).max(least)
+    }
+}

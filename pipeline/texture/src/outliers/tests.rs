@@ -1,0 +1,42 @@
+use super::*;
+use sastrugi_numeric::Streams;
+
+const COLS: usize = 200;
+
+fn noise() -> Vec<f64> {
+    let mut s = Streams::for_seed(1, "outliers-test").stream("field");
+    (0..COLS * COLS).map(|_| s.normal()).collect()
+}
+
+/// White normal cells: 40 000 cells, chance of any beyond 5 standard deviations 2.3 %; this field has none.
+#[test]
+fn val_a_surface_without_objects_is_left_alone() {
+    let outlier = find(&noise(), COLS, BoxWindow { half: [8, 8] });
+    assert_eq!(outlier.iter().filter(|&&o| o).count(), 0);
+}
+
+/// A cone 20 standard deviations high is taken out down to its skirt, and the hollow that it pulls into the moving
+/// average around it is not.
+#[test]
+fn val_a_tree_is_found_whole() {
+    let mut values = noise();
+    let distance = |k: usize| (((k / COLS) as f64 - 100.0), ((k % COLS) as f64 - 90.0));
+    let radius = |k: usize| {
+        let (y, x) = distance(k);
+        (x * x + y * y).sqrt()
+    };
+    for (k, v) in values.iter_mut().enumerate() {
+        *v += (20.0 * (1.0 - radius(k) / 6.0)).max(0.0);
+    }
+    let outlier = find(&values, COLS, BoxWindow { half: [8, 8] });
+    assert!((0..values.len()).filter(|&k| radius(k) < 4.0).all(|k| outlier[k]));
+    assert!((0..values.len()).filter(|&k| radius(k) > 12.0).all(|k| !outlier[k]));
+}
+
+#[test]
+fn val_no_data_and_constant_rasters() {
+    let window = BoxWindow { half: [1, 1] };
+    assert!(find(&[], 1, window).is_empty());
+    assert_eq!(find(&[f64::NAN; 9], 3, window), vec![false; 9]);
+    assert_eq!(find(&[4.0; 9], 3, window), vec![false; 9]);
+}
