@@ -1,1 +1,63 @@
-//! Room under construction.
+//! The report of a release: one self-contained HTML page that needs no network, every figure as an SVG file, and the
+//! numbers behind every figure as JSON.
+//!
+//! * [`questions`]: one folder per question that the page answers (query, figure, table), listed in one registry.
+//! * [`papers`]: published figures as data.
+//! * [`render`]: drawing, which knows nothing of what it draws.
+//! * [`data`]: the only way to the release's rows and files.
+//!
+//! No kernel runs here: spectra, histograms, covariances, backgrounds, residuals and class maps are read as a stage
+//! stored them. Medians and intervals come from `sastrugi-statistics`. The same release gives the same bytes: there is
+//! no clock and no thread in this room.
+
+pub mod content;
+pub mod data;
+pub mod papers;
+pub mod questions;
+pub mod render;
+#[cfg(test)]
+mod tests;
+
+mod release;
+mod write;
+
+pub use write::{Summary, render};
+
+use std::path::PathBuf;
+
+/// Why a report could not be made.
+#[derive(Debug, thiserror::Error)]
+pub enum ReportError {
+    /// The folder holds neither a study file nor tables.
+    #[error("{path}: no release: there is neither study.toml nor tables/ in it")]
+    NotARelease {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// A file could not be written.
+    #[error("write {path}: {source}")]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// A file of the release is there but cannot be read.
+    #[error("read {path} of the release: {reason}")]
+    Read {
+        /// Path in the release.
+        path: String,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// A picture could not be encoded.
+    #[error("encode a picture: {0}")]
+    Picture(#[from] png::EncodingError),
+}
+
+impl ReportError {
+    /// True when the release is the cause (missing or unusable), not the place of the report.
+    pub fn unusable_input(&self) -> bool {
+        matches!(self, Self::NotARelease { .. } | Self::Read { .. })
+    }
+}

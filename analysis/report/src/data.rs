@@ -1,0 +1,183 @@
+//! What the page is made from: the rows and files of one assembled release, read through `sastrugi-store` alone.
+//!
+//! Tables are read once; rasters and samples when a figure asks for them, one at a time. What a release lacks is an
+//! empty table or `None`: only a file that is there and cannot be read is an error.
+
+use crate::ReportError;
+use sastrugi_numeric::Grid;
+use sastrugi_schemas::fit::FitFile;
+use sastrugi_schemas::manifest::FailedItem;
+use sastrugi_schemas::tables::{
+    CovarianceRow, FitRow, HeightDistributionRow, MissionRow, PsdRow, SampleRow, TerrainRow,
+};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Files of a release that are read on demand. Paths are relative to the release; `None` where there is no such file.
+pub trait Files {
+    /// Heights or residuals, NaN where there is no data.
+    fn grid(&self, path: &str) -> Result<Option<Grid>, ReportError>;
+    /// Roughness class codes.
+    fn classes(&self, path: &str) -> Result<Option<Grid<u8>>, ReportError>;
+    /// Recorded samples of every mission on a terrain.
+    fn samples(&self, terrain_id: &str) -> Result<Vec<SampleRow>, ReportError>;
+    /// A fit file.
+    fn fit(&self, path: &str) -> Result<Option<FitFile>, ReportError>;
+}
+
+/// One file of the release.
+#[derive(Clone, Debug)]
+pub struct Artifact {
+    /// Path in the release.
+    pub path: String,
+    /// Size, bytes.
+    pub bytes: u64,
+}
+
+/// `[study]` of the study file, as far as a page shows it.
+#[derive(Clone, Debug, Default)]
+pub struct Study {
+    /// Short name.
+    pub name: String,
+    /// Title.
+    pub title: String,
+    /// A paragraph.
+    pub description: String,
+    /// Seed of every random stream.
+    pub seed: u64,
+    /// Date of the study.
+    pub date: String,
+    /// Licence of the release.
+    pub license: String,
+    /// People or groups that made it.
+    pub creators: Vec<String>,
+}
+
+/// Rows of a release.
+pub struct Data {
+    /// The study.
+    pub study: Study,
+    /// SHA-256 of the release's `study.toml`.
+    pub study_sha256: String,
+    /// Version of the program that made the release.
+    pub version: String,
+    /// Data files of the release, by path.
+    pub artifacts: Vec<Artifact>,
+    /// Items that failed, as far as the release says so: it lists them once it is sealed.
+    pub failed: Vec<FailedItem>,
+    /// Heightfields.
+    pub terrains: Vec<TerrainRow>,
+    /// Fits.
+    pub fits: Vec<FitRow>,
+    /// Covariance bins.
+    pub covariance: Vec<CovarianceRow>,
+    /// Spectra.
+    pub psd: Vec<PsdRow>,
+    /// Histograms of heights.
+    pub heights: Vec<HeightDistributionRow>,
+    /// Missions.
+    pub missions: Vec<MissionRow>,
+    /// Files read on demand.
+    pub files: Box<dyn Files>,
+}
+
+/// What carries one label and is compared with other groups.
+#[derive(Clone, Debug)]
+pub struct Group<'a, R> {
+    /// Label.
+    pub name: String,
+    /// Number among all groups of the release: its colour.
+    pub index: usize,
+    /// Its rows, in the order of the table.
+    pub rows: Vec<&'a R>,
+}
+
+impl Data {
+    /// Generated terrains by group, groups in natural order.
+    pub fn terrain_groups(&self) -> Vec<Group<'_, TerrainRow>> {
+        self.grouped(self.of_stage("terrain").map(|t| (label(t), t)))
+    }
+
+    /// Missions by group, groups in natural order.
+    pub fn mission_groups(&self) -> Vec<Group<'_, MissionRow>> {
+        let labels: BTreeMap<&str, &str> = self.terrains.iter().map(|t| (t.terrain_id.as_str(), label(t))).collect();
+        let of_terrain = |m: &MissionRow| labels.get(m.terrain_id.as_str()).copied();
+        self.grouped(self.missions.iter().map(|m| (m.group.as_deref().or(of_terrain(m)).unwrap_or("all"), m)))
+    }
+
+    /// Rows by label; a label has the same number whatever is grouped.
+    fn grouped<'a, R>(&'a self, rows: impl Iterator<Item = (&'a str, &'a R)>) -> Vec<Group<'a, R>> {
+        let missions = self.missions.iter().filter_map(|m| m.group.as_deref());
+        let names: BTreeSet<Natural> = self.terrains.iter().map(label).chain(missions).map(natural).collect();
+        let index = |key: &Natural| names.iter().position(|n| n == key).unwrap_or(names.len());
+        let mut groups: BTreeMap<Natural, Vec<&R>> = BTreeMap::new();
+        rows.for_each(|(name, row)| groups.entry(natural(name)).or_default().push(row));
+        groups.into_iter().map(|(key, rows)| Group { index: index(&key), name: key.1, rows }).collect()
+    }
+
+    /// Heightfields that a stage made.
+    pub fn of_stage<'a>(&'a self, stage: &'a str) -> impl Iterator<Item = &'a TerrainRow> {
+        self.terrains.iter().filter(move |t| t.stage == stage)
+    }
+
+    /// The heightfield of that id.
+    pub fn terrain(&self, id: &str) -> Option<&TerrainRow> {
+        self.terrains.iter().find(|t| t.terrain_id == id)
+    }
+
+    /// The fit of that id.
+    pub fn fit(&self, id: &str) -> Option<&FitRow> {
+        self.fits.iter().find(|f| f.fit_id == id)
+    }
+
+    /// Spectrum of a heightfield: bins with a positive frequency and density.
+    pub fn spectrum(&self, id: &str) -> Vec<&PsdRow> {
+        let usable = |r: &&PsdRow| r.terrain_id == id && r.frequency_cycles_m > 0.0 && r.psd_m4 > 0.0;
+        self.psd.iter().filter(usable).collect()
+    }
+
+    /// Histogram of a heightfield.
+    pub fn histogram(&self, id: &str) -> Vec<&HeightDistributionRow> {
+        self.heights.iter().filter(|r| r.terrain_id == id && r.density_per_m.is_finite()).collect()
+    }
+}
+
+/// The group a heightfield belongs to: its label, or its generator where it has none.
+pub fn label(terrain: &TerrainRow) -> &str {
+    terrain.group.as_deref().unwrap_or(&terrain.kind)
+}
+
+/// Sorting key of a label (numbers before words, numbers by value), and the label.
+type Natural = (Vec<(u64, String)>, String);
+
+/// A key under which `d2.3` < `d2.45` < `d10`: runs of digits and points compare by their value.
+fn natural(label: &str) -> Natural {
+    let numeric = |c: &char| c.is_ascii_digit() || *c == '.';
+    let chars: Vec<char> = label.chars().collect();
+    let part = |run: &[char]| {
+        let text: String = run.iter().collect();
+        match text.parse::<f64>() {
+            // The bits of numbers that are not negative sort as the numbers do.
+            Ok(n) if run.iter().all(numeric) => (n.to_bits(), String::new()),
+            _ => (u64::MAX, text),
+        }
+    };
+    (chars.chunk_by(|a, b| numeric(a) == numeric(b)).map(part).collect(), label.to_owned())
+}
+
+/// Text of a key in the JSON parameters of a heightfield, as `fit` of a texture.
+pub fn parameter(terrain: &TerrainRow, key: &str) -> Option<String> {
+    let params: serde_json::Value = serde_json::from_str(&terrain.params).ok()?;
+    params.get(key)?.as_str().map(str::to_owned)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn val_labels_sort_as_people_do() {
+        let mut labels = ["d10", "2.6", "d2", "10", "2.45", "rough", "", "inf"];
+        labels.sort_by_key(|l| natural(l));
+        assert_eq!(labels, ["", "2.45", "2.6", "10", "d2", "d10", "inf", "rough"]);
+    }
+}

@@ -1,0 +1,250 @@
+//! How well each fit describes its measured DEM: the DEM, what was fitted, the covariance with its model, the parameters
+//! of all fits side by side.
+
+use super::Question;
+use super::curves::HEIGHT;
+use super::relief::{Style, Words, deviations, exaggeration, exaggeration_words, limit_m, relief};
+use crate::ReportError;
+use crate::content::{Block, Figure, Numbers, Size, TableBlock, number, slug, text};
+use crate::data::Data;
+use crate::render::axis::Axis;
+use crate::render::chart::{Mark, Plot};
+use crate::render::number as set;
+use crate::render::svg::{Paint, Stroke, Symbol};
+use sastrugi_schemas::tables::{CovarianceRow, FitRow};
+use std::collections::BTreeSet;
+
+/// Registry entry.
+pub const QUESTION: Question =
+    Question { id: "covariance", title: "How well do the fits describe the measured surface?", answer };
+
+/// Measured DEMs whose maps are drawn; the fits of all are in the table.
+const DEMS_MAX: usize = 4;
+
+fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
+    let dems: BTreeSet<&str> = data.fits.iter().map(|f| f.dem_id.as_str()).collect();
+    let mut blocks = Vec::new();
+    for dem in dems.iter().take(DEMS_MAX) {
+        let fits: Vec<&FitRow> = data.fits.iter().filter(|f| f.dem_id == *dem).collect();
+        blocks.push(Block::Heading(format!("DEM {dem}")));
+        blocks.extend(warnings(data, &fits)?.into_iter().map(Block::Warning));
+        blocks.push(Block::Figures(covariances(data, &fits)));
+        blocks.push(Block::Table(parameters(dem, &fits)));
+        blocks.push(Block::Figures(maps(data, dem, &fits)?));
+    }
+    if dems.len() > DEMS_MAX {
+        blocks.push(Block::Text(format!(
+            "The first {DEMS_MAX} of {} DEMs are drawn; the table holds all fits.",
+            dems.len()
+        )));
+    }
+    blocks.push(Block::FoldedTable(all(data)));
+    Ok(blocks)
+}
+
+/// What a reader must know about each fit, as full sentences.
+fn warnings(data: &Data, fits: &[&FitRow]) -> Result<Vec<String>, ReportError> {
+    let mut all = Vec::new();
+    for fit in fits {
+        let file = data.files.fit(&format!("fit/{}.json", fit.fit_id))?;
+        let of_table = || fit.warnings.split("; ").map(str::to_owned).collect();
+        let list: Vec<String> = file.map_or_else(of_table, |f| f.warnings);
+        let own = list.iter().filter(|w| !w.trim().is_empty());
+        all.extend(own.map(|w| format!("{} ({} mode): {}", fit.fit_id, fit.mode, sentence(w))));
+    }
+    Ok(all)
+}
+
+/// The words with a capital and a full stop.
+fn sentence(words: &str) -> String {
+    let words = words.trim();
+    let mut chars = words.chars();
+    let start: String = chars.next().map(|c| c.to_uppercase().collect()).unwrap_or_default();
+    let stop = if words.ends_with(['.', '!', '?']) { "" } else { "." };
+    format!("{start}{}{stop}", chars.as_str())
+}
+
+fn covariances(data: &Data, fits: &[&FitRow]) -> Vec<Figure> {
+    let bins = |fit: &&FitRow| -> Vec<&CovarianceRow> {
+        let isotropic =
+            |r: &&CovarianceRow| r.fit_id == fit.fit_id && r.azimuth_deg.is_none() && r.covariance_m2.is_finite();
+        data.covariance.iter().filter(isotropic).collect()
+    };
+    let drawn: Vec<(&FitRow, Vec<&CovarianceRow>)> =
+        fits.iter().map(|f| (*f, bins(f))).filter(|(_, b)| !b.is_empty()).collect();
+    // Common axes, so that the modes can be compared by eye.
+    let all = || drawn.iter().flat_map(|(_, bins)| bins.iter());
+    let finite = |values: Vec<f64>| values.into_iter().filter(|v| v.is_finite());
+    let values = || all().flat_map(|r| finite(vec![r.covariance_m2, r.model_m2, r.surface_model_m2]));
+    let x = Axis::linear(0.0, 1.03 * all().map(|r| r.lag_m).fold(0.0, f64::max));
+    let high = values().fold(0.0, f64::max);
+    let low = values().fold(0.0, f64::min);
+    let y = Axis::linear(low - 0.04 * (high - low), high + 0.06 * (high - low));
+    drawn.iter().map(|(fit, bins)| covariance(fit, bins, x, y)).collect()
+}
+
+fn covariance(fit: &FitRow, bins: &[&CovarianceRow], x: Axis, y: Axis) -> Figure {
+    let id = slug(&format!("covariance-{}", fit.fit_id));
+    let seen = Stroke::new(Paint::Series(1), 2.0);
+    let surface = Stroke::new(Paint::Series(0), 2.0).dashed("7 4");
+    let same = bins.iter().all(|b| (b.model_m2 - b.surface_model_m2).abs() <= 1e-9 * b.model_m2.abs());
+    let mut legend = vec![(Mark::Symbol(Symbol::Disc, Paint::Ink), "measured (area: pairs)".to_owned())];
+    match same {
+        true => legend.push((Mark::Line(seen), "fitted model".into())),
+        false => legend.extend([
+            (Mark::Line(seen), "model as the estimator sees it".into()),
+            (Mark::Line(surface), "model of the surface".into()),
+        ]),
+    }
+    let mut plot = Plot::new(HEIGHT + 20.0, (x, "lag, m"), (y, "covariance, m²"), &legend);
+    plot.line([(0.0, 0.0), (x.range().1, 0.0)], Stroke::new(Paint::Muted, 1.0));
+    plot.clip(&format!("{id}-clip"));
+    if !same {
+        plot.line(bins.iter().map(|b| (b.lag_m, b.surface_model_m2)), surface);
+    }
+    plot.line(bins.iter().map(|b| (b.lag_m, b.model_m2)), seen);
+    draw_bins(&mut plot, bins);
+    plot.svg.close();
+    plot.note(0, &format!("σ = {}", set::with_unit(fit.sigma_m, 3, "m")));
+    plot.note(1, &format!("b = {}", set::with_unit(fit.range_m, 3, "m")));
+    figure(id, fit, bins, plot)
+}
+
+/// Discs whose area grows with the number of pairs.
+fn draw_bins(plot: &mut Plot, bins: &[&CovarianceRow]) {
+    let most = bins.iter().map(|b| b.pairs).max().unwrap_or(1).max(1) as f64;
+    for bin in bins {
+        let radius = 1.3 + 2.7 * (bin.pairs.max(0) as f64 / most).sqrt();
+        for at in plot.place([(bin.lag_m, bin.covariance_m2)]) {
+            plot.svg.disc(at, radius, Paint::Ink, 0.8);
+        }
+    }
+}
+
+fn figure(id: String, fit: &FitRow, bins: &[&CovarianceRow], plot: Plot) -> Figure {
+    let pairs = bins.iter().map(|b| b.pairs);
+    let (fewest, most) = (pairs.clone().min().unwrap_or(0), pairs.max().unwrap_or(0));
+    let caption = format!(
+        "{} covariance of the residual after a moving average of {} × {} m; {} to {} pairs of cells in a bin.",
+        fit.model,
+        set::significant(fit.window_x_m, 3),
+        set::significant(fit.window_y_m, 3),
+        set::count(fewest),
+        set::count(most)
+    );
+    let description = format!(
+        "Covariance against lag in {} bins with the fitted {} model: standard deviation {}, range {}.",
+        bins.len(),
+        fit.model,
+        set::with_unit(fit.sigma_m, 3, "m"),
+        set::with_unit(fit.range_m, 3, "m")
+    );
+    let names = ["bin", "lag_m", "covariance_m2", "pairs", "model_m2", "surface_model_m2"];
+    let query = format!("tables/covariance where fit_id = '{}' and azimuth_deg is null", fit.fit_id);
+    let numbers = Numbers::select(query, bins.iter().copied(), &names);
+    let title = format!("{}, {} mode.", fit.fit_id, fit.mode);
+    Figure { id, title, caption, description, svg: plot.svg, size: Size::Medium, numbers }
+}
+
+/// A parameter of every fit: name, unit, figure.
+type Parameter = (&'static str, &'static str, fn(&FitRow) -> f64);
+
+const PARAMETERS: [Parameter; 11] = [
+    ("standard deviation σ", "m", |f| f.sigma_m),
+    ("range b", "m", |f| f.range_m),
+    ("nugget", "m2", |f| f.nugget_m2),
+    ("σ²/b", "m", |f| f.sigma2_over_range_m),
+    ("range b over window", "1", |f| f.range_m / f.window_x_m),
+    ("window, east-west", "m", |f| f.window_x_m),
+    ("window, north-south", "m", |f| f.window_y_m),
+    ("trim level", "1", |f| f.trim_level),
+    ("trim threshold", "m", |f| f.trim_threshold_m),
+    ("share of cells used", "1", |f| f.used_share),
+    ("rms misfit of the bins", "m2", |f| f.misfit_m2),
+];
+
+fn parameters(dem: &str, fits: &[&FitRow]) -> TableBlock {
+    let headings: Vec<String> = fits.iter().map(|f| format!("{} ({})", f.fit_id, f.mode)).collect();
+    let columns: Vec<(&str, &str)> =
+        [("parameter", ""), ("unit", "")].into_iter().chain(headings.iter().map(|h| (h.as_str(), ""))).collect();
+    let mut numbers = Numbers::new(format!("tables/fits where dem_id = '{dem}'"), &columns);
+    for (name, unit, figure) in PARAMETERS {
+        let values = fits.iter().map(|f| number(figure(f)));
+        numbers.row([text(name), text(set::unit(unit))].into_iter().chain(values));
+    }
+    let caption = format!("Fits of {dem} side by side");
+    TableBlock { id: slug(&format!("fits-of-{dem}")), caption, numbers }
+}
+
+/// The DEM, then background and residual of every fit.
+fn maps(data: &Data, dem: &str, fits: &[&FitRow]) -> Result<Vec<Figure>, ReportError> {
+    let row = data.terrain(dem);
+    let slope = row.map_or(f64::NAN, |t| t.rms_slope);
+    let path = row.map_or_else(|| format!("dem/{dem}.metric.tif"), |t| t.path.clone());
+    let range_m = row.map_or((f64::NAN, f64::NAN), |t| (t.height_min_m, t.height_max_m));
+    let style = Style { range_m, exaggeration: exaggeration(slope), pixels: 400 };
+    let style = Some(style).filter(|s| s.range_m.0 < s.range_m.1);
+    let shading = style.map_or_else(String::new, |s| exaggeration_words(s.exaggeration));
+    let mut figures = Vec::new();
+    let words =
+        |what: &str, title: String, caption: String| Words { id: slug(&format!("{what}-{dem}")), title, caption };
+    let caption = format!("{dem} as imported, in metres. Light from the north-west.{shading}");
+    figures.extend(relief(data, &path, style, words("dem", "Measured DEM.".into(), caption))?);
+    for fit in fits {
+        figures.extend(background(data, fit, style)?);
+        figures.extend(residual(data, fit)?);
+    }
+    Ok(figures)
+}
+
+fn background(data: &Data, fit: &FitRow, style: Option<Style>) -> Result<Option<Figure>, ReportError> {
+    let id = slug(&format!("background-{}", fit.fit_id));
+    let caption = "Centred moving average: what is taken away before the covariance.".to_owned();
+    let words = Words { id, title: format!("Background, {}.", fit.fit_id), caption };
+    relief(data, &format!("fit/{}.background.tif", fit.fit_id), style, words)
+}
+
+fn residual(data: &Data, fit: &FitRow) -> Result<Option<Figure>, ReportError> {
+    let path = format!("fit/{}.residual.tif", fit.fit_id);
+    let Some(grid) = data.files.grid(&path)? else { return Ok(None) };
+    let caption = format!(
+        "DEM less background; {} of the cells entered the covariance, grey ones did not (no data, border, outliers, trimmed).",
+        set::percent(fit.used_share, 1)
+    );
+    let id = slug(&format!("residual-{}", fit.fit_id));
+    let words = Words { id, title: format!("Residual, {}.", fit.fit_id), caption };
+    deviations(&grid, &path, limit_m(&grid), "not used", words)
+}
+
+fn all(data: &Data) -> TableBlock {
+    let names = [
+        "fit_id",
+        "dem_id",
+        "mode",
+        "model",
+        "sigma_m",
+        "range_m",
+        "nugget_m2",
+        "sigma2_over_range_m",
+        "window_x_m",
+        "window_y_m",
+        "trim_level",
+        "trim_threshold_m",
+        "used_share",
+        "misfit_m2",
+    ];
+    let numbers = Numbers::select("tables/fits", &data.fits, &names);
+    TableBlock { id: "fits".into(), caption: "All fits".into(), numbers }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn val_sentences() {
+        assert_eq!(sentence(" b is not identifiable "), "B is not identifiable.");
+        assert_eq!(sentence("Done."), "Done.");
+        assert_eq!(sentence(""), ".");
+    }
+}

@@ -1,0 +1,110 @@
+//! Spectra and height distributions of several heightfields in one frame.
+
+use crate::render::axis::Axis;
+use crate::render::chart::{Entry, Mark, Plot};
+use crate::render::svg::{Paint, Stroke};
+use crate::render::thin;
+use sastrugi_numeric::sums;
+use sastrugi_schemas::tables::{HeightDistributionRow, PsdRow};
+
+/// Height of a chart, px.
+pub const HEIGHT: f64 = 290.0;
+
+/// A curve.
+#[derive(Clone, Debug)]
+pub struct Curve {
+    /// Name in the legend; none for one of many.
+    pub name: Option<String>,
+    /// Line.
+    pub stroke: Stroke,
+    /// Points in order of x.
+    pub points: Vec<(f64, f64)>,
+}
+
+/// Ends of both axes.
+#[derive(Clone, Copy, Debug)]
+pub struct Ranges {
+    x: (f64, f64),
+    y: (f64, f64),
+}
+
+/// A straight line in log-log axes, through the mean of the points in those axes.
+#[derive(Clone, Copy, Debug)]
+pub struct Slope {
+    /// Slope.
+    pub slope: f64,
+    /// A point of the line.
+    centre: (f64, f64),
+}
+
+/// Points of a spectrum.
+pub fn spectrum(rows: &[&PsdRow]) -> Vec<(f64, f64)> {
+    rows.iter().map(|r| (r.frequency_cycles_m, r.psd_m4)).collect()
+}
+
+/// Points of a histogram: the middle of each bin.
+pub fn histogram(rows: &[&HeightDistributionRow]) -> Vec<(f64, f64)> {
+    rows.iter().map(|r| (0.5 * (r.low_m + r.high_m), r.density_per_m)).collect()
+}
+
+/// Ranges that hold all curves.
+pub fn ranges<'a>(curves: impl IntoIterator<Item = &'a Curve>) -> Ranges {
+    let none = (f64::INFINITY, f64::NEG_INFINITY);
+    let widen = |(low, high): (f64, f64), v: f64| (low.min(v), high.max(v));
+    let points = curves.into_iter().flat_map(|c| c.points.iter());
+    points.fold(Ranges { x: none, y: none }, |r, p| Ranges { x: widen(r.x, p.0), y: widen(r.y, p.1) })
+}
+
+/// The fitted slope laid through the middle of the curves; `None` when either is unknown.
+pub fn slope(slope: f64, curves: &[Curve]) -> Option<Slope> {
+    let points = curves.iter().flat_map(|c| c.points.iter());
+    let logs: Vec<(f64, f64)> = points.map(|p| (libm::log(p.0), libm::log(p.1))).collect();
+    let [x, y] =
+        [logs.iter().map(|l| l.0).collect::<Vec<_>>(), logs.iter().map(|l| l.1).collect()].map(|v| sums::mean(&v));
+    (slope.is_finite() && x.is_finite() && y.is_finite()).then_some(Slope { slope, centre: (x, y) })
+}
+
+/// Power spectral densities in log-log axes, with a fitted slope.
+pub fn spectra(id: &str, curves: &[Curve], ranges: Ranges, slope: Option<Slope>) -> Plot {
+    let dashed = Stroke::new(Paint::Ink, 1.6).dashed("6 4");
+    let mut legend = entries(curves);
+    if slope.is_some() && !legend.is_empty() {
+        legend.push((Mark::Line(dashed), "fitted slope".into()));
+    }
+    let (low, high) = ranges.y;
+    // Densities can fall to rounding noise beyond a band limit: ten decades are enough.
+    let y = Axis::log(low.max(high * 1e-10) / 1.5, high * 1.5);
+    let x = (Axis::log(ranges.x.0 / 1.1, ranges.x.1 * 1.1), "spatial frequency, cycles/m");
+    let mut plot = Plot::new(HEIGHT, x, (y, "power spectral density, m⁴"), &legend);
+    draw(&mut plot, id, curves);
+    if let Some(Slope { slope, centre }) = slope {
+        let on_line = |x: f64| (x, libm::exp(centre.1 + slope * (libm::log(x) - centre.0)));
+        let (from, to) = plot.x.range();
+        plot.line([on_line(from), on_line(to)], dashed);
+    }
+    plot.svg.close();
+    plot
+}
+
+/// Height distributions.
+pub fn distributions(id: &str, curves: &[Curve], ranges: Ranges) -> Plot {
+    let x = (Axis::linear(ranges.x.0, ranges.x.1), "height, m");
+    let y = (Axis::linear(0.0, 1.06 * ranges.y.1), "density, 1/m");
+    let mut plot = Plot::new(HEIGHT, x, y, &entries(curves));
+    draw(&mut plot, id, curves);
+    plot.svg.close();
+    plot
+}
+
+/// Draws the curves inside of a clip that stays open.
+fn draw(plot: &mut Plot, id: &str, curves: &[Curve]) {
+    plot.clip(&format!("{id}-clip"));
+    for curve in curves {
+        let placed = plot.place(curve.points.iter().copied());
+        plot.svg.polyline(&thin::line(&placed, 1.0), curve.stroke);
+    }
+}
+
+fn entries(curves: &[Curve]) -> Vec<Entry> {
+    curves.iter().filter_map(|c| Some((Mark::Line(c.stroke), c.name.clone()?))).collect()
+}

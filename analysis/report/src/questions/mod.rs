@@ -1,0 +1,45 @@
+//! The questions a report answers. Adding one is a folder and a line in [`ALL`].
+
+pub mod covariance;
+mod curves;
+pub mod failures;
+pub mod missions;
+mod outcome;
+pub mod published;
+mod relief;
+pub mod terrain;
+pub mod texture;
+
+use crate::ReportError;
+use crate::content::{Block, Section};
+use crate::data::Data;
+
+/// A question.
+#[derive(Clone, Copy, Debug)]
+pub struct Question {
+    /// Anchor on the page.
+    pub id: &'static str,
+    /// Heading.
+    pub title: &'static str,
+    /// Its answer; no block when the release says nothing about it.
+    pub answer: fn(&Data) -> Result<Vec<Block>, ReportError>,
+}
+
+/// All questions, in the order of the page.
+pub const ALL: [Question; 6] = [
+    failures::QUESTION,
+    terrain::QUESTION,
+    covariance::QUESTION,
+    texture::QUESTION,
+    missions::QUESTION,
+    published::QUESTION,
+];
+
+impl Question {
+    /// The section of the page; `None` when there is nothing to say.
+    pub fn section(&self, data: &Data) -> Result<Option<Section>, ReportError> {
+        let mut blocks = (self.answer)(data)?;
+        blocks.retain(|block| !block.is_empty());
+        Ok((!blocks.is_empty()).then_some(Section { id: self.id, title: self.title, blocks }))
+    }
+}

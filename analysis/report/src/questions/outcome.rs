@@ -1,0 +1,53 @@
+//! How a mission can end, and how each end is drawn: by colour, line and mark, so that colour alone never tells.
+
+use crate::render::svg::{OUTCOMES, Paint, Stroke, Symbol};
+use sastrugi_schemas::tables::MissionRow;
+
+/// One way to end.
+#[derive(Clone, Copy, Debug)]
+pub struct Outcome {
+    /// Word in the table `missions`.
+    pub word: &'static str,
+    /// Words for readers.
+    pub name: &'static str,
+    /// Mark where the mission ended.
+    pub symbol: Symbol,
+    /// Dashes of its track.
+    pub dash: &'static str,
+}
+
+const fn outcome(word: &'static str, name: &'static str, symbol: Symbol, dash: &'static str) -> Outcome {
+    Outcome { word, name, symbol, dash }
+}
+
+/// All outcomes, the last for words that a newer program may write.
+pub const ALL: [Outcome; 6] = [
+    outcome("success", "success", Symbol::Disc, ""),
+    outcome("stuck", "stuck", Symbol::Square, "2 3"),
+    outcome("tipped", "tipped", Symbol::Triangle, "7 3"),
+    outcome("out_of_bounds", "out of bounds", Symbol::Cross, "9 3 2 3"),
+    outcome("timeout", "timeout", Symbol::Diamond, "5 2 1 2 1 2"),
+    outcome("", "other", Symbol::Frame, "1 3"),
+];
+
+/// Number of a mission's outcome in [`ALL`].
+pub fn index(mission: &MissionRow) -> usize {
+    ALL.iter().position(|o| o.word == mission.outcome).unwrap_or(ALL.len() - 1)
+}
+
+/// True for a mission that reached its goal.
+pub fn successful(mission: &MissionRow) -> bool {
+    index(mission) == 0
+}
+
+/// Missions by outcome.
+pub fn counts<'a>(missions: impl IntoIterator<Item = &'a MissionRow>) -> [usize; ALL.len()] {
+    let mut counts = [0; ALL.len()];
+    missions.into_iter().for_each(|m| counts[index(m)] += 1);
+    counts
+}
+
+/// Track of an outcome on a map: the colours of maps do not follow the theme.
+pub fn track(index: usize) -> Stroke {
+    Stroke::new(Paint::Fixed(OUTCOMES[index]), 1.7).dashed(ALL[index].dash)
+}

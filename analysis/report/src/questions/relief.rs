@@ -1,0 +1,143 @@
+//! Shaded relief and deviation maps of one heightfield.
+
+use crate::ReportError;
+use crate::content::{Figure, Numbers, Size, number, text};
+use crate::data::Data;
+use crate::render::map::{Key, Map};
+use crate::render::{colour, number as set, picture};
+use sastrugi_numeric::{Grid, sums};
+use sastrugi_schemas::Cell;
+
+/// Width of a map among several, px.
+pub const MAP_WIDTH: f64 = 320.0;
+/// Root mean square slope at which relief is not exaggerated any further.
+const STEEP_ENOUGH: f64 = 0.5;
+
+/// How a relief is drawn, the same for all maps that are compared.
+#[derive(Clone, Copy, Debug)]
+pub struct Style {
+    /// Heights at either end of the colours, m.
+    pub range_m: (f64, f64),
+    /// Factor on the slopes before shading.
+    pub exaggeration: f64,
+    /// Largest number of rows or columns of the picture.
+    pub pixels: usize,
+}
+
+/// The words around a map.
+#[derive(Clone, Debug)]
+pub struct Words {
+    /// Name of its files.
+    pub id: String,
+    /// Title.
+    pub title: String,
+    /// What to mind.
+    pub caption: String,
+}
+
+/// The round factor that makes slopes of that root mean square well visible.
+pub fn exaggeration(rms_slope: f64) -> f64 {
+    let factors = [50.0, 20.0, 10.0, 5.0, 2.0];
+    factors.into_iter().find(|f| f * rms_slope <= STEEP_ENOUGH).unwrap_or(1.0)
+}
+
+/// How the factor is named in a caption; empty for none.
+pub fn exaggeration_words(exaggeration: f64) -> String {
+    if exaggeration > 1.0 {
+        format!(" Slopes are exaggerated {} times.", set::fixed(exaggeration, 0))
+    } else {
+        String::new()
+    }
+}
+
+/// Shaded relief of the file at `path`; `None` when the release has no such file or it holds no data.
+pub fn relief(data: &Data, path: &str, style: Option<Style>, words: Words) -> Result<Option<Figure>, ReportError> {
+    let Some(grid) = data.files.grid(path)? else { return Ok(None) };
+    let Some(own_range) = grid.range() else { return Ok(None) };
+    let style = style.unwrap_or(Style { range_m: own_range, exaggeration: 1.0, pixels: 400 });
+    let picture = picture::relief(&grid, style.range_m, style.exaggeration, style.pixels)?;
+    let absent = (grid.finite_count() < grid.values.len()).then_some((colour::NO_DATA, "no data"));
+    let colours = picture::ramp(&colour::heights(), 40);
+    let key = Key::Ramp { colours: &colours, range: style.range_m, title: "height, m", absent };
+    let map = Map::new(&picture, MAP_WIDTH, &key);
+    let description = format!("Shaded relief of {}: {}.", path, extent(&grid));
+    Ok(Some(figure(words, description, map, numbers(path, &grid, own_range))))
+}
+
+/// Deviations of a grid coloured over `[-limit_m, limit_m]`; `absent` says what the grey cells are.
+pub fn deviations(
+    grid: &Grid,
+    path: &str,
+    limit_m: f64,
+    absent: &str,
+    words: Words,
+) -> Result<Option<Figure>, ReportError> {
+    let Some(own_range) = grid.range() else { return Ok(None) };
+    let picture = picture::deviations(grid, limit_m, 400)?;
+    let absent = (grid.finite_count() < grid.values.len()).then_some((colour::NO_DATA, absent));
+    let colours = picture::ramp(&colour::deviations(), 40);
+    let key = Key::Ramp { colours: &colours, range: (-limit_m, limit_m), title: "deviation, m", absent };
+    let map = Map::new(&picture, MAP_WIDTH, &key);
+    let description = format!("Map of deviations of {path}: {}.", extent(grid));
+    Ok(Some(figure(words, description, map, numbers(path, grid, own_range))))
+}
+
+/// Two and a half standard deviations of the cells with data.
+pub fn limit_m(grid: &Grid) -> f64 {
+    2.5 * sums::variance(&sums::finite(&grid.values)).sqrt()
+}
+
+/// Size and cell in words.
+pub fn extent<T>(grid: &Grid<T>) -> String {
+    let ([x, y], [cell_x, cell_y]) = (grid.geometry.size(), grid.geometry.cell);
+    let short = |v| set::significant(v, 3);
+    let cell = if (cell_x - cell_y).abs() <= 1e-6 * cell_x {
+        short(cell_x)
+    } else {
+        format!("{} × {}", short(cell_x), short(cell_y))
+    };
+    format!("{} × {} m, {} × {} cells of {cell} m", short(x), short(y), grid.cols(), grid.rows())
+}
+
+fn figure(words: Words, description: String, map: Map, numbers: Numbers) -> Figure {
+    let Words { id, title, caption } = words;
+    Figure { id, title, caption, description, svg: map.svg, size: Size::Small, numbers }
+}
+
+fn numbers(path: &str, grid: &Grid, (low, high): (f64, f64)) -> Numbers {
+    let g = grid.geometry;
+    let columns = [
+        ("file", ""),
+        ("rows", "1"),
+        ("cols", "1"),
+        ("cell_x_m", "m"),
+        ("cell_y_m", "m"),
+        ("low_m", "m"),
+        ("high_m", "m"),
+    ];
+    let mut numbers = Numbers::new(path, &columns);
+    let int = |n: usize| Cell::I64(n as i64);
+    numbers.row([
+        text(path),
+        int(g.rows),
+        int(g.cols),
+        number(g.cell[0]),
+        number(g.cell[1]),
+        number(low),
+        number(high),
+    ]);
+    numbers
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn val_exaggeration_is_round() {
+        assert_eq!(exaggeration(0.4), 1.0);
+        assert_eq!(exaggeration(0.2), 2.0);
+        assert_eq!(exaggeration(0.01), 50.0);
+        assert_eq!(exaggeration(f64::NAN), 1.0);
+    }
+}

@@ -1,0 +1,128 @@
+//! Which terrains the release holds: relief, classes, spectra, heights, by group.
+
+mod classes;
+mod reliefs;
+mod spectra;
+
+use super::Question;
+use crate::ReportError;
+use crate::content::{Block, Figure, Numbers, TableBlock, count, number, text};
+use crate::data::{Data, Group};
+use crate::render::number as set;
+use sastrugi_numeric::sums;
+use sastrugi_schemas::tables::TerrainRow;
+
+/// Registry entry.
+pub const QUESTION: Question = Question { id: "terrain", title: "What is the terrain like?", answer };
+
+/// Groups for which three terrains are drawn; with more groups, one each.
+const GROUPS_WITH_THREE: usize = 3;
+/// Groups that are drawn at all; every group is in the tables.
+const GROUPS_MAX: usize = 12;
+
+fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
+    let groups = data.terrain_groups();
+    if groups.is_empty() {
+        return Ok(Vec::new());
+    }
+    let drawn = &groups[..groups.len().min(GROUPS_MAX)];
+    let mut blocks = vec![Block::Text(introduction(&groups)), Block::Table(medians(&groups))];
+    if drawn.len() < groups.len() {
+        blocks.push(Block::Text(format!(
+            "The first {GROUPS_MAX} of {} groups are drawn; all are in the tables.",
+            groups.len()
+        )));
+    }
+    push(&mut blocks, "Relief", reliefs::figures(data, drawn)?);
+    push(&mut blocks, "Roughness classes", classes::figures(data, drawn)?);
+    push(&mut blocks, "Spectra and heights", spectra::figures(data, drawn));
+    blocks.push(Block::FoldedTable(all(data)));
+    Ok(blocks)
+}
+
+fn push(blocks: &mut Vec<Block>, heading: &str, figures: Vec<Figure>) {
+    if !figures.is_empty() {
+        blocks.extend([Block::Heading(heading.into()), Block::Figures(figures)]);
+    }
+}
+
+fn introduction(groups: &[Group<TerrainRow>]) -> String {
+    let n: usize = groups.iter().map(|g| g.rows.len()).sum();
+    let plural = |n: usize, word: &str| format!("{} {word}{}", set::count(n), if n == 1 { "" } else { "s" });
+    let names: Vec<String> = groups.iter().map(|g| format!("{} ({})", g.name, g.rows.len())).take(GROUPS_MAX).collect();
+    let more = if groups.len() > GROUPS_MAX { " …" } else { "" };
+    format!(
+        "{} in {}: {}{more}. Roughness classes follow the largest gradient to the eight neighbours of a cell; \
+         shares leave out the border and are taken before the class map is closed.",
+        plural(n, "terrain"),
+        plural(groups.len(), "group"),
+        names.join(", ")
+    )
+}
+
+/// The terrains of a group in order of their root mean square slope: the middle one is the group's representative.
+fn by_slope<'a>(group: &Group<'a, TerrainRow>) -> Vec<&'a TerrainRow> {
+    let mut rows = group.rows.clone();
+    rows.sort_by(|a, b| a.rms_slope.total_cmp(&b.rms_slope));
+    rows
+}
+
+/// The terrain whose root mean square slope is in the middle of its group (the lower middle of an even number).
+fn representative<'a>(group: &Group<'a, TerrainRow>) -> Option<&'a TerrainRow> {
+    let rows = by_slope(group);
+    rows.get(rows.len().saturating_sub(1) / 2).copied()
+}
+
+/// A figure of each row whose median a group is described by.
+type Column = (&'static str, &'static str, fn(&TerrainRow) -> f64);
+
+const MEDIANS: [Column; 7] = [
+    ("relief", "m", |t| t.relief_m),
+    ("rms height", "m", |t| t.rms_height_m),
+    ("rms slope", "1", |t| t.rms_slope),
+    ("low", "%", |t| 100.0 * t.share_low),
+    ("semi", "%", |t| 100.0 * t.share_semi),
+    ("high", "%", |t| 100.0 * t.share_high),
+    ("PSD slope", "1", |t| t.psd_slope),
+];
+
+/// Median of a figure over the rows that have it.
+fn median(rows: &[&TerrainRow], figure: impl Fn(&TerrainRow) -> f64) -> f64 {
+    let values: Vec<f64> = rows.iter().map(|t| figure(t)).collect();
+    sums::median(&sums::finite(&values))
+}
+
+fn medians(groups: &[Group<TerrainRow>]) -> TableBlock {
+    let columns: Vec<(&str, &str)> =
+        [("group", ""), ("terrains", "")].into_iter().chain(MEDIANS.map(|(name, unit, _)| (name, unit))).collect();
+    let mut numbers = Numbers::new("tables/terrains where stage = 'terrain', medians by group", &columns);
+    for group in groups {
+        let figures = MEDIANS.iter().map(|(_, _, figure)| number(median(&group.rows, figure)));
+        numbers.row([text(&group.name), count(group.rows.len())].into_iter().chain(figures));
+    }
+    TableBlock { id: "terrain-medians".into(), caption: "Terrain by group (medians over terrains)".into(), numbers }
+}
+
+fn all(data: &Data) -> TableBlock {
+    let names = [
+        "terrain_id",
+        "group",
+        "kind",
+        "rows",
+        "cols",
+        "cell_x_m",
+        "relief_m",
+        "rms_height_m",
+        "rms_slope",
+        "band_rms_m",
+        "share_low",
+        "share_semi",
+        "share_high",
+        "psd_slope",
+        "skewness",
+        "kurtosis",
+        "path",
+    ];
+    let numbers = Numbers::select("tables/terrains where stage = 'terrain'", data.of_stage("terrain"), &names);
+    TableBlock { id: "terrains".into(), caption: "All terrains".into(), numbers }
+}

@@ -1,0 +1,87 @@
+//! Power spectral densities with their fitted slopes, and height distributions, one frame per group on common axes.
+
+use super::median;
+use crate::content::{Figure, Numbers, Size, slug};
+use crate::data::{Data, Group};
+use crate::questions::curves::{self, Curve};
+use crate::render::chart::Plot;
+use crate::render::number as set;
+use crate::render::svg::{Paint, Stroke};
+use sastrugi_schemas::tables::{HeightDistributionRow, PsdRow, TerrainRow};
+
+/// Spectra of all groups, then distributions of all groups.
+pub fn figures(data: &Data, groups: &[Group<TerrainRow>]) -> Vec<Figure> {
+    let mut figures = spectra(data, groups);
+    figures.extend(distributions(data, groups));
+    figures
+}
+
+/// A group that has curves.
+type Drawn<'a, 'b> = (&'b Group<'a, TerrainRow>, Vec<Curve>);
+
+fn drawn<'a, 'b>(groups: &'b [Group<'a, TerrainRow>], points: impl Fn(&str) -> Vec<(f64, f64)>) -> Vec<Drawn<'a, 'b>> {
+    let curves = |g: &Group<TerrainRow>| {
+        // Many lines in one frame stay apart when they are thin.
+        let opacity = (3.0 / g.rows.len() as f64).clamp(0.25, 1.0);
+        let stroke = Stroke::new(Paint::Series(g.index), if g.rows.len() > 3 { 1.1 } else { 1.7 }).faint(opacity);
+        let curve = |t: &&TerrainRow| Curve { name: None, stroke, points: points(&t.terrain_id) };
+        g.rows.iter().map(curve).filter(|c| c.points.len() > 1).collect::<Vec<_>>()
+    };
+    groups.iter().map(|g| (g, curves(g))).filter(|(_, c)| !c.is_empty()).collect()
+}
+
+fn spectra(data: &Data, groups: &[Group<TerrainRow>]) -> Vec<Figure> {
+    let drawn = drawn(groups, |id| curves::spectrum(&data.spectrum(id)));
+    let ranges = curves::ranges(drawn.iter().flat_map(|(_, c)| c));
+    let figure = |(group, curves): &Drawn| {
+        let id = file_id("psd", group);
+        let middle = median(&group.rows, |t| t.psd_slope);
+        let slope = curves::slope(middle, curves);
+        let mut plot = curves::spectra(&id, curves, ranges, slope);
+        if slope.is_some() {
+            plot.note(0, &format!("slope {}", set::fixed(middle, 2)));
+        }
+        let caption = "Radially averaged two-dimensional power spectral density, one line per terrain; dashed, the median \
+                       of the slopes fitted to each, laid through the middle of the lines.";
+        let description =
+            format!("Log-log spectra of {} terrains; median slope {}.", curves.len(), set::fixed(middle, 2));
+        let rows: Vec<&PsdRow> = group.rows.iter().flat_map(|t| data.spectrum(&t.terrain_id)).collect();
+        let names = ["terrain_id", "bin", "frequency_cycles_m", "psd_m4", "modes"];
+        let numbers = Numbers::select(query("psd", group), rows, &names);
+        finish(id, format!("Spectra, group {}.", group.name), caption, description, plot, numbers)
+    };
+    drawn.iter().map(figure).collect()
+}
+
+fn distributions(data: &Data, groups: &[Group<TerrainRow>]) -> Vec<Figure> {
+    let drawn = drawn(groups, |id| curves::histogram(&data.histogram(id)));
+    let ranges = curves::ranges(drawn.iter().flat_map(|(_, c)| c));
+    let figure = |(group, curves): &Drawn| {
+        let id = file_id("heights", group);
+        let plot = curves::distributions(&id, curves, ranges);
+        let [skewness, kurtosis] = [median(&group.rows, |t| t.skewness), median(&group.rows, |t| t.kurtosis)];
+        let description = format!(
+            "Height distributions of {} terrains; median skewness {}, median kurtosis {} (3 for a normal distribution).",
+            curves.len(),
+            set::fixed(skewness, 2),
+            set::fixed(kurtosis, 2)
+        );
+        let rows: Vec<&HeightDistributionRow> = group.rows.iter().flat_map(|t| data.histogram(&t.terrain_id)).collect();
+        let names = ["terrain_id", "bin", "low_m", "high_m", "cells", "density_per_m"];
+        let numbers = Numbers::select(query("height_distribution", group), rows, &names);
+        finish(id, format!("Heights, group {}.", group.name), &description.clone(), description, plot, numbers)
+    };
+    drawn.iter().map(figure).collect()
+}
+
+fn file_id(what: &str, group: &Group<TerrainRow>) -> String {
+    slug(&format!("{what}-{}", group.name))
+}
+
+fn query(table: &str, group: &Group<TerrainRow>) -> String {
+    format!("tables/{table} where terrain_id is in group '{}'", group.name)
+}
+
+fn finish(id: String, title: String, caption: &str, description: String, plot: Plot, numbers: Numbers) -> Figure {
+    Figure { id, title, caption: caption.into(), description, svg: plot.svg, size: Size::Medium, numbers }
+}

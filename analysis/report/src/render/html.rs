@@ -1,0 +1,152 @@
+//! The page: one file with its style, figures and tables inside, and no request to anywhere.
+
+use super::number;
+use super::svg::escape;
+use crate::content::{Block, Figure, Heading, Numbers, Section, Size, TableBlock};
+use sastrugi_schemas::Cell;
+
+/// Style of the page.
+const STYLE: &str = include_str!("style.css");
+/// Rows of a figure's numbers that are repeated in the page.
+const FIGURE_ROWS_MAX: usize = 60;
+/// Rows of a table that are printed in the page.
+const TABLE_ROWS_MAX: usize = 1500;
+
+/// What stands above the sections.
+#[derive(Clone, Debug)]
+pub struct Head {
+    /// Title of the release.
+    pub title: String,
+    /// A paragraph about it; may be empty.
+    pub description: String,
+    /// Facts in order: name, value.
+    pub facts: Vec<(String, String)>,
+    /// Key figures: value, what it counts.
+    pub figures: Vec<(String, String)>,
+}
+
+/// The whole page.
+pub fn page(head: &Head, sections: &[Section]) -> String {
+    let title = escape(&head.title);
+    let links: String = sections.iter().map(|s| format!("<a href=\"#{}\">{}</a>", s.id, escape(s.title))).collect();
+    let body: String = sections.iter().map(section).collect();
+    format!(
+        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+         <meta name=\"color-scheme\" content=\"light dark\">\n<title>{title}</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n\
+         <header>\n<p class=\"kicker\">sastrugi release report</p>\n<h1>{title}</h1>\n{}</header>\n\
+         <nav aria-label=\"Sections\">{links}</nav>\n<main>\n{body}</main>\n{FOOTER}</body>\n</html>\n",
+        head_parts(head)
+    )
+}
+
+const FOOTER: &str = "<footer><p>This page is complete in itself and asks nothing of the network. Beside it, \
+<code>figures/</code> holds every figure as SVG and <code>data/</code> the numbers behind it as JSON. The tables \
+of the release are under <code>tables/</code> as Parquet.</p></footer>\n";
+
+fn head_parts(head: &Head) -> String {
+    let description = if head.description.is_empty() { String::new() } else { paragraph("lead", &head.description) };
+    let pair =
+        |(name, value): &(String, String)| format!("<div><dt>{}</dt><dd>{}</dd></div>", escape(name), escape(value));
+    let facts: String = head.facts.iter().map(pair).collect();
+    let figure = |(value, what): &(String, String)| format!("<li><b>{}</b> {}</li>", escape(value), escape(what));
+    let figures: String = head.figures.iter().map(figure).collect();
+    let figures = if figures.is_empty() { figures } else { format!("<ul class=\"key\">{figures}</ul>\n") };
+    format!("{description}<dl class=\"facts\">{facts}</dl>\n{figures}")
+}
+
+fn section(section: &Section) -> String {
+    let blocks: String = section.blocks.iter().map(block).collect();
+    format!("<section id=\"{}\">\n<h2>{}</h2>\n{blocks}</section>\n", section.id, escape(section.title))
+}
+
+fn block(block: &Block) -> String {
+    match block {
+        Block::Heading(text) => format!("<h3>{}</h3>\n", escape(text)),
+        Block::Text(text) => paragraph("", text),
+        Block::Warning(text) => paragraph("warning", text),
+        Block::Figures(figures) => figure_grid(figures),
+        Block::Table(t) => table_block(t),
+        Block::FoldedTable(t) => {
+            folded(&format!("{} ({} rows)", t.caption, number::count(t.numbers.rows.len())), &table_block(t))
+        }
+    }
+}
+
+fn paragraph(class: &str, text: &str) -> String {
+    let class = if class.is_empty() { String::new() } else { format!(" class=\"{class}\"") };
+    format!("<p{class}>{}</p>\n", escape(text))
+}
+
+fn figure_grid(figures: &[Figure]) -> String {
+    let class = if figures.iter().all(|f| f.size == Size::Small) { "figures small" } else { "figures" };
+    let items: String = figures.iter().map(figure).collect();
+    if items.is_empty() { items } else { format!("<div class=\"{class}\">\n{items}</div>\n") }
+}
+
+fn figure(figure: &Figure) -> String {
+    let id = escape(&figure.id);
+    let svg = figure.svg.finish(&figure.id, &figure.title, &figure.description);
+    let numbers = match figure.numbers.rows.len() {
+        0 => String::new(),
+        1..=FIGURE_ROWS_MAX => folded("Numbers", &table(&figure.numbers, &figure.title)),
+        n => format!("<span>{} rows</span>", number::count(n)),
+    };
+    format!(
+        "<figure id=\"fig-{id}\">\n{svg}<figcaption><b>{}</b> {}<div class=\"links\"><a href=\"figures/{id}.svg\">SVG</a> \
+         <a href=\"data/{id}.json\">JSON</a> <span>from <code>{}</code></span>{numbers}</div></figcaption>\n</figure>\n",
+        escape(&figure.title),
+        escape(&figure.caption),
+        escape(&figure.numbers.query),
+    )
+}
+
+fn folded(summary: &str, content: &str) -> String {
+    format!("<details><summary>{}</summary>\n{content}</details>\n", escape(summary))
+}
+
+fn table_block(block: &TableBlock) -> String {
+    let id = escape(&block.id);
+    format!(
+        "{}<p class=\"links\"><a href=\"data/{id}.json\">JSON</a> <span>from <code>{}</code></span></p>\n",
+        table(&block.numbers, &block.caption),
+        escape(&block.numbers.query)
+    )
+}
+
+fn table(numbers: &Numbers, caption: &str) -> String {
+    let head: String = numbers.columns.iter().map(heading).collect();
+    let rows: String = numbers.rows.iter().take(TABLE_ROWS_MAX).map(|r| row(r)).collect();
+    let caption = match numbers.rows.len().saturating_sub(TABLE_ROWS_MAX) {
+        0 => escape(caption),
+        _ => format!("{} (first {TABLE_ROWS_MAX} of {} rows)", escape(caption), number::count(numbers.rows.len())),
+    };
+    format!(
+        "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"Table\"><table><caption>{caption}</caption>\n\
+         <thead><tr>{head}</tr></thead>\n<tbody>\n{rows}</tbody></table></div>\n"
+    )
+}
+
+fn heading(heading: &Heading) -> String {
+    let name = escape(&heading.name).replace('_', "_<wbr>");
+    let unit = match number::unit(&heading.unit) {
+        u if u.is_empty() => u,
+        u => format!("<br><small>{}</small>", escape(&u)),
+    };
+    format!("<th scope=\"col\">{name}{unit}</th>")
+}
+
+fn row(cells: &[Cell]) -> String {
+    let cells: String = cells.iter().map(cell).collect();
+    format!("<tr>{cells}</tr>\n")
+}
+
+fn cell(cell: &Cell) -> String {
+    match cell {
+        Cell::Null => format!("<td class=\"n\">{}</td>", number::ABSENT),
+        Cell::Text(v) => format!("<td>{}</td>", escape(v)),
+        Cell::F64(v) => format!("<td class=\"n\">{}</td>", number::significant(*v, 4)),
+        Cell::I64(v) => format!("<td class=\"n\">{v}</td>"),
+        Cell::Bool(v) => format!("<td>{}</td>", if *v { "yes" } else { "no" }),
+    }
+}

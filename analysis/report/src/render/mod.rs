@@ -1,0 +1,12 @@
+//! Drawing: numbers, axes, colours, pictures, charts, maps and the page. Nothing here knows what it draws.
+
+pub mod axis;
+pub mod chart;
+pub mod colour;
+pub mod hillshade;
+pub mod html;
+pub mod map;
+pub mod number;
+pub mod picture;
+pub mod svg;
+pub mod thin;

@@ -1,0 +1,133 @@
+//! Numbers as a reader sees them. A value that is not finite is printed as [`ABSENT`], never as `NaN`.
+
+/// Stands where a figure is not known.
+pub const ABSENT: &str = "–";
+/// Group separator of large counts: narrow no-break space.
+const SEPARATOR: char = '\u{202f}';
+
+/// `value` with a fixed number of decimals.
+pub fn fixed(value: f64, decimals: usize) -> String {
+    if !value.is_finite() {
+        return ABSENT.into();
+    }
+    let text = format!("{value:.decimals$}");
+    match text.strip_prefix('-') {
+        Some(digits) if digits.chars().all(|c| c == '0' || c == '.') => digits.into(),
+        Some(digits) => format!("−{digits}"),
+        None => text,
+    }
+}
+
+/// `value` to `digits` significant digits, in powers of ten where it is very large or small.
+pub fn significant(value: f64, digits: usize) -> String {
+    if !value.is_finite() {
+        return ABSENT.into();
+    }
+    if value == 0.0 {
+        return "0".into();
+    }
+    let digits = digits.max(1);
+    let scientific = format!("{value:.*e}", digits - 1);
+    let Some((mantissa, exponent)) = scientific.split_once('e') else { return ABSENT.into() };
+    match exponent.parse::<i32>() {
+        Ok(e) if (-4..6).contains(&e) => fixed(value, usize::try_from(digits as i32 - 1 - e).unwrap_or(0)),
+        Ok(e) => format!("{} × {}", mantissa.replace('-', "−"), power_of_ten(e)),
+        Err(_) => ABSENT.into(),
+    }
+}
+
+/// A count with its thousands apart.
+pub fn count(n: impl TryInto<u64>) -> String {
+    let Ok(n) = n.try_into() else { return ABSENT.into() };
+    let digits = n.to_string();
+    let mut out = String::new();
+    for (i, c) in digits.chars().enumerate() {
+        if i > 0 && digits.len() > 4 && (digits.len() - i).is_multiple_of(3) {
+            out.push(SEPARATOR);
+        }
+        out.push(c);
+    }
+    out
+}
+
+/// A file size in decimal units.
+pub fn bytes(n: u64) -> String {
+    let units = ["kB", "MB", "GB", "TB"];
+    if n < 1000 {
+        return format!("{n} B");
+    }
+    let mut value = n as f64 / 1000.0;
+    let mut unit = 0;
+    while value >= 1000.0 && unit + 1 < units.len() {
+        value /= 1000.0;
+        unit += 1;
+    }
+    format!("{} {}", significant(value, 3), units[unit])
+}
+
+/// A share as a percentage.
+pub fn percent(share: f64, decimals: usize) -> String {
+    if share.is_finite() { format!("{} %", fixed(100.0 * share, decimals)) } else { ABSENT.into() }
+}
+
+/// `value unit`, or [`ABSENT`] alone.
+pub fn with_unit(value: f64, digits: usize, unit: &str) -> String {
+    let text = significant(value, digits);
+    if text == ABSENT || unit.is_empty() { text } else { format!("{text} {unit}") }
+}
+
+/// `10` with a raised exponent.
+pub fn power_of_ten(exponent: i32) -> String {
+    let raised = |c| match c {
+        '-' => '⁻',
+        '1' => '¹',
+        '2' => '²',
+        '3' => '³',
+        '4' => '⁴',
+        '5' => '⁵',
+        '6' => '⁶',
+        '7' => '⁷',
+        '8' => '⁸',
+        '9' => '⁹',
+        _ => '⁰',
+    };
+    format!("10{}", exponent.to_string().chars().map(raised).collect::<String>())
+}
+
+/// A unit of a column as it is set in text (`m/s2` becomes `m/s²`).
+pub fn unit(unit: &str) -> String {
+    match unit {
+        "1" => String::new(),
+        other => other.replace('2', "²").replace('4', "⁴").replace("deg", "°"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn val_numbers_as_set() {
+        assert_eq!(significant(0.838, 3), "0.838");
+        assert_eq!(significant(-12.345, 3), "−12.3");
+        assert_eq!(significant(1.234e-7, 3), "1.23 × 10⁻⁷");
+        assert_eq!(significant(99.96, 3), "100");
+        assert_eq!(significant(0.0, 3), "0");
+        assert_eq!(fixed(-0.04, 1), "0.0");
+        assert_eq!(count(1_234_567_i64), "1\u{202f}234\u{202f}567");
+        assert_eq!(count(-1_i64), ABSENT);
+        assert_eq!(bytes(8_123_456), "8.12 MB");
+        assert_eq!(percent(0.875, 1), "87.5 %");
+        assert_eq!(unit("m/s2"), "m/s²");
+    }
+
+    #[test]
+    fn prop_what_is_not_finite_is_absent() {
+        for v in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+            assert_eq!(significant(v, 3), ABSENT);
+            assert_eq!(fixed(v, 2), ABSENT);
+            assert_eq!(percent(v, 1), ABSENT);
+            assert_eq!(with_unit(v, 3, "m"), ABSENT);
+        }
+    }
+}

@@ -1,0 +1,154 @@
+//! From a release to the files of its report.
+
+use crate::ReportError;
+use crate::content::{Block, Figure, Numbers, Section, TableBlock, slug};
+use crate::data::Data;
+use crate::questions;
+use crate::render::html::{self, Head};
+use crate::render::number as set;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+/// What a report consists of.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Summary {
+    /// Names of the figures: each is `figures/<name>.svg` and `data/<name>.json`.
+    pub figures: Vec<String>,
+    /// Every file, relative to the report's folder, in the order in which they were written.
+    pub files: Vec<PathBuf>,
+    /// Bytes of all files.
+    pub bytes: u64,
+}
+
+/// Writes the report of the release at `release` into the folder `out`: `index.html`, `figures/*.svg`, `data/*.json`.
+/// The release need not be sealed. Files of the same names in `out` are replaced, others are left alone.
+/// `progress` hears a few words before each part.
+///
+/// # Errors
+/// A file of the release that is there but cannot be read; a file that cannot be written. What a release does not have is
+/// no error: the page leaves it out.
+pub fn render(release: &Path, out: &Path, progress: &dyn Fn(&str)) -> Result<Summary, ReportError> {
+    progress("reading the tables");
+    write(&Data::open(release)?, out, progress)
+}
+
+/// The report of rows that are already read.
+pub(crate) fn write(data: &Data, out: &Path, progress: &dyn Fn(&str)) -> Result<Summary, ReportError> {
+    let mut sections = Vec::new();
+    for question in &questions::ALL {
+        progress(question.title);
+        sections.extend(question.section(data)?);
+    }
+    name_once(&mut sections);
+    progress("writing");
+    let mut folder = Folder { root: out, summary: Summary::default() };
+    folder.put("index.html", &html::page(&head(data), &sections))?;
+    for section in &sections {
+        section.blocks.iter().try_for_each(|block| folder.put_block(block))?;
+    }
+    Ok(folder.summary)
+}
+
+/// The folder being written.
+struct Folder<'a> {
+    root: &'a Path,
+    summary: Summary,
+}
+
+impl Folder<'_> {
+    fn put_block(&mut self, block: &Block) -> Result<(), ReportError> {
+        match block {
+            Block::Figures(figures) => figures.iter().try_for_each(|f| self.put_figure(f)),
+            Block::Table(t) | Block::FoldedTable(t) => self.put_numbers(&t.id, &t.caption, &t.numbers),
+            Block::Heading(_) | Block::Text(_) | Block::Warning(_) => Ok(()),
+        }
+    }
+
+    fn put_figure(&mut self, figure: &Figure) -> Result<(), ReportError> {
+        self.put(
+            &format!("figures/{}.svg", figure.id),
+            &figure.svg.finish(&figure.id, &figure.title, &figure.description),
+        )?;
+        self.summary.figures.push(figure.id.clone());
+        self.put_numbers(&figure.id, &figure.title, &figure.numbers)
+    }
+
+    fn put_numbers(&mut self, id: &str, title: &str, numbers: &Numbers) -> Result<(), ReportError> {
+        self.put(&format!("data/{id}.json"), &format!("{}\n", numbers.to_json(id, title)))
+    }
+
+    fn put(&mut self, name: &str, content: &str) -> Result<(), ReportError> {
+        let path = self.root.join(name);
+        let failed = |source| ReportError::Write { path: path.clone(), source };
+        std::fs::create_dir_all(path.parent().unwrap_or(self.root)).map_err(failed)?;
+        sastrugi_store::atomic::write(&path, content.as_bytes()).map_err(failed)?;
+        self.summary.files.push(name.into());
+        self.summary.bytes += content.len() as u64;
+        Ok(())
+    }
+}
+
+/// Gives every figure and table a name that is a file name and occurs once.
+fn name_once(sections: &mut [Section]) {
+    let mut taken = BTreeSet::new();
+    let mut rename = |id: &mut String| {
+        let plain = Some(slug(id)).filter(|s| !s.is_empty()).unwrap_or_else(|| "unnamed".into());
+        let numbered = |n: usize| if n == 1 { plain.clone() } else { format!("{plain}-{n}") };
+        *id = (1..).map(numbered).find(|name| !taken.contains(name)).unwrap_or_default();
+        taken.insert(id.clone());
+    };
+    for block in sections.iter_mut().flat_map(|s| &mut s.blocks) {
+        match block {
+            Block::Figures(figures) => figures.iter_mut().for_each(|f| rename(&mut f.id)),
+            Block::Table(TableBlock { id, .. }) | Block::FoldedTable(TableBlock { id, .. }) => rename(id),
+            Block::Heading(_) | Block::Text(_) | Block::Warning(_) => {}
+        }
+    }
+}
+
+fn head(data: &Data) -> Head {
+    let study = &data.study;
+    let title = if study.title.is_empty() { &study.name } else { &study.title };
+    let facts = [
+        ("study", study.name.clone()),
+        ("date", study.date.clone()),
+        ("seed", study.seed.to_string()),
+        ("licence", study.license.clone()),
+        ("creators", study.creators.join(", ")),
+        ("program", data.version.clone()),
+        ("hash of the study", data.study_sha256.clone()),
+    ];
+    let known = facts.into_iter().filter(|(_, value)| !value.is_empty());
+    Head {
+        title: title.clone(),
+        description: study.description.clone(),
+        facts: known.map(|(name, value)| (name.to_owned(), value)).collect(),
+        figures: key_figures(data),
+    }
+}
+
+/// What is in the release, in figures; kinds it does not hold are left out.
+fn key_figures(data: &Data) -> Vec<(String, String)> {
+    let stage = |name: &str| data.of_stage(name).count();
+    let mut folders: BTreeMap<&str, usize> = BTreeMap::new();
+    for artifact in &data.artifacts {
+        *folders.entry(artifact.path.split('/').next().unwrap_or_default()).or_default() += 1;
+    }
+    let recordings = folders.get("mcap").copied().unwrap_or(0);
+    let counts = [
+        (stage("terrain"), "terrain"),
+        (stage("dem"), "measured DEM"),
+        (data.fits.len(), "covariance fit"),
+        (stage("texture"), "texture"),
+        (data.missions.len(), "mission"),
+        (recordings, "MCAP recording"),
+        (data.artifacts.len(), "file"),
+    ];
+    let named = |(n, what): (usize, &str)| (set::count(n), if n == 1 { what.to_owned() } else { format!("{what}s") });
+    let mut figures: Vec<(String, String)> = counts.into_iter().filter(|(n, _)| *n > 0).map(named).collect();
+    let bytes: u64 = data.artifacts.iter().map(|a| a.bytes).sum();
+    if bytes > 0 {
+        figures.push((set::bytes(bytes), "in all".into()));
+    }
+    figures
+}
