@@ -1,0 +1,116 @@
+//! A recorded mission as rows of the tables `missions` and `samples`.
+
+use super::{Differentiator, EulerAngles, Metrics};
+use crate::missions::Mission;
+use sastrugi_numeric::Grid;
+use sastrugi_schemas::RoughnessClass;
+use sastrugi_schemas::tables::{MissionRow, SampleRow};
+use sastrugi_schemas::topics::{CommandSample, EventKind, Recording, StateSample};
+
+/// What the tables say about a mission beside what happened in it.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct MissionLabels {
+    /// Id of the terrain.
+    pub terrain_id: String,
+    /// Label of the terrain.
+    pub group: Option<String>,
+    /// Id of the traverse stage.
+    pub traverse_id: String,
+    /// MCAP recording in the release.
+    pub path: String,
+}
+
+/// The row of a mission.
+pub fn mission_row(
+    labels: &MissionLabels,
+    mission: &Mission,
+    recording: &Recording,
+    differentiator: Differentiator,
+) -> MissionRow {
+    let metrics = Metrics::of(&recording.states, recording.sample_rate_hz, differentiator);
+    let outcome = recording.events.last();
+    let success = outcome.is_some_and(|event| event.kind == EventKind::Success);
+    MissionRow {
+        terrain_id: labels.terrain_id.clone(),
+        mission_id: mission.id(),
+        group: labels.group.clone(),
+        traverse_id: labels.traverse_id.clone(),
+        vehicle: recording.vehicle.name.clone(),
+        start_x_m: mission.start_m[0],
+        start_y_m: mission.start_m[1],
+        goal_x_m: mission.goal_m[0],
+        goal_y_m: mission.goal_m[1],
+        heading_deg: mission.heading_rad.to_degrees(),
+        draws: i64::from(mission.draws),
+        outcome: outcome.map_or("", |event| event.kind.name()).to_owned(),
+        time_s: outcome.map_or(f64::NAN, |event| event.time_s),
+        path_length_m: metrics.path_length_m,
+        efficiency: if success { metrics.efficiency } else { f64::NAN },
+        rms_vertical_acceleration_m_s2: metrics.rms_vertical_acceleration_m_s2,
+        rms_pitch_rate_deg_s: metrics.rms_pitch_rate_rad_s.to_degrees(),
+        rms_roll_rate_deg_s: metrics.rms_roll_rate_rad_s.to_degrees(),
+        rms_body_pitch_rate_deg_s: metrics.rms_body_pitch_rate_rad_s.to_degrees(),
+        rms_body_roll_rate_deg_s: metrics.rms_body_roll_rate_rad_s.to_degrees(),
+        max_pitch_deg: metrics.max_pitch_rad.to_degrees(),
+        max_roll_deg: metrics.max_roll_rad.to_degrees(),
+        samples: recording.states.len() as i64,
+        sample_rate_hz: recording.sample_rate_hz,
+        path: labels.path.clone(),
+    }
+}
+
+/// The rows of a mission's samples; `classes` (codes of [`RoughnessClass`]) tells the class under base_link.
+pub fn sample_rows(terrain_id: &str, mission: &Mission, recording: &Recording, classes: &Grid<u8>) -> Vec<SampleRow> {
+    let mission_id = mission.id();
+    let commands = recording.commands.iter().map(Some).chain(std::iter::repeat(None));
+    let row = |(sample, (state, command)): (usize, (&StateSample, Option<&CommandSample>))| {
+        let class = class_at(classes, state.position_m);
+        sample_row(terrain_id, &mission_id, sample as i64, state, command, class)
+    };
+    recording.states.iter().zip(commands).enumerate().map(row).collect()
+}
+
+fn class_at(classes: &Grid<u8>, [x, y, _]: [f64; 3]) -> Option<i64> {
+    let (row, col) = classes.geometry.cell_at(x, y)?;
+    RoughnessClass::from_code(classes.at(row, col)).map(|class| class as i64)
+}
+
+fn sample_row(
+    terrain_id: &str,
+    mission_id: &str,
+    sample: i64,
+    state: &StateSample,
+    command: Option<&CommandSample>,
+    class: Option<i64>,
+) -> SampleRow {
+    let angles = EulerAngles::of(state.orientation);
+    let [qx, qy, qz, qw] = state.orientation;
+    let [x_m, y_m, z_m] = state.position_m;
+    let [vx_m_s, vy_m_s, vz_m_s] = state.velocity_m_s;
+    let [roll_rate, pitch_rate, yaw_rate] = state.angular_velocity_rad_s;
+    SampleRow {
+        terrain_id: terrain_id.to_owned(),
+        mission_id: mission_id.to_owned(),
+        sample,
+        time_s: state.time_s,
+        x_m,
+        y_m,
+        z_m,
+        qx,
+        qy,
+        qz,
+        qw,
+        vx_m_s,
+        vy_m_s,
+        vz_m_s,
+        roll_deg: angles.roll.to_degrees(),
+        pitch_deg: angles.pitch.to_degrees(),
+        yaw_deg: angles.yaw.to_degrees(),
+        roll_rate_deg_s: roll_rate.to_degrees(),
+        pitch_rate_deg_s: pitch_rate.to_degrees(),
+        yaw_rate_deg_s: yaw_rate.to_degrees(),
+        command_speed_m_s: command.map_or(f64::NAN, |c| c.speed_m_s),
+        command_yaw_rate_deg_s: command.map_or(f64::NAN, |c| c.yaw_rate_rad_s.to_degrees()),
+        class,
+    }
+}

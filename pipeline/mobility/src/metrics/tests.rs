@@ -1,0 +1,92 @@
+use super::*;
+use std::f64::consts::{SQRT_2, TAU};
+
+const RATE_HZ: f64 = 20.0;
+
+/// Poses of a vehicle that drives east at 1 m/s for 40 s, with the given height, roll and pitch over time.
+fn states(height: impl Fn(f64) -> f64, roll: impl Fn(f64) -> f64, pitch: impl Fn(f64) -> f64) -> Vec<StateSample> {
+    let state = |k: u32| {
+        let time_s = f64::from(k) / RATE_HZ;
+        let ((sr, cr), (sp, cp)) = (libm::sincos(0.5 * roll(time_s)), libm::sincos(0.5 * pitch(time_s)));
+        StateSample {
+            time_s,
+            position_m: [time_s, 0.0, height(time_s)],
+            // Pitch, then roll in the pitched frame.
+            orientation: [sr * cp, cr * sp, -sr * sp, cr * cp],
+            velocity_m_s: [1.0, 0.0, 0.0],
+            angular_velocity_rad_s: [0.1, -0.2, 0.0],
+        }
+    };
+    (0..=800).map(state).collect()
+}
+
+fn sinc(x: f64) -> f64 {
+    libm::sin(x) / x
+}
+
+/// Acceptance 10: a sine heave of amplitude A has RMS acceleration `A w^2 / sqrt 2` less the attenuation of the sampling.
+/// Whole periods, so the tolerance of 1 % covers the end effects.
+#[test]
+fn val_sine_heave() {
+    for frequency_hz in [0.5, 1.0, 2.0, 5.0] {
+        let (amplitude, w) = (0.02, TAU * frequency_hz);
+        let states = states(|t| amplitude * libm::sin(w * t + 0.3), |_| 0.0, |_| 0.0);
+        let exact = amplitude * w * w / SQRT_2;
+        for (differentiator, attenuation) in
+            [(Differentiator::SecondDifference, sinc(0.5 * w / RATE_HZ)), (Differentiator::Gradient, sinc(w / RATE_HZ))]
+        {
+            let found = Metrics::of(&states, RATE_HZ, differentiator).rms_vertical_acceleration_m_s2;
+            let expected = exact * attenuation * attenuation;
+            assert!((found / expected - 1.0).abs() < 0.01, "{frequency_hz} {differentiator:?}: {found} {expected}");
+        }
+    }
+}
+
+/// A sine pitch and roll: RMS rate `A w / sqrt 2` less the attenuation; largest angles; body rates as recorded.
+#[test]
+fn val_sine_pitch_and_roll() {
+    let w = TAU;
+    let states = states(|_| 0.0, |t| 0.2 * libm::sin(w * t), |t| 0.1 * libm::cos(w * t));
+    for (differentiator, attenuation) in
+        [(Differentiator::SecondDifference, sinc(0.5 * w / RATE_HZ)), (Differentiator::Gradient, sinc(w / RATE_HZ))]
+    {
+        let m = Metrics::of(&states, RATE_HZ, differentiator);
+        assert!((m.rms_roll_rate_rad_s / (0.2 * w / SQRT_2 * attenuation) - 1.0).abs() < 0.01);
+        assert!((m.rms_pitch_rate_rad_s / (0.1 * w / SQRT_2 * attenuation) - 1.0).abs() < 0.01);
+        assert!((m.max_roll_rad - 0.2).abs() < 1e-12 && (m.max_pitch_rad - 0.1).abs() < 1e-12);
+        assert!((m.rms_body_roll_rate_rad_s - 0.1).abs() < 1e-12 && (m.rms_body_pitch_rate_rad_s - 0.2).abs() < 1e-12);
+    }
+}
+
+#[test]
+fn val_path_and_efficiency() {
+    let straight = states(|_| 0.0, |_| 0.0, |_| 0.0);
+    let m = Metrics::of(&straight, RATE_HZ, Differentiator::default());
+    assert!((m.path_length_m - 40.0).abs() < 1e-12 && (m.efficiency - 1.0).abs() < 1e-12);
+    let mut there_and_back = straight.clone();
+    there_and_back.extend(straight.iter().rev().take(401).copied());
+    let m = Metrics::of(&there_and_back, RATE_HZ, Differentiator::default());
+    assert!((m.path_length_m - 60.0).abs() < 1e-9 && (m.efficiency - 20.0 / 60.0).abs() < 1e-9);
+}
+
+/// A roll through 180 deg is no jump.
+#[test]
+fn val_angles_are_unwrapped() {
+    let states = states(|_| 0.0, |t| 0.5 * t, |_| 0.0);
+    let m = Metrics::of(&states, RATE_HZ, Differentiator::default());
+    assert!((m.rms_roll_rate_rad_s - 0.5).abs() < 1e-9);
+    assert!((m.max_roll_rad - std::f64::consts::PI).abs() < 0.03);
+}
+
+#[test]
+fn val_short_recordings_have_no_figures() {
+    for length in 0..3 {
+        for differentiator in [Differentiator::SecondDifference, Differentiator::Gradient] {
+            let states = &states(|_| 0.0, |_| 0.0, |_| 0.0)[..length];
+            let m = Metrics::of(states, RATE_HZ, differentiator);
+            assert!(length == 2 || m.rms_pitch_rate_rad_s.is_nan());
+            assert!(length > 0 || m.max_roll_rad.is_nan());
+            assert_eq!(m.path_length_m > 0.0, length == 2);
+        }
+    }
+}

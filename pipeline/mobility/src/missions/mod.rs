@@ -1,0 +1,200 @@
+//! Random straight missions (Majhor and Bos, section 2.3).
+//!
+//! The start is a cell centre drawn uniformly from the low-roughness cells of the closed class map that lie more than a
+//! border from the edge. The heading is uniform over the circle. The goal lies one mission length away along the heading;
+//! it must lie inside the border, in a cell of low or semi roughness. Otherwise start and heading are drawn again.
+//!
+//! Every mission draws from its own stream (`mission-0001`, `mission-0002`, ...), so that asking for more missions changes
+//! none of those before. The paper does not say what happens on a terrain that allows no mission: here the draws are
+//! counted and end in an error.
+//!
+//! Cost: one pass over the map and a few draws per mission; memory: four bytes per eligible cell.
+
+mod params;
+#[cfg(test)]
+mod tests;
+
+pub use params::{MissionParameters, MissionSettings};
+
+use sastrugi_numeric::{Geometry, Grid, Stream, Streams};
+use sastrugi_schemas::RoughnessClass;
+
+/// A straight mission.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Mission {
+    /// Number of the mission on its terrain, from 0.
+    pub index: usize,
+    /// Start point `[x, y]`, m.
+    pub start_m: [f64; 2],
+    /// Goal point `[x, y]`, m.
+    pub goal_m: [f64; 2],
+    /// Direction from start to goal, counterclockwise from east, rad, in [0, 2 pi).
+    pub heading_rad: f64,
+    /// Draws of start and heading that were needed, at least 1.
+    pub draws: u32,
+}
+
+impl Mission {
+    /// Id in tables and file names: `mission-0001` for index 0.
+    pub fn id(&self) -> String {
+        mission_id(self.index)
+    }
+
+    /// The straight mission between two points.
+    pub fn between(index: usize, start_m: [f64; 2], goal_m: [f64; 2]) -> Self {
+        let bearing = libm::atan2(goal_m[1] - start_m[1], goal_m[0] - start_m[0]);
+        let heading_rad = if bearing < 0.0 { bearing + std::f64::consts::TAU } else { bearing };
+        Self { index, start_m, goal_m, heading_rad, draws: 1 }
+    }
+
+    /// Distance from start to goal, m.
+    pub fn length_m(&self) -> f64 {
+        distance(self.start_m, self.goal_m)
+    }
+}
+
+/// Id of the mission with that index (from 0).
+pub fn mission_id(index: usize) -> String {
+    format!("mission-{:04}", index + 1)
+}
+
+/// Why a terrain has no missions.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum MissionError {
+    /// The terrain cannot hold the mission at any heading.
+    #[error(
+        "place missions of {length_m} m: inside the border of {border_m} m the terrain measures {inside_x_m:.2} x \
+         {inside_y_m:.2} m; take a larger terrain, a shorter `length_m` or a narrower `border_m`"
+    )]
+    LongerThanTerrain {
+        /// Mission length, m.
+        length_m: f64,
+        /// Border, m.
+        border_m: f64,
+        /// Extent inside of the border east-west, m (negative when the border covers everything).
+        inside_x_m: f64,
+        /// Extent inside of the border north-south, m.
+        inside_y_m: f64,
+    },
+    /// No low-roughness cell lies inside the border.
+    #[error(
+        "find a start: none of the {cells} cells more than {border_m} m from the edge has low roughness; a smoother \
+         terrain or a narrower `border_m` would"
+    )]
+    NoEligibleStart {
+        /// Cells inside of the border.
+        cells: usize,
+        /// Border, m.
+        border_m: f64,
+    },
+    /// No draw met the goal rule.
+    #[error(
+        "find a goal for {mission_id}: {draws} draws from {starts} low-roughness cells met none at {length_m} m in low \
+         or semi roughness; raise `max_draws` or shorten `length_m`"
+    )]
+    DrawsExhausted {
+        /// Id of the mission.
+        mission_id: String,
+        /// Draws made.
+        draws: u32,
+        /// Eligible start cells.
+        starts: usize,
+        /// Mission length, m.
+        length_m: f64,
+    },
+}
+
+/// Draws the missions of one terrain from its closed class map (codes of [`RoughnessClass`]).
+///
+/// # Errors
+/// [`MissionError`] when the terrain is too small, too rough, or the draws run out.
+pub fn draw_missions(
+    classes: &Grid<u8>,
+    settings: &MissionSettings,
+    streams: &Streams,
+) -> Result<Vec<Mission>, MissionError> {
+    let field = Field::new(classes, settings)?;
+    (0..settings.count()).map(|index| field.draw(index, streams)).collect()
+}
+
+/// The part of a class map on which missions may lie.
+struct Field<'a> {
+    classes: &'a Grid<u8>,
+    settings: &'a MissionSettings,
+    /// Row-major indices of the cells in which a mission may start.
+    starts: Vec<usize>,
+}
+
+impl<'a> Field<'a> {
+    fn new(classes: &'a Grid<u8>, settings: &'a MissionSettings) -> Result<Self, MissionError> {
+        let [inside_x_m, inside_y_m] = classes.geometry.size().map(|extent| extent - 2.0 * settings.border_m());
+        let (length_m, border_m) = (settings.length_m(), settings.border_m());
+        let diagonal_m = (inside_x_m * inside_x_m + inside_y_m * inside_y_m).sqrt();
+        if !(inside_x_m > 0.0 && inside_y_m > 0.0 && diagonal_m > length_m) {
+            return Err(MissionError::LongerThanTerrain { length_m, border_m, inside_x_m, inside_y_m });
+        }
+        let inside: Vec<usize> =
+            (0..classes.values.len()).filter(|&k| is_inside(&classes.geometry, border_m, centre(classes, k))).collect();
+        let cells = inside.len();
+        let starts: Vec<usize> =
+            inside.into_iter().filter(|&k| classes.values[k] == RoughnessClass::Low as u8).collect();
+        if starts.is_empty() {
+            return Err(MissionError::NoEligibleStart { cells, border_m });
+        }
+        Ok(Self { classes, settings, starts })
+    }
+
+    /// The mission with that index, from its own stream.
+    fn draw(&self, index: usize, streams: &Streams) -> Result<Mission, MissionError> {
+        let mut stream = streams.child(&mission_id(index)).stream("start and heading");
+        for draws in 1..=self.settings.max_draws() {
+            let (start_m, heading_rad) = self.candidate(&mut stream);
+            let (sin, cos) = libm::sincos(heading_rad);
+            let length_m = self.settings.length_m();
+            let goal_m = [start_m[0] + length_m * cos, start_m[1] + length_m * sin];
+            if self.is_goal(goal_m) {
+                return Ok(Mission { index, start_m, goal_m, heading_rad, draws });
+            }
+        }
+        Err(MissionError::DrawsExhausted {
+            mission_id: mission_id(index),
+            draws: self.settings.max_draws(),
+            starts: self.starts.len(),
+            length_m: self.settings.length_m(),
+        })
+    }
+
+    fn candidate(&self, stream: &mut Stream) -> ([f64; 2], f64) {
+        let start = self.starts[stream.below(self.starts.len() as u64) as usize];
+        (centre(self.classes, start), stream.uniform_in(0.0, std::f64::consts::TAU))
+    }
+
+    fn is_goal(&self, point_m: [f64; 2]) -> bool {
+        let geometry = &self.classes.geometry;
+        let Some((row, col)) = geometry.cell_at(point_m[0], point_m[1]) else { return false };
+        is_inside(geometry, self.settings.border_m(), point_m)
+            && matches!(
+                RoughnessClass::from_code(self.classes.at(row, col)),
+                Some(RoughnessClass::Low | RoughnessClass::Semi)
+            )
+    }
+}
+
+/// True more than `border_m` from every edge of the grid.
+fn is_inside(geometry: &Geometry, border_m: f64, point_m: [f64; 2]) -> bool {
+    let size = geometry.size();
+    (0..2).all(|axis| {
+        let from_low_edge = point_m[axis] - geometry.origin[axis];
+        from_low_edge > border_m && size[axis] - from_low_edge > border_m
+    })
+}
+
+/// Centre of the cell with that row-major index.
+fn centre(classes: &Grid<u8>, index: usize) -> [f64; 2] {
+    [classes.geometry.x(index % classes.cols()), classes.geometry.y(index / classes.cols())]
+}
+
+fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
+    let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
+    (dx * dx + dy * dy).sqrt()
+}

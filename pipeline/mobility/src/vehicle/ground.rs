@@ -1,0 +1,212 @@
+//! The ground under a vehicle: stored heights, bilinear between cell centres, and an upper bound of them.
+//!
+//! All missions of one terrain share a [`Ground`]. Beside the heights it holds their *ceiling*: for every bilinear cell
+//! the largest height of any cell centre that a point of it can reach within the vehicle's `reach`, widened by one more
+//! cell for the interpolation. A group of contact points whose lowest point lies above the ceiling at its centre touches
+//! nothing, so it can be left out without changing a bit of the result. Where a reachable centre holds no data, or lies
+//! beyond the terrain, the ceiling is infinite and nothing is left out.
+//!
+//! Memory: eight bytes per cell and a rim of one vehicle length; cost of building: two running maxima over the grid.
+
+use super::Vehicle;
+use sastrugi_numeric::Grid;
+
+/// Why a terrain cannot carry a vehicle.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum GroundError {
+    /// The cells are coarser than the vehicle.
+    #[error(
+        "drive `{vehicle}` on cells of {cell_m} m: they are larger than its wheelbase of {wheelbase_m} m; add detail \
+         below the cell with an `elaborate` terrain first"
+    )]
+    CellTooLarge {
+        /// Larger side of a cell, m.
+        cell_m: f64,
+        /// Distance between the outer axles, m.
+        wheelbase_m: f64,
+        /// Name of the vehicle.
+        vehicle: String,
+    },
+    /// Fewer than two rows or columns: no bilinear cell.
+    #[error("drive on a terrain of {rows} x {cols} cells; it needs at least 2 x 2")]
+    TooSmall {
+        /// Rows.
+        rows: usize,
+        /// Columns.
+        cols: usize,
+    },
+}
+
+/// Heights of a terrain, prepared for one vehicle.
+#[derive(Clone, Debug)]
+pub struct Ground {
+    /// Cell centres east-west, rim included.
+    cols: usize,
+    /// Position of the south-west cell centre, rim included, m.
+    origin: [f64; 2],
+    inverse_cell: [f64; 2],
+    /// Outermost cell centres of the terrain: west, south, east, north, m.
+    bounds: [f64; 4],
+    /// Heights, south row first, NaN in the rim and where there is no data.
+    heights: Vec<f32>,
+    /// Upper bound of the heights in reach of a point of the bilinear cell that starts here.
+    ceiling: Vec<f32>,
+    reach_m: f64,
+    warnings: Vec<String>,
+}
+
+impl Ground {
+    /// The ground of a terrain (heights in m, NaN without data; rounded to single precision as a release stores them) for
+    /// a vehicle.
+    ///
+    /// # Errors
+    /// [`GroundError`] for cells larger than the wheelbase and for terrains without a bilinear cell.
+    pub fn new(dem: &Grid, vehicle: &Vehicle) -> Result<Self, GroundError> {
+        let geometry = dem.geometry;
+        let cell_m = geometry.cell[0].max(geometry.cell[1]);
+        if geometry.rows < 2 || geometry.cols < 2 {
+            return Err(GroundError::TooSmall { rows: geometry.rows, cols: geometry.cols });
+        }
+        if cell_m > vehicle.wheelbase_m() {
+            let vehicle_name = vehicle.name().to_owned();
+            return Err(GroundError::CellTooLarge {
+                cell_m,
+                wheelbase_m: vehicle.wheelbase_m(),
+                vehicle: vehicle_name,
+            });
+        }
+        let rim = geometry.cell.map(|cell| (vehicle.extent_m() / cell).ceil() as usize + 2);
+        let (heights, cols) = framed(dem, rim);
+        let reach = geometry.cell.map(|cell| (vehicle.reach_m() / cell).ceil() as usize);
+        Ok(Self {
+            cols,
+            origin: [
+                geometry.x(0) - rim[0] as f64 * geometry.cell[0],
+                geometry.y(geometry.rows - 1) - rim[1] as f64 * geometry.cell[1],
+            ],
+            inverse_cell: geometry.cell.map(|cell| 1.0 / cell),
+            bounds: [geometry.x(0), geometry.y(geometry.rows - 1), geometry.x(geometry.cols - 1), geometry.y(0)],
+            ceiling: ceiling(&heights, cols, reach),
+            heights,
+            reach_m: vehicle.reach_m(),
+            warnings: cell_warning(cell_m, vehicle).into_iter().collect(),
+        })
+    }
+
+    /// What a reader of the results should know about this terrain.
+    pub fn warnings(&self) -> &[String] {
+        &self.warnings
+    }
+
+    /// Largest distance of contact points from their group's centre that the ceiling allows for, m.
+    pub(crate) fn reach_m(&self) -> f64 {
+        self.reach_m
+    }
+
+    /// True when the point lies between the outermost cell centres.
+    pub(crate) fn contains(&self, x: f64, y: f64) -> bool {
+        let [west, south, east, north] = self.bounds;
+        x >= west && x <= east && y >= south && y <= north
+    }
+
+    /// Height at a point, m; NaN where undefined.
+    #[inline(always)]
+    pub(crate) fn height(&self, x: f64, y: f64) -> f64 {
+        let (k, fx, fy) = self.locate(x, y);
+        let [sw, se, nw, ne] = self.corners(k);
+        let (low, high) = (sw + (se - sw) * fx, nw + (ne - nw) * fx);
+        low + (high - low) * fy
+    }
+
+    /// Derivatives `(dz/dx, dz/dy)` of the height at a point; NaN where undefined.
+    #[inline(always)]
+    pub(crate) fn gradient(&self, x: f64, y: f64) -> (f64, f64) {
+        let (k, fx, fy) = self.locate(x, y);
+        let [sw, se, nw, ne] = self.corners(k);
+        let (low, high) = (se - sw, ne - nw);
+        let dx = (low + (high - low) * fy) * self.inverse_cell[0];
+        let dy = ((nw + high * fx) - (sw + low * fx)) * self.inverse_cell[1];
+        (dx, dy)
+    }
+
+    /// No point within `reach_m` of this one (in plan) is higher, m; infinite where a height may be undefined.
+    #[inline(always)]
+    pub(crate) fn ceiling(&self, x: f64, y: f64) -> f64 {
+        let (k, _, _) = self.locate(x, y);
+        self.ceiling.get(k).map_or(f64::INFINITY, |&z| f64::from(z))
+    }
+
+    /// The same ground without a bound: every contact point is looked at.
+    #[cfg(test)]
+    pub(crate) fn without_ceiling(mut self) -> Self {
+        self.ceiling.fill(f32::INFINITY);
+        self
+    }
+
+    /// Index of the south-west corner of the bilinear cell around a point, and the place in the cell (0 to 1).
+    #[inline(always)]
+    fn locate(&self, x: f64, y: f64) -> (usize, f64, f64) {
+        let u = (x - self.origin[0]) * self.inverse_cell[0];
+        let v = (y - self.origin[1]) * self.inverse_cell[1];
+        // The rim keeps both positive and below 2^31 near the terrain; elsewhere the index is out of range or the
+        // height NaN.
+        let (i, j) = (u as i32, v as i32);
+        let k = (j as usize).wrapping_mul(self.cols).wrapping_add(i as usize);
+        (k, u - f64::from(i), v - f64::from(j))
+    }
+
+    /// Heights south-west, south-east, north-west, north-east of a bilinear cell; NaN beyond the rim.
+    #[inline(always)]
+    fn corners(&self, k: usize) -> [f64; 4] {
+        let north = k.wrapping_add(self.cols);
+        match (self.heights.get(k..k.wrapping_add(2)), self.heights.get(north..north.wrapping_add(2))) {
+            (Some(&[sw, se]), Some(&[nw, ne])) => [f64::from(sw), f64::from(se), f64::from(nw), f64::from(ne)],
+            _ => [f64::NAN; 4],
+        }
+    }
+}
+
+fn cell_warning(cell_m: f64, vehicle: &Vehicle) -> Option<String> {
+    let radius_m = vehicle.parameters().wheels.radius_m;
+    (cell_m > radius_m).then(|| {
+        format!(
+            "cells of {cell_m} m are larger than the wheel radius of {radius_m} m: bumps that the wheels would feel are \
+             missing, and vibration is understated"
+        )
+    })
+}
+
+/// The heights in single precision, south row first, inside a rim without data; and the new number of columns.
+fn framed(dem: &Grid, rim: [usize; 2]) -> (Vec<f32>, usize) {
+    let cols = dem.cols() + 2 * rim[0];
+    let mut heights = vec![f32::NAN; cols * (dem.rows() + 2 * rim[1])];
+    let south_first = (0..dem.rows()).rev().map(|row| dem.row(row));
+    for (target, source) in heights.chunks_exact_mut(cols).skip(rim[1]).zip(south_first) {
+        for (t, &s) in target[rim[0]..].iter_mut().zip(source) {
+            *t = s as f32;
+        }
+    }
+    (heights, cols)
+}
+
+/// Largest height within `reach` cells of each bilinear cell and one cell more; infinite where one is not finite.
+fn ceiling(heights: &[f32], cols: usize, reach: [usize; 2]) -> Vec<f32> {
+    let known: Vec<f32> = heights.iter().map(|&z| if z.is_finite() { z } else { f32::INFINITY }).collect();
+    let along_rows = running_max(&known, 1, reach[0]);
+    running_max(&along_rows, cols, reach[1])
+}
+
+/// Maximum of `values[k - (reach + 1) stride ..= k + (reach + 2) stride]` in steps of `stride`; infinite at the ends.
+fn running_max(values: &[f32], stride: usize, reach: usize) -> Vec<f32> {
+    let (before, after) = ((reach + 1) * stride, (reach + 2) * stride);
+    let mut result = vec![f32::INFINITY; values.len()];
+    let Some(inner) = values.len().checked_sub(before + after) else { return result };
+    let target = &mut result[before..before + inner];
+    target.copy_from_slice(&values[..inner]);
+    for offset in (stride..=before + after).step_by(stride) {
+        for (t, &v) in target.iter_mut().zip(&values[offset..]) {
+            *t = if v > *t { v } else { *t };
+        }
+    }
+    result
+}

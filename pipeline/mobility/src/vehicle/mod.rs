@@ -1,0 +1,49 @@
+//! Vehicles: their parameters as data, and the dynamics that drive them over a terrain.
+//!
+//! # Model
+//! A rigid body with six degrees of freedom and one more per side, the spin of the wheels that a motor channel turns
+//! together. State: position of the centre of mass, velocity, unit quaternion, body angular velocity `w`, spin `W` of
+//! either side, and one deflection per contact ([`contact`], [`belly`]). With mass `m`, inertia `I` (wheels included,
+//! save their spin), contact forces `F` at `p`, rolling-resistance couples and wheel spin momentum `J W` about the axle
+//! direction `y`,
+//!
+//! ```text
+//! m a        = sum F - m g z
+//! I dw/dt    = sum (p - com) x F + sum rolling y - J dW/dt y - w x (I w)
+//! J dW/dt    = torque - r sum F_x + sum rolling                        (per side, implicit: drive.rs)
+//! ```
+//!
+//! The motor torque itself is internal: what the chassis feels of it is the contact force at its true point and the
+//! change of the wheels' momentum. Fixed steps, semi-implicit (velocities first, then positions with the new
+//! velocities); 500 Hz unless told otherwise.
+//!
+//! Source: specification of the traversal study; the vehicle of Majhor and Bos, section 2. Only `+ - * /`, `sqrt` and
+//! `libm` are used. Cost: about a microsecond per step and vehicle. What the model leaves out (side walls, spikes between
+//! rays, soil) is listed in `docs/traversal.md`.
+
+mod belly;
+mod body;
+mod contact;
+mod controller;
+mod drive;
+mod ground;
+mod model;
+mod params;
+mod settings;
+mod simulation;
+#[cfg(test)]
+mod tests;
+mod traverse;
+mod vector;
+
+pub use ground::{Ground, GroundError};
+pub use model::Vehicle;
+pub use params::{
+    BellyParameters, ChassisParameters, DriveParameters, SkidSteerParameters, TyreParameters, VehicleParameters,
+    WheelParameters,
+};
+pub use settings::{ControllerParameters, SurfaceParameters, TraverseParameters, TraverseSettings};
+pub use traverse::{TraverseError, drive};
+
+/// Data file of the Clearpath Husky A200.
+pub(crate) const HUSKY_A200: &str = include_str!("models/husky_a200.toml");

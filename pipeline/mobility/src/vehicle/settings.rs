@@ -1,0 +1,289 @@
+//! Parameters of a traverse: vehicle, surface, steering, rules of the mission, clocks.
+
+use super::model::{GRAVITY_M_S2, Vehicle};
+use super::vector::{Vec3, add};
+use crate::metrics::Differentiator;
+use crate::registry;
+use sastrugi_schemas::ParameterError;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
+
+/// A vehicle over straight missions.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct TraverseParameters {
+    /// Kind of vehicle (see `sastrugi kinds`).
+    pub vehicle: String,
+    /// Vehicle parameters that differ from its data file, as `{ drive = { torque_limit_n_m = 30 } }`.
+    pub vehicle_changes: Map<String, Value>,
+    /// Friction of the ground.
+    pub surface: SurfaceParameters,
+    /// Steering along the line.
+    pub controller: ControllerParameters,
+    /// Commanded speed, m/s (Majhor and Bos, section 2.3: 1).
+    pub speed_m_s: f64,
+    /// The goal counts as reached within this distance in plan, m (chosen here).
+    pub goal_tolerance_m: f64,
+    /// Pitch or roll beyond this is a tip-over, deg, below 90 (Majhor and Bos, section 2.4: 75).
+    pub tip_deg: f64,
+    /// A vehicle that moves less than this in plan within `stuck_time_s` is stuck, m (section 2.4: 0.2).
+    pub stuck_distance_m: f64,
+    /// Time without motion after which a vehicle is stuck, s (section 2.4: 30).
+    pub stuck_time_s: f64,
+    /// Longest mission, s (chosen here: about seven times the undisturbed drive).
+    pub timeout_s: f64,
+    /// Time for the vehicle to come to rest on the ground before the clock starts, s.
+    pub settle_s: f64,
+    /// Time steps per second, Hz (500; 1000 to check convergence).
+    pub step_rate_hz: u32,
+    /// Rate of recorded poses, wheels and commands, Hz; divides `step_rate_hz` (section 2.4: 20).
+    pub sample_rate_hz: u32,
+    /// Rate of recorded inertial measurements, Hz; divides `step_rate_hz`.
+    pub imu_rate_hz: u32,
+    /// Rate of the steering, Hz; divides `step_rate_hz`.
+    pub control_rate_hz: u32,
+    /// How the recorded poses are differentiated for the figures.
+    pub differentiator: Differentiator,
+}
+
+/// Friction of the ground.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct SurfaceParameters {
+    /// Friction coefficient between tyre and ground (husky_description URDF: 1).
+    pub wheel_friction: f64,
+    /// Friction coefficient between chassis and ground (assumed).
+    pub belly_friction: f64,
+    /// Rolling resistance over normal force (assumed; hard soil).
+    pub rolling_resistance: f64,
+}
+
+/// Pure pursuit of the straight line.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct ControllerParameters {
+    /// Distance along the line from the vehicle's foot point to the point it steers for, m (assumed: three wheelbases).
+    pub lookahead_m: f64,
+    /// Factor on the yaw rate of the pursuit arc (assumed: 1, the plain arc).
+    pub steering_gain: f64,
+    /// Bearing of the point beyond which the vehicle turns on the spot, deg (assumed: the point is behind).
+    pub turn_start_deg: f64,
+    /// Bearing below which it drives on, deg; below `turn_start_deg` (assumed).
+    pub turn_stop_deg: f64,
+    /// Yaw rate of a turn on the spot, rad/s (assumed: half of the vehicle's limit).
+    pub turn_rate_rad_s: f64,
+}
+
+impl Default for TraverseParameters {
+    fn default() -> Self {
+        Self {
+            vehicle: "husky_a200".to_owned(),
+            vehicle_changes: Map::new(),
+            surface: SurfaceParameters::default(),
+            controller: ControllerParameters::default(),
+            speed_m_s: 1.0,
+            goal_tolerance_m: 0.5,
+            tip_deg: 75.0,
+            stuck_distance_m: 0.2,
+            stuck_time_s: 30.0,
+            timeout_s: 240.0,
+            settle_s: 1.0,
+            step_rate_hz: 500,
+            sample_rate_hz: 20,
+            imu_rate_hz: 100,
+            control_rate_hz: 50,
+            differentiator: Differentiator::SecondDifference,
+        }
+    }
+}
+
+impl Default for SurfaceParameters {
+    fn default() -> Self {
+        Self { wheel_friction: 1.0, belly_friction: 0.5, rolling_resistance: 0.03 }
+    }
+}
+
+impl Default for ControllerParameters {
+    fn default() -> Self {
+        Self { lookahead_m: 1.5, steering_gain: 1.0, turn_start_deg: 90.0, turn_stop_deg: 30.0, turn_rate_rad_s: 1.0 }
+    }
+}
+
+impl TraverseParameters {
+    /// Checks everything, the vehicle included.
+    ///
+    /// # Errors
+    /// A [`ParameterError`] for an unknown vehicle, a number out of range, rates that do not divide the step rate, or a
+    /// time step that the vehicle's stiffness does not stand.
+    pub fn prepare(&self) -> Result<(Vehicle, TraverseSettings), ParameterError> {
+        let vehicle = registry::vehicle(&self.vehicle, &self.vehicle_changes)?;
+        self.check_rules()?;
+        self.surface.check().map_err(|e| e.within("surface"))?;
+        self.controller.check().map_err(|e| e.within("controller"))?;
+        self.check_rates()?;
+        self.check_step(&vehicle)?;
+        let tip_sin_cos = libm::sincos(self.tip_deg.to_radians());
+        Ok((vehicle, TraverseSettings { parameters: self.clone(), tip_sin_cos }))
+    }
+
+    fn check_rules(&self) -> Result<(), ParameterError> {
+        let positive = [
+            ("speed_m_s", self.speed_m_s),
+            ("goal_tolerance_m", self.goal_tolerance_m),
+            ("stuck_distance_m", self.stuck_distance_m),
+            ("stuck_time_s", self.stuck_time_s),
+        ];
+        positive.into_iter().try_for_each(|(key, value)| ParameterError::positive(key, value).map(drop))?;
+        ParameterError::between("tip_deg", self.tip_deg, 0.0, 90.0)?;
+        ParameterError::between("timeout_s", self.timeout_s, 0.0, TIME_MAX_S)?;
+        if !(0.0..TIME_MAX_S).contains(&self.settle_s) {
+            let message = format!("is {}; it must be 0 or above and below {TIME_MAX_S}", self.settle_s);
+            return Err(ParameterError::new("settle_s", message));
+        }
+        Ok(())
+    }
+
+    fn check_rates(&self) -> Result<(), ParameterError> {
+        if !(1..=STEP_RATE_MAX_HZ).contains(&self.step_rate_hz) {
+            let message = format!("is {}; it must be 1 to {STEP_RATE_MAX_HZ}", self.step_rate_hz);
+            return Err(ParameterError::new("step_rate_hz", message));
+        }
+        let rates = [
+            ("sample_rate_hz", self.sample_rate_hz),
+            ("imu_rate_hz", self.imu_rate_hz),
+            ("control_rate_hz", self.control_rate_hz),
+        ];
+        match rates.into_iter().find(|&(_, rate)| rate == 0 || !self.step_rate_hz.is_multiple_of(rate)) {
+            None => Ok(()),
+            Some((key, rate)) => {
+                let message = format!("is {rate}; it must divide the step rate of {} Hz", self.step_rate_hz);
+                Err(ParameterError::new(key, message))
+            }
+        }
+    }
+
+    fn check_step(&self, vehicle: &Vehicle) -> Result<(), ParameterError> {
+        let (step_s, limit_s) = (1.0 / f64::from(self.step_rate_hz), step_limit_s(vehicle));
+        if step_s < limit_s {
+            return Ok(());
+        }
+        let message = format!(
+            "is {}: steps of {step_s} s are unstable for the stiffness of `{}`; the limit is {limit_s:.2e} s, so take \
+             {} Hz or more",
+            self.step_rate_hz,
+            vehicle.name(),
+            (1.0 / limit_s).floor() + 1.0
+        );
+        Err(ParameterError::new("step_rate_hz", message))
+    }
+}
+
+/// Longest mission and settling that is accepted, s.
+const TIME_MAX_S: f64 = 86_400.0;
+/// Highest step rate that is accepted, Hz.
+const STEP_RATE_MAX_HZ: u32 = 100_000;
+
+impl SurfaceParameters {
+    fn check(&self) -> Result<(), ParameterError> {
+        ParameterError::not_negative("wheel_friction", self.wheel_friction)?;
+        ParameterError::not_negative("belly_friction", self.belly_friction)?;
+        ParameterError::not_negative("rolling_resistance", self.rolling_resistance)?;
+        Ok(())
+    }
+}
+
+impl ControllerParameters {
+    fn check(&self) -> Result<(), ParameterError> {
+        ParameterError::positive("lookahead_m", self.lookahead_m)?;
+        ParameterError::positive("steering_gain", self.steering_gain)?;
+        ParameterError::positive("turn_rate_rad_s", self.turn_rate_rad_s)?;
+        ParameterError::between("turn_start_deg", self.turn_start_deg, 0.0, 180.0)?;
+        ParameterError::between("turn_stop_deg", self.turn_stop_deg, 0.0, self.turn_start_deg)?;
+        Ok(())
+    }
+}
+
+/// Checked [`TraverseParameters`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct TraverseSettings {
+    parameters: TraverseParameters,
+    tip_sin_cos: (f64, f64),
+}
+
+impl TraverseSettings {
+    /// The parameters it was made from.
+    pub fn parameters(&self) -> &TraverseParameters {
+        &self.parameters
+    }
+
+    pub(crate) fn controller(&self) -> &ControllerParameters {
+        &self.parameters.controller
+    }
+
+    pub(crate) fn speed_m_s(&self) -> f64 {
+        self.parameters.speed_m_s
+    }
+
+    pub(crate) fn step_s(&self) -> f64 {
+        1.0 / f64::from(self.parameters.step_rate_hz)
+    }
+
+    /// Sine and cosine of the angle of a tip-over.
+    pub(crate) fn tip_sin_cos(&self) -> (f64, f64) {
+        self.tip_sin_cos
+    }
+
+    pub(crate) fn turn_start_rad(&self) -> f64 {
+        self.parameters.controller.turn_start_deg.to_radians()
+    }
+
+    pub(crate) fn turn_stop_rad(&self) -> f64 {
+        self.parameters.controller.turn_stop_deg.to_radians()
+    }
+}
+
+/// Largest stable time step of a vehicle with every contact point in the ground, s.
+///
+/// A semi-implicit Euler step `h` of a mass `M` on a spring `K` with an explicit damper `C` is stable while
+/// `K h^2 + 2 C h < 4 M`; taken for each of the six degrees of freedom by itself.
+pub(crate) fn step_limit_s(vehicle: &Vehicle) -> f64 {
+    let contacts = contacts(vehicle);
+    let limit = |mass: f64, arm_squared: &dyn Fn(Vec3) -> f64| {
+        let stiffness: f64 = contacts.iter().map(|c| c.stiffness * arm_squared(c.arm)).sum();
+        let damping: f64 = contacts.iter().map(|c| c.damping * arm_squared(c.arm)).sum();
+        ((damping * damping + 4.0 * stiffness * mass).sqrt() - damping) / stiffness
+    };
+    let shift = limit(vehicle.mass_kg, &|_| 1.0);
+    let turn = |axis: usize| {
+        let arm_squared = |arm: Vec3| {
+            let (a, b) = (arm[(axis + 1) % 3], arm[(axis + 2) % 3]);
+            a * a + b * b
+        };
+        limit(vehicle.inertia_kg_m2[axis], &arm_squared)
+    };
+    (0..3).map(turn).fold(shift, f64::min)
+}
+
+/// A contact as a spring and damper in every direction.
+struct Contact {
+    arm: Vec3,
+    stiffness: f64,
+    damping: f64,
+}
+
+fn contacts(vehicle: &Vehicle) -> Vec<Contact> {
+    let (tyre, belly) = (&vehicle.parameters().tyre, &vehicle.parameters().belly);
+    let wheel = Contact {
+        arm: [0.0, 0.0, -vehicle.tyre.radius_m],
+        stiffness: vehicle.tyre.stiffness_max_n_m().max(tyre.tangential_stiffness_n_m),
+        damping: tyre.damping_n_s_m.max(tyre.tangential_damping_n_s_m),
+    };
+    let points = vehicle.belly.points();
+    // The dissipation of all points together follows their load: here the weight.
+    let dissipation = belly.dissipation_s_m * vehicle.mass_kg * GRAVITY_M_S2 / points.len() as f64;
+    let damping = belly.tangential_damping_n_s_m.max(dissipation);
+    let wheels = vehicle.wheels.iter().map(|w| Contact { arm: add(w.hub, wheel.arm), ..wheel });
+    let points = points.iter().map(|&arm| Contact { arm, stiffness: belly.stiffness_n_m, damping });
+    wheels.chain(points).collect()
+}

@@ -1,0 +1,328 @@
+//! A mission from the settled start to its outcome.
+
+use super::body::Body;
+use super::controller::{Controller, PlanPose};
+use super::drive::Servo;
+use super::ground::Ground;
+use super::model::{GRAVITY_M_S2, Vehicle};
+use super::settings::{TraverseParameters, TraverseSettings};
+use super::simulation::Simulation;
+use super::vector::{Axes, Vec3, add_scaled, cross, norm, scale, sub};
+use crate::missions::Mission;
+use sastrugi_schemas::topics::{CommandSample, Event, EventKind, ImuSample, Recording, StateSample, WheelSample};
+
+/// Why a mission could not be driven.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum TraverseError {
+    /// The ground was prepared for a smaller vehicle.
+    #[error(
+        "drive a vehicle with a reach of {reach_m} m on ground prepared for {ground_m} m; prepare it for this vehicle"
+    )]
+    OtherVehicle {
+        /// Reach of the vehicle, m.
+        reach_m: f64,
+        /// Reach that the ground was prepared for, m.
+        ground_m: f64,
+    },
+    /// Start or goal is not a point.
+    #[error("drive from {start_m:?} to {goal_m:?}: start and goal must be finite and apart")]
+    NoLine {
+        /// Start, m.
+        start_m: [f64; 2],
+        /// Goal, m.
+        goal_m: [f64; 2],
+    },
+}
+
+/// Drives one mission. Time 0 is when the vehicle stands at rest on the start point, facing the goal.
+///
+/// # Errors
+/// [`TraverseError`]; a vehicle that tips, sticks, leaves the terrain or runs out of time is an outcome, not an error.
+pub fn drive(
+    ground: &Ground,
+    vehicle: &Vehicle,
+    settings: &TraverseSettings,
+    mission: &Mission,
+) -> Result<Recording, TraverseError> {
+    if ground.reach_m() < vehicle.reach_m() {
+        return Err(TraverseError::OtherVehicle { reach_m: vehicle.reach_m(), ground_m: ground.reach_m() });
+    }
+    let (start_m, goal_m) = (mission.start_m, mission.goal_m);
+    let length_m = mission.length_m();
+    if !(length_m.is_finite() && length_m > 0.0 && mission.heading_rad.is_finite()) {
+        return Err(TraverseError::NoLine { start_m, goal_m });
+    }
+    Ok(match settled(ground, vehicle, settings, mission) {
+        Some(simulation) => Run::new(simulation, ground, vehicle, settings, mission).finish(),
+        None => nowhere(vehicle, settings.parameters(), mission),
+    })
+}
+
+/// The vehicle at rest on the start, wheels locked; `None` where the ground is undefined.
+pub(crate) fn settled<'a>(
+    ground: &'a Ground,
+    vehicle: &'a Vehicle,
+    settings: &'a TraverseSettings,
+    mission: &Mission,
+) -> Option<Simulation<'a>> {
+    let body = fitted(ground, vehicle, mission)?;
+    let mut simulation = Simulation::new(ground, vehicle, settings, body);
+    let overlap = simulation.deepest_overlap_m();
+    if !overlap.is_finite() {
+        return None;
+    }
+    simulation.body.position[2] += overlap;
+    let steps = (settings.parameters().settle_s / settings.step_s()).ceil() as u64;
+    for _ in 0..steps {
+        simulation.step([Servo::BRAKE; 2]);
+    }
+    simulation.zero_angles();
+    (!simulation.undefined).then_some(simulation)
+}
+
+/// Pose with the base_link origin over the start, tilted as the plane through the ground under the hubs, wheels about on
+/// that plane.
+fn fitted(ground: &Ground, vehicle: &Vehicle, mission: &Mission) -> Option<Body> {
+    let [x0, y0] = mission.start_m;
+    if !ground.contains(x0, y0) {
+        return None;
+    }
+    let (sin, cos) = libm::sincos(mission.heading_rad);
+    let hubs: Vec<Vec3> = vehicle.outline().wheels.iter().map(|w| w.hub_m).collect();
+    let height = |hub: &Vec3| ground.height(x0 + cos * hub[0] - sin * hub[1], y0 + sin * hub[0] + cos * hub[1]);
+    let heights: Vec<f64> = hubs.iter().map(height).collect();
+    let count = hubs.len() as f64;
+    let (mean_x, mean_z) = (hubs.iter().map(|h| h[0]).sum::<f64>() / count, heights.iter().sum::<f64>() / count);
+    // Hubs come in pairs left and right of x, so the two slopes of the least-squares plane are independent.
+    let slope = |axis: usize, mean: f64| {
+        let product: f64 = hubs.iter().zip(&heights).map(|(h, z)| (h[axis] - mean) * z).sum();
+        let square: f64 = hubs.iter().map(|h| (h[axis] - mean) * (h[axis] - mean)).sum();
+        product / square
+    };
+    let (ahead, left) = (slope(0, mean_x), slope(1, 0.0));
+    let axes = tilted([cos, sin], ahead, left);
+    let base_z = mean_z - ahead * mean_x + vehicle.tyre.radius_m - hubs[0][2];
+    let position = add_scaled([x0, y0, base_z], axes.to_map(vehicle.centre_of_mass_m), 1.0);
+    let body = Body { position, velocity: [0.0; 3], orientation: axes.quaternion(), rate: [0.0; 3] };
+    base_z.is_finite().then_some(body)
+}
+
+/// Axes with x over the heading, on a plane with these slopes ahead and to the left.
+fn tilted([cos, sin]: [f64; 2], ahead: f64, left: f64) -> Axes {
+    let along = [cos, sin, ahead];
+    let across = [-sin, cos, left];
+    let normal = cross(along, across);
+    let (x, z) = (scale(along, 1.0 / norm(along)), scale(normal, 1.0 / norm(normal)));
+    Axes { x, y: cross(z, x), z }
+}
+
+/// The recording of a vehicle whose start is on no ground.
+fn nowhere(vehicle: &Vehicle, parameters: &TraverseParameters, mission: &Mission) -> Recording {
+    let (sin, cos) = libm::sincos(0.5 * mission.heading_rad);
+    let state = StateSample {
+        time_s: 0.0,
+        position_m: [mission.start_m[0], mission.start_m[1], 0.0],
+        orientation: [0.0, 0.0, sin, cos],
+        velocity_m_s: [0.0; 3],
+        angular_velocity_rad_s: [0.0; 3],
+    };
+    let text = format!(
+        "the start ({:.2}, {:.2}) m lies off the terrain or beside cells without data",
+        mission.start_m[0], mission.start_m[1]
+    );
+    let event = Event { time_s: 0.0, kind: EventKind::OutOfBounds, text };
+    Recording { states: vec![state], events: vec![event], ..empty(vehicle, parameters) }
+}
+
+fn empty(vehicle: &Vehicle, parameters: &TraverseParameters) -> Recording {
+    Recording {
+        vehicle: vehicle.outline(),
+        sample_rate_hz: f64::from(parameters.sample_rate_hz),
+        imu_rate_hz: f64::from(parameters.imu_rate_hz),
+        states: Vec::new(),
+        imu: Vec::new(),
+        wheels: Vec::new(),
+        commands: Vec::new(),
+        events: Vec::new(),
+    }
+}
+
+/// A mission under way.
+struct Run<'a> {
+    simulation: Simulation<'a>,
+    ground: &'a Ground,
+    vehicle: &'a Vehicle,
+    settings: &'a TraverseSettings,
+    controller: Controller,
+    recording: Recording,
+    /// Steps since the start.
+    steps: u64,
+    /// Velocity of base_link at the last inertial measurement.
+    imu_velocity: Vec3,
+    /// Where and when the vehicle last was as far as `stuck_distance_m` from where it had been.
+    moved: ([f64; 2], f64),
+}
+
+impl<'a> Run<'a> {
+    fn new(
+        simulation: Simulation<'a>,
+        ground: &'a Ground,
+        vehicle: &'a Vehicle,
+        settings: &'a TraverseSettings,
+        mission: &Mission,
+    ) -> Self {
+        let (position, imu_velocity) = simulation.body.base(vehicle);
+        let text = format!(
+            "at ({:.2}, {:.2}, {:.2}) m, goal {:.2} m away",
+            position[0],
+            position[1],
+            position[2],
+            mission.length_m()
+        );
+        let mut recording = empty(vehicle, settings.parameters());
+        recording.events.push(Event { time_s: 0.0, kind: EventKind::Start, text });
+        Self {
+            simulation,
+            ground,
+            vehicle,
+            settings,
+            controller: Controller::new(mission),
+            recording,
+            steps: 0,
+            imu_velocity,
+            moved: ([position[0], position[1]], 0.0),
+        }
+    }
+
+    /// Steps to the outcome.
+    fn finish(mut self) -> Recording {
+        loop {
+            self.on_clock();
+            if let Some((kind, text)) = self.outcome() {
+                self.recording.events.push(Event { time_s: self.time_s(), kind, text });
+                return self.recording;
+            }
+            self.simulation.step(self.servos());
+            self.steps += 1;
+        }
+    }
+
+    fn parameters(&self) -> &'a TraverseParameters {
+        self.settings.parameters()
+    }
+
+    fn time_s(&self) -> f64 {
+        self.steps as f64 / f64::from(self.parameters().step_rate_hz)
+    }
+
+    /// True when something at this rate falls on the current step.
+    fn is_due(&self, rate_hz: u32) -> bool {
+        self.steps.is_multiple_of(u64::from(self.parameters().step_rate_hz / rate_hz))
+    }
+
+    /// Control and recording at their rates. At one instant the commands come first, then the samples.
+    fn on_clock(&mut self) {
+        let parameters = self.parameters();
+        if self.is_due(parameters.control_rate_hz) {
+            let period_s = 1.0 / f64::from(parameters.control_rate_hz);
+            self.controller.update(self.pose(), self.settings, self.vehicle.skid_steer(), period_s);
+        }
+        if self.is_due(parameters.imu_rate_hz) {
+            self.record_imu();
+        }
+        if self.is_due(parameters.sample_rate_hz) {
+            self.record_samples();
+        }
+    }
+
+    fn pose(&self) -> PlanPose {
+        let ([x, y, _], _) = self.simulation.body.base(self.vehicle);
+        let forward = self.simulation.body.axes().x;
+        PlanPose { x, y, yaw: libm::atan2(forward[1], forward[0]) }
+    }
+
+    /// Wheel speeds of both sides that the commands ask for.
+    fn servos(&self) -> [Servo; 2] {
+        let (drive, wheels) = (self.vehicle.skid_steer(), &self.vehicle.parameters().wheels);
+        let command = &self.controller.command;
+        let half_track = 0.5 * wheels.track_m * drive.track_multiplier;
+        [-1.0, 1.0].map(|side| Servo {
+            target: (command.speed_m_s + side * command.yaw_rate_rad_s * half_track) / wheels.radius_m,
+            gain: drive.servo_gain_n_m_s,
+            limit: drive.torque_limit_n_m,
+        })
+    }
+
+    fn record_samples(&mut self) {
+        let time_s = self.time_s();
+        self.controller.observe(self.pose(), self.settings);
+        let (body, command) = (&self.simulation.body, &self.controller.command);
+        let (position_m, velocity_m_s) = body.base(self.vehicle);
+        self.recording.states.push(StateSample {
+            time_s,
+            position_m,
+            orientation: body.orientation,
+            velocity_m_s,
+            angular_velocity_rad_s: body.rate,
+        });
+        self.recording.wheels.push(WheelSample { time_s, wheels: self.simulation.wheel_states() });
+        self.recording.commands.push(CommandSample {
+            time_s,
+            speed_m_s: command.speed_m_s,
+            yaw_rate_rad_s: command.yaw_rate_rad_s,
+            cross_track_m: command.cross_track_m,
+            heading_error_rad: command.heading_error_rad,
+            distance_to_goal_m: command.distance_to_goal_m,
+        });
+    }
+
+    /// Mean specific force since the last measurement, in the frame at its end; at time 0 that of a vehicle at rest.
+    fn record_imu(&mut self) {
+        let body = &self.simulation.body;
+        let (_, velocity) = body.base(self.vehicle);
+        let acceleration = scale(sub(velocity, self.imu_velocity), f64::from(self.parameters().imu_rate_hz));
+        self.imu_velocity = velocity;
+        self.recording.imu.push(ImuSample {
+            time_s: self.time_s(),
+            orientation: body.orientation,
+            angular_velocity_rad_s: body.rate,
+            specific_force_m_s2: body.axes().to_body(add_scaled(acceleration, [0.0, 0.0, 1.0], GRAVITY_M_S2)),
+        });
+    }
+
+    /// How the mission ends at this instant, if it does.
+    fn outcome(&mut self) -> Option<(EventKind, String)> {
+        let rules = self.parameters();
+        let body = &self.simulation.body;
+        let ([x, y, _], _) = body.base(self.vehicle);
+        if self.simulation.undefined || !self.ground.contains(body.position[0], body.position[1]) {
+            let text = format!("at ({x:.2}, {y:.2}) m the ground ends or holds no data");
+            return Some((EventKind::OutOfBounds, text));
+        }
+        if body.is_tipped(self.settings.tip_sin_cos()) {
+            let text = format!("pitch or roll beyond {} deg at ({x:.2}, {y:.2}) m", rules.tip_deg);
+            return Some((EventKind::Tipped, text));
+        }
+        let left_m = self.controller.distance_to_goal_m([x, y]);
+        if left_m <= rules.goal_tolerance_m {
+            return Some((EventKind::Success, format!("within {left_m:.3} m of the goal")));
+        }
+        if self.stands_still([x, y]) {
+            let (distance_m, time_s) = (rules.stuck_distance_m, rules.stuck_time_s);
+            let text = format!("less than {distance_m} m of motion in {time_s} s at ({x:.2}, {y:.2}) m");
+            return Some((EventKind::Stuck, text));
+        }
+        (self.time_s() >= rules.timeout_s).then(|| (EventKind::Timeout, format!("{left_m:.2} m short of the goal")))
+    }
+
+    fn stands_still(&mut self, at: [f64; 2]) -> bool {
+        let rules = self.parameters();
+        let (anchor, since_s) = self.moved;
+        let (dx, dy) = (at[0] - anchor[0], at[1] - anchor[1]);
+        if dx * dx + dy * dy >= rules.stuck_distance_m * rules.stuck_distance_m {
+            self.moved = (at, self.time_s());
+            return false;
+        }
+        self.time_s() - since_s >= rules.stuck_time_s
+    }
+}
