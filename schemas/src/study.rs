@@ -168,8 +168,6 @@ pub struct TraverseItem {
     pub id: String,
     /// Id of the missions to drive.
     pub missions: String,
-    /// Vehicle (see `sastrugi kinds`).
-    pub vehicle: String,
 }
 
 /// `[roughness]`: how every heightfield is classified and described.
@@ -184,8 +182,8 @@ pub struct RoughnessSection {
     pub border_m: f64,
     /// Radius of the disk of the morphological closing, m (half diagonal of a Husky A200's outline).
     pub closing_radius_m: f64,
-    /// Window of the moving average of the band RMS, m.
-    pub band_window_m: f64,
+    /// Window of the moving average below which the band RMS is taken, m; 41 cells when absent.
+    pub band_window_m: Option<f64>,
 }
 
 impl Default for RoughnessSection {
@@ -197,7 +195,7 @@ impl Default for RoughnessSection {
             semi_max: 140.0 * level_cm,
             border_m: 5.0,
             closing_radius_m: 0.57,
-            band_window_m: 2.0,
+            band_window_m: None,
         }
     }
 }

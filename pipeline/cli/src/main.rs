@@ -1,2 +1,44 @@
-//! Binary under construction.
-fn main() {}
+//! The `sastrugi` command: reads arguments, calls the stages, prints, and ends with a documented exit code.
+
+mod args;
+mod failure;
+mod output;
+mod progress;
+mod verbs;
+
+use clap::Parser;
+use failure::{Code, Failure};
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    let arguments = match args::Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(error) => return refuse_arguments(&error),
+    };
+    if let Err(error) = ctrlc::set_handler(interrupted) {
+        eprintln!("sastrugi: note: Ctrl-C will not be announced: {error}");
+    }
+    if let Err(failure) = verbs::start_threads(arguments.common.threads) {
+        return failure.report();
+    }
+    match verbs::dispatch(&arguments) {
+        Ok(code) => code.into(),
+        Err(failure) => failure.report(),
+    }
+}
+
+/// `--help` and `--version` are no errors; anything else that clap says is bad usage.
+fn refuse_arguments(error: &clap::Error) -> ExitCode {
+    // Nothing can be done about a terminal that is gone.
+    let _ = error.print();
+    if error.use_stderr() { Code::Usage.into() } else { Code::Done.into() }
+}
+
+/// Every file appears whole or not at all, so the process may end here and now.
+fn interrupted() {
+    eprintln!("\nsastrugi: interrupted; what is finished is kept, the same command goes on from there");
+    std::process::exit(i32::from(Code::Retry as u8));
+}
+
+/// What a verb comes to.
+type Verdict = Result<Code, Failure>;

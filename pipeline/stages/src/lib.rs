@@ -1,1 +1,13 @@
-//! Room under construction.
+//! From a study to a release: one job per stage (glue between kernels and files), the study reader, the runner with its
+//! cache and shards, and the verbs that work on single files.
+
+mod error;
+pub mod jobs;
+pub mod registry;
+mod revision;
+pub mod runner;
+pub mod studies;
+pub mod study;
+pub mod verbs;
+
+pub use error::Error;

@@ -1,0 +1,346 @@
+//! The command line.
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap_complete::Shell;
+use std::path::PathBuf;
+
+/// Rough-terrain datasets that can be reproduced bit for bit, and the statistics to compare them.
+#[derive(Debug, Parser)]
+#[command(name = "sastrugi", version, propagate_version = true, max_term_width = 100)]
+#[command(
+    after_help = "Exit codes: 0 done, 1 failed, 2 bad usage or study, 3 done but some items failed, 4 verification found a \
+difference, 65 input data missing or unusable, 75 interrupted or retryable.\n\nExample:\n  sastrugi run fixtures/studies/quickstart.toml -o release"
+)]
+pub struct Arguments {
+    /// What to do.
+    #[command(subcommand)]
+    pub verb: Verb,
+    /// Options of every verb.
+    #[command(flatten)]
+    pub common: Common,
+}
+
+/// Options of every verb.
+#[derive(Debug, Args)]
+pub struct Common {
+    /// Threads to use; all cores when absent. Changes no byte of any result.
+    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
+    /// Machine-readable result on stdout.
+    #[arg(long, global = true)]
+    pub json: bool,
+    /// No progress on stderr; errors always print.
+    #[arg(long, global = true)]
+    pub quiet: bool,
+}
+
+/// Verbs.
+#[derive(Debug, Subcommand)]
+pub enum Verb {
+    /// Run a study to a release; goes on where an earlier run stopped.
+    #[command(
+        after_help = "Examples:\n  sastrugi run study.toml -o release\n  sastrugi run study.toml -o part1 --shard 1/3"
+    )]
+    Run(Run),
+    /// Say what a run would do, how much it is, and why each stale item is stale.
+    #[command(after_help = "Example:\n  sastrugi plan study.toml -o release")]
+    Plan(Plan),
+    /// Join shards to a release, equal byte by byte to an unsharded run.
+    #[command(after_help = "Example:\n  sastrugi merge part1 part2 part3 -o release")]
+    Merge(Merge),
+    /// Check every checksum, schema and count of a release; recompute items on request.
+    #[command(after_help = "Examples:\n  sastrugi verify release\n  sastrugi verify release --recompute 3")]
+    Verify(Verify),
+    /// Generate one terrain.
+    #[command(after_help = "Examples:\n  sastrugi terrain multifractal --seed 7 -o rough.tif\n  \
+        sastrugi terrain weierstrass_mandelbrot --set fractal_dimension=2.4 --set size_px='[512, 512]' -o wm.png")]
+    Terrain(Terrain),
+    /// Fit the covariance of a measured DEM.
+    #[command(after_help = "Example:\n  sastrugi fit snow.tif --outer-scale 2 -o fit.json")]
+    Fit(Fit),
+    /// Synthesise a texture that matches a fit.
+    #[command(
+        after_help = "Examples:\n  sastrugi texture fit.json --size 20x20 --cell 0.1 --seed 1 -o texture.tif\n  \
+        sastrugi texture fit.json --size 10x10 --cell 0.05 --onto terrain.tif -o textured.tif"
+    )]
+    Texture(Texture),
+    /// Classify and describe the roughness of a DEM.
+    #[command(after_help = "Example:\n  sastrugi roughness terrain.tif --classes classes.tif")]
+    Roughness(Roughness),
+    /// Drive missions over one DEM, to a release of their own.
+    #[command(after_help = "Example:\n  sastrugi traverse terrain.tif --vehicle husky_a200 --missions 5 -o drive")]
+    Traverse(Traverse),
+    /// Write the report of a release: one offline HTML page, figures as SVG, numbers as JSON.
+    #[command(after_help = "Example:\n  sastrugi report release -o release-report")]
+    Report(Report),
+    /// Convert between DEM formats, by file name ending (.tif .asc .hgt .png .npy .obj).
+    #[command(after_help = "Example:\n  sastrugi convert N44W072.hgt tile.tif")]
+    Convert(Convert),
+    /// Say what a file or a release is.
+    #[command(after_help = "Example:\n  sastrugi info terrain.tif")]
+    Info(Info),
+    /// List every generator, fit, method, mission rule and vehicle with parameters, defaults and sources.
+    #[command(after_help = "Examples:\n  sastrugi kinds\n  sastrugi kinds multifractal")]
+    Kinds(Kinds),
+    /// Print the JSON Schema of study files, or the columns of a table.
+    #[command(after_help = "Examples:\n  sastrugi schema\n  sastrugi schema missions")]
+    Schema(Schema),
+    /// Print shell completions.
+    #[command(
+        after_help = "Example:\n  sastrugi completions bash > ~/.local/share/bash-completion/completions/sastrugi"
+    )]
+    Completions(Completions),
+}
+
+/// Where results and work go, and how much memory may be used.
+#[derive(Debug, Args)]
+pub struct Place {
+    /// Release folder.
+    #[arg(short, long, value_name = "DIR", default_value = "release")]
+    pub output: PathBuf,
+    /// Work area; DIR.work beside the release when absent.
+    #[arg(long, value_name = "DIR")]
+    pub work: Option<PathBuf>,
+}
+
+/// `run`.
+#[derive(Debug, Args)]
+pub struct Run {
+    /// Study file.
+    pub study: PathBuf,
+    /// Where.
+    #[command(flatten)]
+    pub place: Place,
+    /// Run one of N shards (I = 1..N) to a partial folder for `merge`.
+    #[arg(long, value_name = "I/N")]
+    pub shard: Option<String>,
+    /// Working memory of the items at once, GiB.
+    #[arg(long, value_name = "GIB", default_value_t = 4.0)]
+    pub memory: f64,
+}
+
+/// `plan`.
+#[derive(Debug, Args)]
+pub struct Plan {
+    /// Study file.
+    pub study: PathBuf,
+    /// Where.
+    #[command(flatten)]
+    pub place: Place,
+}
+
+/// `merge`.
+#[derive(Debug, Args)]
+pub struct Merge {
+    /// Folders that `run --shard` wrote.
+    #[arg(required = true)]
+    pub shards: Vec<PathBuf>,
+    /// Release folder.
+    #[arg(short, long, value_name = "DIR", default_value = "release")]
+    pub output: PathBuf,
+}
+
+/// `verify`.
+#[derive(Debug, Args)]
+pub struct Verify {
+    /// Release folder.
+    pub release: PathBuf,
+    /// Also compute all, or this many, of the items again and compare their bytes.
+    #[arg(long, value_name = "all|K")]
+    pub recompute: Option<String>,
+}
+
+/// Compression of a GeoTIFF.
+#[derive(Clone, Copy, Debug, Default, ValueEnum)]
+pub enum Compress {
+    /// As they are.
+    None,
+    /// Deflate with predictor.
+    #[default]
+    Deflate,
+}
+
+/// `terrain`.
+#[derive(Debug, Args)]
+pub struct Terrain {
+    /// A generator (see `kinds`), or a TOML file with `kind` and its parameters.
+    #[arg(value_name = "SPEC.toml|KIND")]
+    pub spec: String,
+    /// A parameter, `name=value`; the value is TOML, a bare word is text.
+    #[arg(long = "set", value_name = "K=V")]
+    pub set: Vec<String>,
+    /// Seed of the random streams.
+    #[arg(long, value_name = "N")]
+    pub seed: Option<u64>,
+    /// DEM to write; the ending gives the format.
+    #[arg(short, long, value_name = "DEM")]
+    pub output: PathBuf,
+    /// Compression of a GeoTIFF.
+    #[arg(long, value_enum, default_value_t)]
+    pub compress: Compress,
+}
+
+/// `fit`.
+#[derive(Debug, Args)]
+pub struct Fit {
+    /// Measured DEM.
+    pub dem: PathBuf,
+    /// Fit file to write.
+    #[arg(short, long, value_name = "FIT.json")]
+    pub output: PathBuf,
+    /// Window of the moving average that separates background from texture, m.
+    #[arg(long, value_name = "M")]
+    pub outer_scale: Option<f64>,
+    /// `corrected` for detrending and trimming, or as in the `paper`.
+    #[arg(long, value_name = "corrected|paper")]
+    pub mode: Option<String>,
+    /// Share of residuals trimmed as outliers.
+    #[arg(long, value_name = "SHARE")]
+    pub trim: Option<f64>,
+    /// Covariance model.
+    #[arg(long, value_name = "MODEL")]
+    pub model: Option<String>,
+    /// Part of the DEM, x0,y0,x1,y1 in its own coordinates.
+    #[arg(long, value_name = "X0,Y0,X1,Y1", allow_hyphen_values = true)]
+    pub window: Option<String>,
+    /// Cell size for files that carry none, m: one number, or east-west,north-south.
+    #[arg(long, value_name = "M")]
+    pub cell: Option<String>,
+    /// Any other parameter of the fit (see `kinds fit`), `name=value`.
+    #[arg(long = "set", value_name = "K=V")]
+    pub set: Vec<String>,
+}
+
+/// `texture`.
+#[derive(Debug, Args)]
+pub struct Texture {
+    /// Fit file; `model` and `parameters` are enough.
+    pub fit: PathBuf,
+    /// Size east-west by north-south, m.
+    #[arg(long, value_name = "WxH")]
+    pub size: Option<String>,
+    /// Cell size, m.
+    #[arg(long, value_name = "M")]
+    pub cell: Option<f64>,
+    /// Seed of the random streams.
+    #[arg(long, value_name = "N")]
+    pub seed: Option<u64>,
+    /// Synthesis method.
+    #[arg(long, value_name = "M", default_value = "fft_ma")]
+    pub method: String,
+    /// `unit` magnitude (exact covariance in each tile) or `gaussian`.
+    #[arg(long, value_name = "unit|gaussian")]
+    pub phase: Option<String>,
+    /// Base DEM to add the texture to.
+    #[arg(long, value_name = "DEM")]
+    pub onto: Option<PathBuf>,
+    /// Any other parameter of the method (see `kinds`), `name=value`.
+    #[arg(long = "set", value_name = "K=V")]
+    pub set: Vec<String>,
+    /// DEM to write.
+    #[arg(short, long, value_name = "DEM")]
+    pub output: PathBuf,
+    /// Compression of a GeoTIFF.
+    #[arg(long, value_enum, default_value_t)]
+    pub compress: Compress,
+}
+
+/// `roughness`.
+#[derive(Debug, Args)]
+pub struct Roughness {
+    /// DEM.
+    pub dem: PathBuf,
+    /// Write the class map (unclosed), as GeoTIFF.
+    #[arg(long, value_name = "TIF")]
+    pub classes: Option<PathBuf>,
+    /// Any setting of `[roughness]` (see `schema`), `name=value`.
+    #[arg(long = "set", value_name = "K=V")]
+    pub set: Vec<String>,
+    /// Cell size for files that carry none, m: one number, or east-west,north-south.
+    #[arg(long, value_name = "M")]
+    pub cell: Option<String>,
+}
+
+/// `traverse`.
+#[derive(Debug, Args)]
+pub struct Traverse {
+    /// DEM, metric, with cells that the vehicle's wheels can feel.
+    pub dem: PathBuf,
+    /// Vehicle (see `kinds`).
+    #[arg(long, value_name = "V", default_value = "husky_a200")]
+    pub vehicle: String,
+    /// Number of missions.
+    #[arg(long, value_name = "N", default_value_t = 20)]
+    pub missions: u32,
+    /// Seed of the random streams.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u64,
+    /// A rule of the missions (see `kinds`), `name=value`.
+    #[arg(long = "set-missions", value_name = "K=V")]
+    pub set_missions: Vec<String>,
+    /// A parameter of the run (see `kinds`), `name=value`.
+    #[arg(long = "set", value_name = "K=V")]
+    pub set: Vec<String>,
+    /// Date that the release carries.
+    #[arg(long, value_name = "YYYY-MM-DD", default_value = "1970-01-01")]
+    pub date: String,
+    /// Where.
+    #[command(flatten)]
+    pub place: Place,
+}
+
+/// `report`.
+#[derive(Debug, Args)]
+pub struct Report {
+    /// Release folder.
+    pub release: PathBuf,
+    /// Folder to write, never inside of the release; ./<name>-report when absent.
+    #[arg(short, long, value_name = "DIR")]
+    pub output: Option<PathBuf>,
+}
+
+/// `convert`.
+#[derive(Debug, Args)]
+pub struct Convert {
+    /// DEM to read.
+    pub input: PathBuf,
+    /// DEM to write.
+    pub output: PathBuf,
+    /// Cell size for files that carry none, m: one number, or east-west,north-south.
+    #[arg(long, value_name = "M")]
+    pub cell: Option<String>,
+    /// Compression of a GeoTIFF.
+    #[arg(long, value_enum, default_value_t)]
+    pub compress: Compress,
+}
+
+/// `info`.
+#[derive(Debug, Args)]
+pub struct Info {
+    /// DEM, fit file, MCAP recording, table, or release folder.
+    pub path: PathBuf,
+    /// Cell size for files that carry none, m: one number, or east-west,north-south.
+    #[arg(long, value_name = "M")]
+    pub cell: Option<String>,
+}
+
+/// `kinds`.
+#[derive(Debug, Args)]
+pub struct Kinds {
+    /// One of them, with all its parameters.
+    pub kind: Option<String>,
+}
+
+/// `schema`.
+#[derive(Debug, Args)]
+pub struct Schema {
+    /// `study` (default), `tables`, or the name of a table.
+    pub name: Option<String>,
+}
+
+/// `completions`.
+#[derive(Debug, Args)]
+pub struct Completions {
+    /// Shell.
+    pub shell: Shell,
+}

@@ -1,0 +1,49 @@
+//! Results on stdout: JSON for machines, aligned lines for people.
+
+use crate::failure::Failure;
+use serde_json::Value;
+use std::io::Write;
+
+/// Prints JSON when asked for, else the text.
+///
+/// # Errors
+/// When stdout is gone.
+pub fn print(json: bool, value: &Value, text: &str) -> Result<(), Failure> {
+    let mut out = std::io::stdout().lock();
+    let written = if json {
+        let pretty = serde_json::to_string_pretty(value).map_err(Failure::failed)?;
+        writeln!(out, "{pretty}")
+    } else {
+        writeln!(out, "{}", text.trim_end())
+    };
+    match written.and_then(|()| out.flush()) {
+        // A reader that has seen enough (`| head`) is no failure.
+        Err(e) if e.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
+        other => other.map_err(Failure::failed),
+    }
+}
+
+/// Rows of cells in aligned columns.
+pub fn columns(rows: &[Vec<String>]) -> String {
+    let width = |column: usize| rows.iter().filter_map(|r| r.get(column)).map(|c| c.chars().count()).max().unwrap_or(0);
+    let widths: Vec<usize> = (0..rows.iter().map(Vec::len).max().unwrap_or(0)).map(width).collect();
+    let line = |row: &Vec<String>| {
+        let cells: Vec<String> = row.iter().zip(&widths).map(|(c, w)| format!("{c:<w$}")).collect();
+        cells.join("  ").trim_end().to_owned()
+    };
+    rows.iter().map(line).collect::<Vec<_>>().join("\n")
+}
+
+/// Bytes in words.
+pub fn bytes(count: f64) -> String {
+    let steps = [(1e9, "GB"), (1e6, "MB"), (1e3, "kB")];
+    match steps.iter().find(|(size, _)| count >= *size) {
+        Some((size, unit)) => format!("{:.1} {unit}", count / size),
+        None => format!("{count:.0} bytes"),
+    }
+}
+
+/// Seconds in words.
+pub fn seconds(count: f64) -> String {
+    if count < 90.0 { format!("{count:.1} s") } else { format!("{:.1} min", count / 60.0) }
+}

@@ -1,0 +1,116 @@
+//! Progress of a run on stderr: a bar with ETA on a terminal, plain lines otherwise, nothing but failures when quiet.
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use sastrugi_stages::jobs::ItemRef;
+use sastrugi_stages::runner::progress::{End, Progress};
+use std::io::IsTerminal;
+use std::sync::{Mutex, PoisonError};
+use std::time::Instant;
+
+/// Steps of the bar per estimated second.
+const TICKS_PER_SECOND: f64 = 1000.0;
+
+/// The listener of a run.
+pub struct Teller {
+    quiet: bool,
+    bar: Option<ProgressBar>,
+    state: Mutex<State>,
+    start: Instant,
+}
+
+#[derive(Default)]
+struct State {
+    total: usize,
+    ended: usize,
+    seconds_total: f64,
+    seconds_done: f64,
+}
+
+impl Teller {
+    /// A listener; `quiet` keeps everything but failures.
+    pub fn new(quiet: bool) -> Self {
+        let bar = (!quiet && std::io::stderr().is_terminal()).then(|| {
+            let bar = ProgressBar::with_draw_target(Some(0), ProgressDrawTarget::stderr());
+            let style = "{bar:32} {percent:>3}%  {elapsed} elapsed, {eta} left  {msg}";
+            bar.set_style(ProgressStyle::with_template(style).unwrap_or_else(|_| ProgressStyle::default_bar()));
+            bar
+        });
+        Self { quiet, bar, state: Mutex::default(), start: Instant::now() }
+    }
+
+    /// A line that stays.
+    pub fn say(&self, line: &str) {
+        if self.quiet {
+            return;
+        }
+        self.print(line);
+    }
+
+    fn print(&self, line: &str) {
+        match &self.bar {
+            Some(bar) => bar.suspend(|| eprintln!("{line}")),
+            None => eprintln!("{line}"),
+        }
+    }
+
+    /// Takes the bar away.
+    pub fn close(&self) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+    }
+
+    fn advance(&self, item: &ItemRef, seconds: f64) {
+        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        state.ended += 1;
+        state.seconds_done += seconds;
+        let counts = format!("{}/{} items", state.ended, state.total);
+        match &self.bar {
+            Some(bar) => {
+                bar.set_position((state.seconds_done * TICKS_PER_SECOND) as u64);
+                bar.set_message(format!("{counts}, {item}"));
+            }
+            None => self.say(&format!("{counts}, {item}{}", self.remaining(&state))),
+        }
+    }
+
+    /// Time left, from the share of the estimated work that is done.
+    fn remaining(&self, state: &State) -> String {
+        if state.seconds_done <= 0.0 || state.ended >= state.total {
+            return String::new();
+        }
+        let share = state.seconds_done / state.seconds_total.max(state.seconds_done);
+        let left = self.start.elapsed().as_secs_f64() * (1.0 / share - 1.0);
+        format!(", about {} left", crate::output::seconds(left))
+    }
+}
+
+impl Progress for Teller {
+    fn begin(&self, total: usize, ready: usize, seconds: f64) {
+        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        *state = State { total: total - ready, ended: 0, seconds_total: seconds, seconds_done: 0.0 };
+        drop(state);
+        if let Some(bar) = &self.bar {
+            bar.set_length((seconds * TICKS_PER_SECOND) as u64);
+        }
+        self.say(&format!("{total} items, {ready} of them there already"));
+    }
+
+    fn ended(&self, item: &ItemRef, end: &End, seconds: f64) {
+        match end {
+            End::Done(notes) => notes.iter().for_each(|note| self.say(&format!("{item}: {note}"))),
+            End::Failed(why) => self.print(&format!("sastrugi: {item} failed: {why}")),
+            End::Skipped(parent) => self.print(&format!("sastrugi: {item} not tried, because {parent} failed")),
+        }
+        self.advance(item, seconds);
+    }
+
+    fn phase(&self, text: &str) {
+        if let Some(bar) = &self.bar {
+            bar.set_message(text.to_owned());
+        }
+        if self.bar.is_none() {
+            self.say(text);
+        }
+    }
+}

@@ -1,0 +1,105 @@
+//! Verbs on single files of any kind.
+
+use super::{cell, options};
+use crate::Verdict;
+use crate::args::{Common, Convert, Info};
+use crate::failure::{Code, Failure};
+use crate::output::{columns, print};
+use sastrugi_stages::verbs::describe_grid;
+use sastrugi_store::dem::{self, DemError, ReadOptions};
+use sastrugi_store::release::Release;
+use serde_json::{Value, json};
+use std::path::Path;
+
+fn failure(error: DemError) -> Failure {
+    match error {
+        DemError::Unfit { .. } => Failure::usage(error.to_string()),
+        _ if error.unusable_input() => Failure::input(error),
+        _ => Failure::failed(error),
+    }
+}
+
+/// `convert`.
+pub fn convert(args: &Convert, common: &Common) -> Verdict {
+    if dem::Format::of_name(&args.output).is_none() {
+        let path = args.output.display();
+        let message = format!("{path}: the ending names no DEM format; .tif, .asc, .hgt, .png, .npy and .obj do");
+        return Err(Failure::usage(message));
+    }
+    let read = dem::read_with(&args.input, &ReadOptions { cell_m: cell(args.cell.as_deref())? }).map_err(failure)?;
+    let lost = dem::write(&args.output, &read.grid, &read.info.crs, &options(args.compress)).map_err(failure)?;
+    let notes: Vec<&String> = read.info.notes.iter().chain(&lost).collect();
+    let mut text = format!("{}: {} x {} cells", args.output.display(), read.grid.rows(), read.grid.cols());
+    notes.iter().for_each(|note| text.push_str(&format!("\n  note: {note}")));
+    let result = json!({ "file": args.output, "grid": describe_grid(&read.grid), "notes": notes });
+    print(common.json, &result, &text)?;
+    Ok(Code::Done)
+}
+
+/// `info`.
+pub fn info(args: &Info, common: &Common) -> Verdict {
+    let extension = args.path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
+    let result = match extension.as_str() {
+        _ if args.path.is_dir() => release(&args.path)?,
+        "json" => fit(&args.path)?,
+        _ => raster(&args.path, cell(args.cell.as_deref())?)?,
+    };
+    let rows: Vec<Vec<String>> =
+        result.as_object().into_iter().flatten().map(|(key, value)| vec![key.clone(), plain(value)]).collect();
+    print(common.json, &result, &columns(&rows))?;
+    Ok(Code::Done)
+}
+
+fn plain(value: &Value) -> String {
+    value.as_str().map_or_else(|| value.to_string(), str::to_owned)
+}
+
+fn raster(path: &Path, cell_m: Option<[f64; 2]>) -> Result<Value, Failure> {
+    let read = dem::read_with(path, &ReadOptions { cell_m }).map_err(failure)?;
+    let info = &read.info;
+    let mut result = json!({
+        "what": "elevation raster",
+        "format": info.format.name(),
+        "dtype": info.dtype,
+        "nodata": info.nodata,
+        "unit": if info.crs.geographic { "degrees" } else { "m" },
+        "epsg": info.crs.epsg,
+        "crs": info.crs.name,
+        "pixel_is_point": info.pixel_is_point,
+    });
+    if let (Some(all), Some(grid)) = (result.as_object_mut(), describe_grid(&read.grid).as_object()) {
+        all.extend(grid.clone());
+        all.insert("notes".to_owned(), json!(info.notes));
+    }
+    Ok(result)
+}
+
+fn fit(path: &Path) -> Result<Value, Failure> {
+    let fit = sastrugi_stages::verbs::texture::read_fit(path)?;
+    Ok(json!({
+        "what": "covariance fit",
+        "mode": fit.mode,
+        "model": fit.model,
+        "parameters": fit.parameters,
+        "window_m": fit.window_m,
+        "bins": fit.lags_m.len(),
+        "source": fit.source.map(|s| s.file),
+        "warnings": fit.warnings,
+    }))
+}
+
+fn release(path: &Path) -> Result<Value, Failure> {
+    let release = Release::open(path).map_err(Failure::input)?;
+    let manifest = release.manifest();
+    Ok(json!({
+        "what": "release",
+        "name": manifest.name,
+        "version": manifest.version,
+        "seed": manifest.seed,
+        "license": manifest.license,
+        "study_sha256": manifest.study_sha256,
+        "files": manifest.artifacts.len(),
+        "bytes": manifest.artifacts.iter().map(|a| a.bytes).sum::<u64>(),
+        "failed_items": manifest.failed.len(),
+    }))
+}

@@ -1,0 +1,122 @@
+//! Verbs that make or describe one file.
+
+use super::{cell, options};
+use crate::Verdict;
+use crate::args::{Common, Fit, Roughness, Terrain, Texture};
+use crate::failure::{Code, Failure};
+use crate::output::{columns, print};
+use sastrugi_stages::verbs::{self, numbers, parameters};
+use serde_json::{Value, json};
+
+/// `terrain`.
+pub fn terrain(args: &Terrain, common: &Common) -> Verdict {
+    let options = options(args.compress);
+    let request =
+        verbs::terrain::Request { spec: &args.spec, set: &args.set, seed: args.seed, output: &args.output, options };
+    made(common, &verbs::terrain::terrain(&request)?)
+}
+
+/// `texture`.
+pub fn texture(args: &Texture, common: &Common) -> Verdict {
+    let mut params = json!({});
+    parameters::assign(&mut params, &args.set)?;
+    if let Some(size) = &args.size {
+        params["size_m"] = json!(numbers::<2>("--size", size)?);
+    }
+    if let Some(cell) = args.cell {
+        params["cell_m"] = json!(cell);
+    }
+    if let Some(phase) = &args.phase {
+        params["phase"] = json!(phase);
+    }
+    let request = verbs::texture::Request {
+        fit: &args.fit,
+        method: &args.method,
+        parameters: params,
+        seed: args.seed.unwrap_or(0),
+        onto: args.onto.as_deref(),
+        output: &args.output,
+        options: options(args.compress),
+    };
+    made(common, &verbs::texture::texture(&request)?)
+}
+
+/// Says what was made.
+fn made(common: &Common, result: &Value) -> Verdict {
+    let grid = &result["grid"];
+    let number = |v: &Value| v.as_f64().map_or_else(|| "none".to_owned(), |x| format!("{x:.4}"));
+    let text = format!(
+        "{}: {} x {} cells of {} x {} m, heights {} to {} m{}",
+        result["file"].as_str().unwrap_or_default(),
+        grid["rows"],
+        grid["cols"],
+        grid["cell"][0],
+        grid["cell"][1],
+        number(&grid["height_min"]),
+        number(&grid["height_max"]),
+        notes(&result["notes"]),
+    );
+    print(common.json, result, &text)?;
+    Ok(Code::Done)
+}
+
+fn notes(list: &Value) -> String {
+    let lines = list.as_array().into_iter().flatten().filter_map(Value::as_str);
+    lines.map(|note| format!("\n  note: {note}")).collect()
+}
+
+/// `fit`.
+pub fn fit(args: &Fit, common: &Common) -> Verdict {
+    let mut params = json!({});
+    parameters::assign(&mut params, &args.set)?;
+    let mut put = |key: &str, value: Option<Value>| {
+        if let Some(value) = value {
+            params[key] = value;
+        }
+    };
+    put("outer_scale_m", args.outer_scale.map(|v| json!(v)));
+    put("mode", args.mode.as_ref().map(|v| json!(v)));
+    put("trim", args.trim.map(|v| json!(v)));
+    put("model", args.model.as_ref().map(|v| json!(v)));
+    let window = args.window.as_deref().map(|w| numbers::<4>("--window", w)).transpose()?;
+    let cell_m = cell(args.cell.as_deref())?;
+    let request = verbs::fit::Request { dem: &args.dem, output: &args.output, parameters: params, window, cell_m };
+    let (fit, read_notes) = verbs::fit::fit(&request)?;
+    let parameters: Vec<String> = fit.parameters.iter().map(|(name, value)| format!("{name} = {value:.6}")).collect();
+    let mut text = format!("{}: {} ({}), {}", args.output.display(), fit.model, fit.mode, parameters.join(", "));
+    read_notes.iter().for_each(|note| text.push_str(&format!("\n  note: {note}")));
+    fit.warnings.iter().for_each(|warning| text.push_str(&format!("\n  warning: {warning}")));
+    print(common.json, &serde_json::to_value(&fit).map_err(Failure::failed)?, &text)?;
+    Ok(Code::Done)
+}
+
+/// `roughness`.
+pub fn roughness(args: &Roughness, common: &Common) -> Verdict {
+    let mut params = json!({});
+    parameters::assign(&mut params, &args.set)?;
+    let cell_m = cell(args.cell.as_deref())?;
+    let request =
+        verbs::roughness::Request { dem: &args.dem, parameters: params, classes: args.classes.as_deref(), cell_m };
+    let (summary, read_notes) = verbs::roughness::roughness(&request)?;
+    let h = &summary.heights;
+    let percent = |share: f64| if share.is_nan() { "none".to_owned() } else { format!("{:.2} %", 100.0 * share) };
+    let rows = [
+        ("cells with data", percent(summary.valid_share)),
+        ("height", format!("{:.4} to {:.4} m, relief {:.4} m", h.min_m, h.max_m, h.relief_m)),
+        ("RMS height", format!("{:.5} m, skewness {:.3}, kurtosis {:.3}", h.rms_m, h.skewness, h.kurtosis)),
+        ("RMS slope", format!("{:.4}", summary.rms_slope)),
+        ("band RMS", format!("{:.5} m below {:.3} m", summary.band_rms_m, summary.band_window_m)),
+        ("low roughness", percent(summary.shares.low)),
+        ("semi roughness", percent(summary.shares.semi)),
+        (
+            "high roughness",
+            format!("{}, without a border of {} m", percent(summary.shares.high), summary.share_border_m),
+        ),
+        ("PSD slope", format!("{:.3}", summary.psd_slope)),
+    ];
+    let rows: Vec<Vec<String>> = rows.iter().map(|(name, value)| vec![(*name).to_owned(), value.clone()]).collect();
+    let mut text = columns(&rows);
+    read_notes.iter().for_each(|note| text.push_str(&format!("\n  note: {note}")));
+    print(common.json, &serde_json::to_value(&summary).map_err(Failure::failed)?, &text)?;
+    Ok(Code::Done)
+}

@@ -1,0 +1,103 @@
+//! Verbs that list what the program knows.
+
+use crate::Verdict;
+use crate::args::{Arguments, Common, Completions, Kinds, Schema};
+use crate::failure::{Code, Failure};
+use crate::output::{columns, print};
+use clap::CommandFactory;
+use sastrugi_schemas::{Kind, Table, tables};
+use sastrugi_stages::registry;
+use sastrugi_stages::study::keys::nearest;
+use serde_json::{Value, json};
+
+/// `kinds`.
+pub fn kinds(args: &Kinds, common: &Common) -> Verdict {
+    let all = registry::kinds();
+    let Some(name) = &args.kind else {
+        let rows: Vec<Vec<String>> =
+            all.iter().map(|k| vec![k.family.to_owned(), k.kind.to_owned(), k.summary.to_owned()]).collect();
+        print(common.json, &json!(all), &columns(&rows))?;
+        return Ok(Code::Done);
+    };
+    let chosen: Vec<&Kind> = all.iter().filter(|k| k.kind == name || k.family == name).collect();
+    if chosen.is_empty() {
+        let names = all.iter().flat_map(|k| [k.kind, k.family]);
+        let hint = nearest(name, names)
+            .map_or_else(|| "`sastrugi kinds` lists them".to_owned(), |n| format!("did you mean `{n}`?"));
+        return Err(Failure::usage(format!("there is no kind `{name}`; {hint}")));
+    }
+    let text: Vec<String> = chosen.iter().map(|k| describe(k)).collect();
+    print(common.json, &json!(chosen), &text.join("\n\n"))?;
+    Ok(Code::Done)
+}
+
+fn describe(kind: &Kind) -> String {
+    let mut rows = Vec::new();
+    parameters("", &kind.parameters, &kind.parameters, &mut rows);
+    let text = format!("{} {}: {}\nsource: {}", kind.family, kind.kind, kind.summary, kind.source);
+    if rows.is_empty() { text } else { format!("{text}\n{}", columns(&rows)) }
+}
+
+/// Rows `name, default, description` of a schema's properties, tables opened.
+fn parameters(prefix: &str, schema: &Value, root: &Value, rows: &mut Vec<Vec<String>>) {
+    let schema = resolve(schema, root);
+    let defaults = schema.get("default");
+    for (name, property) in schema.get("properties").and_then(Value::as_object).into_iter().flatten() {
+        let default = property.get("default").or_else(|| defaults.and_then(|d| d.get(name)));
+        let inner = resolve(property, root);
+        let description = property.get("description").or_else(|| inner.get("description"));
+        let description = description.and_then(Value::as_str).unwrap_or_default().replace('\n', " ");
+        let is_table = inner.get("properties").is_some();
+        let default = default.filter(|_| !is_table).map(Value::to_string).unwrap_or_default();
+        rows.push(vec![format!("  {prefix}{name}"), default, description]);
+        if is_table {
+            parameters(&format!("{prefix}{name}."), inner, root, rows);
+        }
+    }
+}
+
+fn resolve<'a>(schema: &'a Value, root: &'a Value) -> &'a Value {
+    let target = schema.get("$ref").and_then(Value::as_str).and_then(|r| r.strip_prefix('#'));
+    target.and_then(|path| root.pointer(path)).unwrap_or(schema)
+}
+
+/// `schema`.
+pub fn schema(args: &Schema, common: &Common) -> Verdict {
+    match args.name.as_deref() {
+        None | Some("study") => {
+            let schema = registry::study_schema();
+            let text = serde_json::to_string_pretty(&schema).map_err(Failure::failed)?;
+            print(common.json, &schema, &text)?;
+        }
+        Some("tables") => {
+            let text: Vec<String> = tables::ALL.iter().map(|t| describe_table(t)).collect();
+            print(common.json, &json!(tables::ALL), &text.join("\n\n"))?;
+        }
+        Some(name) => {
+            let table = tables::by_name(name).ok_or_else(|| {
+                let known: Vec<&str> = tables::ALL.iter().map(|t| t.name).collect();
+                Failure::usage(format!("there is no schema `{name}`; there are study, tables, {}", known.join(", ")))
+            })?;
+            print(common.json, &json!(table), &describe_table(table))?;
+        }
+    }
+    Ok(Code::Done)
+}
+
+fn describe_table(table: &Table) -> String {
+    let rows: Vec<Vec<String>> = table
+        .columns
+        .iter()
+        .map(|c| {
+            let kind = format!("{:?}{}", c.column_type, if c.key { ", key" } else { "" }).to_lowercase();
+            vec![format!("  {}", c.name), kind, c.unit.to_owned(), c.description.to_owned()]
+        })
+        .collect();
+    format!("{}: {}\n{}", table.name, table.description, columns(&rows))
+}
+
+/// `completions`.
+pub fn completions(args: &Completions) -> Verdict {
+    clap_complete::generate(args.shell, &mut Arguments::command(), "sastrugi", &mut std::io::stdout());
+    Ok(Code::Done)
+}

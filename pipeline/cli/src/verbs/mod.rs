@@ -1,0 +1,62 @@
+//! One module per group of verbs: arguments in, a printed result and an exit code out.
+
+mod files;
+mod generate;
+mod lists;
+mod study;
+
+use crate::Verdict;
+use crate::args::{Arguments, Compress, Verb};
+use crate::failure::Failure;
+use sastrugi_stages::verbs::numbers;
+use sastrugi_store::dem::{Compression, WriteOptions};
+
+/// Does what was asked.
+pub fn dispatch(arguments: &Arguments) -> Verdict {
+    let common = &arguments.common;
+    match &arguments.verb {
+        Verb::Run(args) => study::run(args, common),
+        Verb::Plan(args) => study::plan(args, common),
+        Verb::Merge(args) => study::merge(args, common),
+        Verb::Verify(args) => study::verify(args, common),
+        Verb::Report(args) => study::report(args, common),
+        Verb::Traverse(args) => study::traverse(args, common),
+        Verb::Terrain(args) => generate::terrain(args, common),
+        Verb::Fit(args) => generate::fit(args, common),
+        Verb::Texture(args) => generate::texture(args, common),
+        Verb::Roughness(args) => generate::roughness(args, common),
+        Verb::Convert(args) => files::convert(args, common),
+        Verb::Info(args) => files::info(args, common),
+        Verb::Kinds(args) => lists::kinds(args, common),
+        Verb::Schema(args) => lists::schema(args, common),
+        Verb::Completions(args) => lists::completions(args),
+    }
+}
+
+/// Threads for kernels.
+pub fn start_threads(threads: Option<u16>) -> Result<(), Failure> {
+    let threads = usize::from(threads.unwrap_or(0));
+    rayon::ThreadPoolBuilder::new().num_threads(threads).build_global().map_err(Failure::failed)
+}
+
+/// How DEMs are written.
+fn options(compress: Compress) -> WriteOptions {
+    let compression = match compress {
+        Compress::None => Compression::None,
+        Compress::Deflate => Compression::Deflate,
+    };
+    WriteOptions { compression }
+}
+
+/// `--cell M` or `--cell X,Y`.
+fn cell(text: Option<&str>) -> Result<Option<[f64; 2]>, Failure> {
+    let Some(text) = text else { return Ok(None) };
+    let cell = match numbers::<1>("--cell", text) {
+        Ok([side]) => [side; 2],
+        Err(_) => numbers::<2>("--cell", text)?,
+    };
+    if cell.iter().all(|c| *c > 0.0) {
+        return Ok(Some(cell));
+    }
+    Err(Failure::usage(format!("`--cell {text}`: cell sizes must be above 0")))
+}

@@ -1,0 +1,155 @@
+//! Verbs on studies and releases.
+
+use crate::Verdict;
+use crate::args::{Common, Merge, Plan, Report, Run, Traverse, Verify};
+use crate::failure::{Code, Failure};
+use crate::output::{bytes, columns, print, seconds};
+use crate::progress::Teller;
+use sastrugi_stages::runner::execute::Limits;
+use sastrugi_stages::runner::shard::Part;
+use sastrugi_stages::studies::{self, Recompute, RunRequest, RunSummary};
+use sastrugi_stages::verbs::{parameters, traverse as drive};
+use serde_json::json;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// Working memory of the items at once where no option sets it, GiB.
+const MEMORY_GIB: f64 = 4.0;
+/// Most lines of a plan for people.
+const PLAN_LINES: usize = 40;
+
+fn limits(memory_gib: f64) -> Result<Limits, Failure> {
+    if !(memory_gib.is_finite() && memory_gib > 0.0) {
+        return Err(Failure::usage(format!("`--memory {memory_gib}`: it must be above 0")));
+    }
+    Ok(Limits { workers: rayon::current_num_threads(), memory_bytes: (memory_gib * 1024.0 * 1024.0 * 1024.0) as u64 })
+}
+
+/// `run`.
+pub fn run(args: &Run, common: &Common) -> Verdict {
+    let part = args.shard.as_deref().map(Part::parse).transpose()?;
+    let limits = limits(args.memory)?;
+    let loaded = studies::load(&args.study)?;
+    let request = RunRequest { output: &args.place.output, work: args.place.work.as_deref(), part, limits };
+    finish_run(common, |teller| Ok(studies::run(&loaded, &request, teller)?))
+}
+
+/// `merge`.
+pub fn merge(args: &Merge, common: &Common) -> Verdict {
+    finish_run(common, |teller| Ok(studies::merge(&args.shards, &args.output, teller)?))
+}
+
+/// `traverse`.
+pub fn traverse(args: &Traverse, common: &Common) -> Verdict {
+    let mut missions = json!({ "count": args.missions });
+    parameters::assign(&mut missions, &args.set_missions)?;
+    let mut parameters = json!({ "vehicle": args.vehicle });
+    parameters::assign(&mut parameters, &args.set)?;
+    let request = drive::Request { dem: &args.dem, seed: args.seed, missions, parameters, date: &args.date };
+    let limits = limits(MEMORY_GIB)?;
+    let run = RunRequest { output: &args.place.output, work: args.place.work.as_deref(), part: None, limits };
+    finish_run(common, |teller| Ok(drive::traverse(&request, &run, teller)?))
+}
+
+/// Runs, says what it came to, and gives the exit code.
+fn finish_run(common: &Common, run: impl FnOnce(&Teller) -> Result<RunSummary, Failure>) -> Verdict {
+    let teller = Teller::new(common.quiet);
+    let start = Instant::now();
+    let summary = run(&teller);
+    teller.close();
+    let summary = summary?;
+    let took = seconds(start.elapsed().as_secs_f64());
+    let failed = summary.failures.len();
+    let mut text = format!(
+        "{}: {} items, {} computed, {failed} failed, {took}",
+        summary.output.display(),
+        summary.items,
+        summary.computed
+    );
+    if failed > 0 {
+        text.push_str("\nfailed items are listed with their parameters in manifest.json:");
+        summary.failures.iter().for_each(|f| text.push_str(&format!("\n  {}: {}", f.item, f.message)));
+    }
+    print(common.json, &serde_json::to_value(&summary).map_err(Failure::failed)?, &text)?;
+    Ok(if failed > 0 { Code::Partial } else { Code::Done })
+}
+
+/// `plan`.
+pub fn plan(args: &Plan, common: &Common) -> Verdict {
+    let loaded = studies::load(&args.study)?;
+    let plan = studies::plan_of(&loaded, &args.place.output, args.place.work.as_deref())?;
+    let total_seconds: f64 = plan.stale.iter().map(|s| s.seconds).sum();
+    let total_bytes: f64 = plan.stale.iter().map(|s| s.bytes).sum();
+    let mut text = format!(
+        "{} items, {} ready, {} to compute: about {} on one core, about {} of artifacts",
+        plan.items,
+        plan.ready,
+        plan.stale.len(),
+        seconds(total_seconds),
+        bytes(total_bytes)
+    );
+    let shown = plan.stale.iter().take(PLAN_LINES);
+    let rows: Vec<Vec<String>> =
+        shown.map(|s| vec![format!("  {}", s.item), seconds(s.seconds), s.reason.clone()]).collect();
+    text.push('\n');
+    text.push_str(&columns(&rows));
+    if plan.stale.len() > PLAN_LINES {
+        text.push_str(&format!("\n  and {} more (all of them with --json)", plan.stale.len() - PLAN_LINES));
+    }
+    print(common.json, &serde_json::to_value(&plan).map_err(Failure::failed)?, &text)?;
+    Ok(Code::Done)
+}
+
+/// `verify`.
+pub fn verify(args: &Verify, common: &Common) -> Verdict {
+    let recompute = args.recompute.as_deref().map(parse_recompute).transpose()?;
+    let teller = Teller::new(common.quiet);
+    let verification = studies::verify(&args.release, recompute, limits(MEMORY_GIB)?, &teller);
+    teller.close();
+    let verification = verification?;
+    let mut text = format!("{} files, {} checked", verification.files, bytes(verification.bytes as f64));
+    if !verification.recomputed.is_empty() {
+        text.push_str(&format!(", {} items computed again", verification.recomputed.len()));
+    }
+    match verification.differences.len() {
+        0 => text.push_str(": all as they should be"),
+        n => text.push_str(&format!(": {n} differences")),
+    }
+    verification.differences.iter().for_each(|d| text.push_str(&format!("\n  {}: {}", d.path, d.problem)));
+    if let Some(why) = &verification.not_comparable {
+        text.push_str(&format!("\n{why}; `sastrugi compare` will tell whether the numbers agree"));
+    }
+    print(common.json, &serde_json::to_value(&verification).map_err(Failure::failed)?, &text)?;
+    Ok(if verification.differences.is_empty() { Code::Done } else { Code::Difference })
+}
+
+fn parse_recompute(text: &str) -> Result<Recompute, Failure> {
+    match (text, text.parse::<usize>()) {
+        ("all", _) => Ok(Recompute::All),
+        (_, Ok(count)) if count > 0 => Ok(Recompute::Some(count)),
+        _ => Err(Failure::usage(format!("`--recompute {text}`: it takes `all` or a number of items"))),
+    }
+}
+
+/// `report`.
+pub fn report(args: &Report, common: &Common) -> Verdict {
+    let output = args.output.clone().unwrap_or_else(|| default_report(&args.release));
+    let inside = |p: &Path| std::path::absolute(p).unwrap_or_else(|_| p.to_owned());
+    if inside(&output).starts_with(inside(&args.release)) {
+        let message = "the report cannot go into the release, which is sealed; name a folder beside it with -o";
+        return Err(Failure::usage(message));
+    }
+    let teller = Teller::new(common.quiet);
+    let summary = sastrugi_report::render(&args.release, &output, &|phase| teller.say(phase));
+    let summary = summary.map_err(|e| if e.unusable_input() { Failure::input(e) } else { Failure::failed(e) })?;
+    let page = output.join("index.html");
+    let text = format!("{}: {} files", page.display(), summary.files.len());
+    print(common.json, &json!({ "page": page, "files": summary.files }), &text)?;
+    Ok(Code::Done)
+}
+
+fn default_report(release: &Path) -> PathBuf {
+    let absolute = std::path::absolute(release).unwrap_or_else(|_| release.to_owned());
+    let name = absolute.file_name().map_or_else(|| "release".into(), |n| n.to_string_lossy().into_owned());
+    PathBuf::from(format!("{name}-report"))
+}

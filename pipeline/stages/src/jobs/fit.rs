@@ -1,0 +1,165 @@
+//! Stage `fit`: the covariance of a measured DEM.
+
+use super::dem::{HEIGHTS, input_error};
+use super::{Estimate, ItemRef, Job, JobError, Outcome, Product, Rows, Work};
+use crate::registry::{BuildError, Builder, unknown_id};
+use crate::revision::Room;
+use crate::runner::graph::Node;
+use sastrugi_schemas::Kind;
+use sastrugi_schemas::fit::{FitFile, Source};
+use sastrugi_schemas::kind::{read_parameters, schema_of};
+use sastrugi_schemas::study::FitItem;
+use sastrugi_schemas::tables::{CovarianceRow, FitRow};
+use sastrugi_store::{atomic, dem, digest};
+use sastrugi_texture::{FitParameters, FitSettings};
+use serde_json::{Value, json};
+
+/// Name of the stage.
+pub const STAGE: &str = "fit";
+/// Fit file.
+pub const FIT: &str = "fit.json";
+const BACKGROUND: &str = "background.tif";
+const RESIDUAL: &str = "residual.tif";
+
+/// The one kind of fit.
+pub fn kinds() -> Vec<Kind> {
+    vec![Kind {
+        family: "fit",
+        kind: "covariance",
+        summary: "moving-average background, outliers, exact masked covariance, fitted model",
+        source: "Vecherin et al., 2022, section 2; corrections in docs/papers/vecherin.md",
+        parameters: schema_of::<FitParameters>(),
+    }]
+}
+
+struct FitJob {
+    id: String,
+    dem_id: String,
+    dem: ItemRef,
+    source: Source,
+    settings: FitSettings,
+}
+
+/// Adds the items of `[[fit]]`.
+///
+/// # Errors
+/// A wrong item.
+pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
+    for entry in builder.study.entries(STAGE)? {
+        let (item, params): (FitItem, Value) = entry.read()?;
+        entry.check_keys::<FitItem>(&params, &schema_of::<FitParameters>())?;
+        let Some(field) = builder.heightfields.get(&item.dem).cloned() else {
+            return Err(unknown_id(&entry, "dem", &item.dem, builder.heightfields.keys()).into());
+        };
+        let source = builder.source_of(&item.dem, &field);
+        for one in entry.expand(&item.id, None, &item.sweep, &params)? {
+            builder.claim(&entry, STAGE, &one.id)?;
+            let raw: FitParameters = read_parameters(&one.params).map_err(|e| entry.refuse(e))?;
+            let settings = FitSettings::try_from(raw).map_err(|e| entry.refuse(e))?;
+            let job = FitJob {
+                id: one.id.clone(),
+                dem_id: item.dem.clone(),
+                dem: field.item.clone(),
+                source: source.clone(),
+                settings,
+            };
+            let item = ItemRef::new(STAGE, &one.id);
+            let node =
+                Node { item, parents: vec![field.item.clone()], inputs: Vec::new(), stream: None, job: Box::new(job) };
+            builder.node(&entry, node)?;
+            builder.fits.push(one.id);
+        }
+    }
+    Ok(())
+}
+
+impl Job for FitJob {
+    fn recipe(&self) -> Value {
+        json!({ "dem": self.dem_id, "source": self.source, "fit": self.settings.parameters() })
+    }
+
+    fn rooms(&self) -> &'static [Room] {
+        &[Room::Roughness, Room::Statistics, Room::Texture]
+    }
+
+    fn memory_bytes(&self) -> u64 {
+        1 << 30
+    }
+
+    fn estimate(&self) -> Estimate {
+        Estimate { seconds: 0.5, bytes: 1e6 }
+    }
+
+    fn run(&self, work: &Work<'_>) -> Result<Outcome, JobError> {
+        let read = dem::read(&work.parent(&self.dem, HEIGHTS)?).map_err(|e| input_error(&e))?;
+        let outcome = sastrugi_texture::fit(&read.grid, &self.settings).map_err(JobError::new)?;
+        let fit = FitFile { source: Some(self.source.clone()), ..outcome.fit };
+        atomic::write(&work.output(FIT), to_json(&fit)?.as_bytes()).map_err(JobError::new)?;
+        let id = &self.id;
+        let mut products = vec![Product::released(FIT, format!("fit/{id}.json"), None)];
+        for (file, grid) in [(BACKGROUND, &outcome.background), (RESIDUAL, &outcome.residual)] {
+            dem::write(&work.output(file), grid, &read.info.crs, &Default::default()).map_err(JobError::new)?;
+            products.push(Product::released(file, format!("fit/{id}.{file}"), Some(digest::heights(grid))));
+        }
+        let rows = Rows {
+            fits: vec![fit_row(id, &self.dem_id, &fit)],
+            covariance: covariance_rows(id, &fit),
+            ..Rows::default()
+        };
+        Ok(Outcome { products, rows, notes: fit.warnings })
+    }
+}
+
+/// A fit file's text.
+///
+/// # Errors
+/// When a figure has no JSON form (a bug).
+pub fn to_json(fit: &FitFile) -> Result<String, JobError> {
+    serde_json::to_string_pretty(fit).map(|text| text + "\n").map_err(JobError::new)
+}
+
+fn fit_row(id: &str, dem_id: &str, fit: &FitFile) -> FitRow {
+    let parameter = |name: &str| fit.parameters.get(name).copied().unwrap_or(f64::NAN);
+    let window = fit.window_m.unwrap_or([f64::NAN; 2]);
+    let (sigma, range) = (parameter("sigma_m"), parameter("range_m"));
+    let nugget = fit.parameters.get("nugget_m2").copied().unwrap_or(0.0);
+    FitRow {
+        fit_id: id.to_owned(),
+        dem_id: dem_id.to_owned(),
+        mode: fit.mode.clone(),
+        model: fit.model.clone(),
+        sigma_m: sigma,
+        range_m: range,
+        nugget_m2: nugget,
+        sigma2_over_range_m: sigma * sigma / range,
+        window_x_m: window[0],
+        window_y_m: window[1],
+        trim_level: fit.trim.map_or(0.0, |t| t.level),
+        trim_threshold_m: fit.trim.map_or(f64::NAN, |t| t.threshold_m),
+        used_share: fit.trim.map_or(f64::NAN, |t| 1.0 - t.masked_share),
+        misfit_m2: misfit(fit),
+        warnings: fit.warnings.join("; "),
+    }
+}
+
+/// Root mean square difference between bins and model.
+fn misfit(fit: &FitFile) -> f64 {
+    let squares: Vec<f64> =
+        fit.covariance_m2.iter().zip(&fit.model_m2).map(|(c, m)| (c - m) * (c - m)).filter(|s| s.is_finite()).collect();
+    sastrugi_numeric::sums::mean(&squares).sqrt()
+}
+
+fn covariance_rows(id: &str, fit: &FitFile) -> Vec<CovarianceRow> {
+    let at = |values: &[f64], bin: usize| values.get(bin).copied().unwrap_or(f64::NAN);
+    let row = |bin: usize| CovarianceRow {
+        fit_id: id.to_owned(),
+        bin: bin as i64,
+        lag_m: at(&fit.lags_m, bin),
+        azimuth_deg: None,
+        covariance_m2: at(&fit.covariance_m2, bin),
+        pairs: fit.pairs.get(bin).map_or(0, |&n| n as i64),
+        model_m2: at(&fit.model_m2, bin),
+        surface_model_m2: at(&fit.surface_model_m2, bin),
+    };
+    (0..fit.lags_m.len()).map(row).collect()
+}

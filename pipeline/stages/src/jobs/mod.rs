@@ -1,0 +1,163 @@
+//! Jobs: one file per stage, each the glue between a kernel and the files of an item.
+
+pub mod dem;
+pub mod fit;
+pub mod missions;
+pub mod roughness;
+pub mod terrain;
+pub mod texture;
+pub mod traverse;
+
+use crate::revision::Room;
+use sastrugi_schemas::tables::{CovarianceRow, FitRow, HeightDistributionRow, MissionRow, PsdRow, TerrainRow};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+/// Name of an item: its stage and its id.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub struct ItemRef {
+    /// Stage, as `terrain`.
+    pub stage: String,
+    /// Id, unique within the stage.
+    pub id: String,
+}
+
+impl ItemRef {
+    /// The item `id` of `stage`.
+    pub fn new(stage: &str, id: &str) -> Self {
+        Self { stage: stage.to_owned(), id: id.to_owned() }
+    }
+}
+
+impl fmt::Display for ItemRef {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}/{}", self.stage, self.id)
+    }
+}
+
+/// What one item of a study does. A job is glue: it reads the artifacts of its parents, calls a kernel, and writes files.
+pub trait Job: Send + Sync {
+    /// Everything in the study that decides the result, defaults filled in.
+    fn recipe(&self) -> Value;
+    /// Rooms whose code decides the result, besides the ones that every job stands on.
+    fn rooms(&self) -> &'static [Room];
+    /// Peak working memory, bytes.
+    fn memory_bytes(&self) -> u64;
+    /// Rough cost, for `plan` and the progress bar.
+    fn estimate(&self) -> Estimate;
+    /// Does the work.
+    ///
+    /// # Errors
+    /// Why this item has no result; the other items go on.
+    fn run(&self, work: &Work<'_>) -> Result<Outcome, JobError>;
+}
+
+/// Rough cost of an item on one core.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Estimate {
+    /// Time, s.
+    pub seconds: f64,
+    /// Bytes of its artifacts.
+    pub bytes: f64,
+}
+
+/// Where a job finds its inputs and leaves its outputs.
+pub struct Work<'a> {
+    /// Folder for the outputs.
+    pub folder: &'a Path,
+    /// Folders of the parents' artifacts.
+    pub parents: &'a BTreeMap<ItemRef, PathBuf>,
+}
+
+impl Work<'_> {
+    /// A file of a parent.
+    ///
+    /// # Errors
+    /// When the item is no parent (a bug in the stage's registration).
+    pub fn parent(&self, item: &ItemRef, file: &str) -> Result<PathBuf, JobError> {
+        let folder = self.parents.get(item).ok_or_else(|| JobError::new(format!("{item} is not a parent")))?;
+        Ok(folder.join(file))
+    }
+
+    /// Path of an output.
+    pub fn output(&self, file: &str) -> PathBuf {
+        self.folder.join(file)
+    }
+}
+
+/// What a job leaves behind.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct Outcome {
+    /// Files in the item's folder.
+    pub products: Vec<Product>,
+    /// Rows for the tables.
+    pub rows: Rows,
+    /// Sentences that a reader must know.
+    pub notes: Vec<String>,
+}
+
+/// One file that a job made.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Product {
+    /// Name in the item's folder.
+    pub file: String,
+    /// Path in the release; absent for files that serve later stages only.
+    pub release_path: Option<String>,
+    /// Hash of the decoded content (heights, rows, messages), where there is one.
+    pub content: Option<String>,
+}
+
+impl Product {
+    /// A file that goes into the release.
+    pub fn released(file: &str, release_path: String, content: Option<String>) -> Self {
+        Self { file: file.to_owned(), release_path: Some(release_path), content }
+    }
+
+    /// A file for later stages.
+    pub fn internal(file: &str) -> Self {
+        Self { file: file.to_owned(), release_path: None, content: None }
+    }
+}
+
+/// Rows of the release's tables.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Rows {
+    /// Table `terrains`.
+    pub terrains: Vec<TerrainRow>,
+    /// Table `fits`.
+    pub fits: Vec<FitRow>,
+    /// Table `covariance`.
+    pub covariance: Vec<CovarianceRow>,
+    /// Table `psd`.
+    pub psd: Vec<PsdRow>,
+    /// Table `height_distribution`.
+    pub height_distribution: Vec<HeightDistributionRow>,
+    /// Table `missions`.
+    pub missions: Vec<MissionRow>,
+}
+
+/// Why an item has no result.
+#[derive(Clone, Debug, thiserror::Error)]
+#[error("{message}")]
+pub struct JobError {
+    /// One sentence.
+    pub message: String,
+    /// The cause lies in input data rather than in the study or the machine.
+    pub unusable_input: bool,
+}
+
+impl JobError {
+    /// A failure with its reason.
+    pub fn new(message: impl fmt::Display) -> Self {
+        Self { message: message.to_string(), unusable_input: false }
+    }
+
+    /// A failure that lies in the input data.
+    pub fn input(message: impl fmt::Display) -> Self {
+        Self { message: message.to_string(), unusable_input: true }
+    }
+}

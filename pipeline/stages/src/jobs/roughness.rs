@@ -1,0 +1,154 @@
+//! Stage `roughness`: every heightfield of a study described and classified.
+
+use super::dem::{HEIGHTS, input_error};
+use super::{Estimate, ItemRef, Job, JobError, Outcome, Product, Rows, Work};
+use crate::registry::Heightfield;
+use crate::revision::Room;
+use sastrugi_numeric::Grid;
+use sastrugi_roughness::{ClassThresholds, DescribeSettings, Summary, classify, close_disk, describe, moore_gradient};
+use sastrugi_schemas::study::RoughnessSection;
+use sastrugi_schemas::tables::{HeightDistributionRow, PsdRow, TerrainRow};
+use sastrugi_store::{dem, digest};
+use serde_json::{Value, json};
+
+/// Name of the stage.
+pub const STAGE: &str = "roughness";
+/// Class map, closed.
+pub const CLASSES: &str = "classes.tif";
+/// Class map before closing.
+pub const CLASSES_RAW: &str = "classes.raw.tif";
+
+/// Describes one heightfield.
+pub struct RoughnessJob {
+    id: String,
+    field: Heightfield,
+    section: RoughnessSection,
+}
+
+impl RoughnessJob {
+    /// The job for the heightfield `id`.
+    pub fn new(id: &str, field: &Heightfield, section: &RoughnessSection) -> Self {
+        Self { id: id.to_owned(), field: field.clone(), section: section.clone() }
+    }
+
+    fn terrain_row(&self, grid: &Grid, summary: &Summary) -> TerrainRow {
+        let heights = &summary.heights;
+        TerrainRow {
+            terrain_id: self.id.clone(),
+            group: self.field.group.clone(),
+            stage: self.field.item.stage.clone(),
+            kind: self.field.kind.clone(),
+            params: self.field.parameters.to_string(),
+            rows: grid.rows() as i64,
+            cols: grid.cols() as i64,
+            cell_x_m: grid.geometry.cell[0],
+            cell_y_m: grid.geometry.cell[1],
+            valid_share: summary.valid_share,
+            height_min_m: heights.min_m,
+            height_max_m: heights.max_m,
+            relief_m: heights.relief_m,
+            rms_height_m: heights.rms_m,
+            skewness: heights.skewness,
+            kurtosis: heights.kurtosis,
+            rms_slope: summary.rms_slope,
+            band_rms_m: summary.band_rms_m,
+            band_window_m: summary.band_window_m,
+            share_low: summary.shares.low,
+            share_semi: summary.shares.semi,
+            share_high: summary.shares.high,
+            share_border_m: summary.share_border_m,
+            psd_slope: summary.psd_slope,
+            stream: self.field.stream.clone(),
+            path: self.field.release_path.clone(),
+        }
+    }
+
+    fn psd_rows(&self, summary: &Summary) -> Vec<PsdRow> {
+        let row = |(bin, b): (usize, &sastrugi_roughness::SpectrumBin)| PsdRow {
+            terrain_id: self.id.clone(),
+            bin: bin as i64,
+            frequency_cycles_m: b.frequency_cycles_m,
+            psd_m4: b.psd_m4,
+            modes: b.modes as i64,
+        };
+        summary.spectrum.iter().enumerate().map(row).collect()
+    }
+
+    fn height_rows(&self, summary: &Summary) -> Vec<HeightDistributionRow> {
+        let row = |(bin, b): (usize, &sastrugi_roughness::HistogramBin)| HeightDistributionRow {
+            terrain_id: self.id.clone(),
+            bin: bin as i64,
+            low_m: b.low_m,
+            high_m: b.high_m,
+            cells: b.cells as i64,
+            density_per_m: b.density_per_m,
+        };
+        summary.histogram.iter().enumerate().map(row).collect()
+    }
+}
+
+/// Settings of the kernel.
+///
+/// # Errors
+/// Thresholds that do not increase.
+pub fn settings(section: &RoughnessSection) -> Result<DescribeSettings, JobError> {
+    let thresholds = ClassThresholds::new(section.low_max, section.semi_max).map_err(JobError::new)?;
+    Ok(DescribeSettings {
+        thresholds,
+        border_m: section.border_m,
+        band_window_m: section.band_window_m,
+        ..DescribeSettings::default()
+    })
+}
+
+impl Job for RoughnessJob {
+    fn recipe(&self) -> Value {
+        json!({
+            "section": self.section,
+            "group": self.field.group,
+            "kind": self.field.kind,
+            "params": self.field.parameters,
+            "path": self.field.release_path,
+        })
+    }
+
+    fn rooms(&self) -> &'static [Room] {
+        &[Room::Roughness]
+    }
+
+    fn memory_bytes(&self) -> u64 {
+        // A spectrum, a gradient and a distance map of a raster of a few million cells.
+        512 << 20
+    }
+
+    fn estimate(&self) -> Estimate {
+        Estimate { seconds: 0.3, bytes: 300e3 }
+    }
+
+    fn run(&self, work: &Work<'_>) -> Result<Outcome, JobError> {
+        let read = dem::read(&work.parent(&self.field.item, HEIGHTS)?).map_err(|e| input_error(&e))?;
+        let settings = settings(&self.section)?;
+        let summary = describe(&read.grid, &settings);
+        let raw = classify(&moore_gradient(&read.grid), &settings.thresholds);
+        let closed = close_disk(&raw, self.section.closing_radius_m);
+        dem::write_classes(&work.output(CLASSES), &closed, &read.info.crs).map_err(JobError::new)?;
+        dem::write_classes(&work.output(CLASSES_RAW), &raw, &read.info.crs).map_err(JobError::new)?;
+        let id = &self.id;
+        let products = vec![
+            Product::released(CLASSES, format!("classes/{id}.tif"), Some(digest::classes(&closed))),
+            Product::released(CLASSES_RAW, format!("classes/{id}.raw.tif"), Some(digest::classes(&raw))),
+        ];
+        let rows = Rows {
+            terrains: vec![self.terrain_row(&read.grid, &summary)],
+            psd: self.psd_rows(&summary),
+            height_distribution: self.height_rows(&summary),
+            ..Rows::default()
+        };
+        Ok(Outcome { products, rows, notes: Vec::new() })
+    }
+}
+
+/// The item that describes a heightfield.
+pub fn item(id: &str) -> ItemRef {
+    ItemRef::new(STAGE, id)
+}

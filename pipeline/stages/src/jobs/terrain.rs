@@ -1,0 +1,129 @@
+//! Stage `terrain`: one generated heightfield.
+
+use super::dem::HEIGHTS;
+use super::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work};
+use crate::registry::{BuildError, Builder, Heightfield};
+use crate::revision::Room;
+use crate::runner::graph::Node;
+use sastrugi_numeric::{Grid, Streams};
+use sastrugi_schemas::study::TerrainItem;
+use sastrugi_store::dem::{self, Crs};
+use sastrugi_store::digest;
+use sastrugi_terrain::Generator;
+use serde_json::{Value, json};
+
+/// Name of the stage.
+pub const STAGE: &str = "terrain";
+
+struct TerrainJob {
+    id: String,
+    generator: Box<dyn Generator>,
+    streams: Streams,
+    png16: bool,
+}
+
+/// Adds the items of `[[terrain]]`.
+///
+/// # Errors
+/// A wrong item.
+pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
+    let kinds = sastrugi_terrain::kinds();
+    for entry in builder.study.entries(STAGE)? {
+        let (item, params): (TerrainItem, Value) = entry.read()?;
+        if let Some(kind) = kinds.iter().find(|k| k.kind == item.kind) {
+            entry.check_keys::<TerrainItem>(&params, &kind.parameters)?;
+        }
+        let expanded = entry.expand(&item.id, item.count, &item.sweep, &params)?;
+        let ids = expanded.iter().map(|e| e.id.clone()).collect();
+        for one in expanded {
+            builder.claim(&entry, STAGE, &one.id)?;
+            let generator = sastrugi_terrain::prepare(&item.kind, &one.params).map_err(|e| entry.refuse(e))?;
+            let streams = builder.streams(STAGE, &one.id, item.seed, one.replicate);
+            let field = Heightfield {
+                item: ItemRef::new(STAGE, &one.id),
+                group: item.group.clone().or(one.sweep_group),
+                kind: item.kind.clone(),
+                parameters: generator.parameters(),
+                stream: Some(streams.label()),
+                release_path: format!("terrain/{}.tif", one.id),
+            };
+            let job = TerrainJob { id: one.id.clone(), generator, streams, png16: item.png16 };
+            let node = Node {
+                item: field.item.clone(),
+                parents: Vec::new(),
+                inputs: Vec::new(),
+                stream: field.stream.clone(),
+                job: Box::new(job),
+            };
+            builder.node(&entry, node)?;
+            builder.heightfield(&entry, &one.id, field)?;
+        }
+        builder.families.insert(item.id, ids);
+    }
+    Ok(())
+}
+
+impl Job for TerrainJob {
+    fn recipe(&self) -> Value {
+        json!({ "kind": self.generator.kind(), "params": self.generator.parameters(), "png16": self.png16 })
+    }
+
+    fn rooms(&self) -> &'static [Room] {
+        &[Room::Roughness, Room::Terrain]
+    }
+
+    fn memory_bytes(&self) -> u64 {
+        self.generator.memory_bytes()
+    }
+
+    fn estimate(&self) -> Estimate {
+        let cells = self.generator.geometry().len() as f64;
+        Estimate { seconds: 4e-7 * cells, bytes: 3.0 * cells }
+    }
+
+    fn run(&self, work: &Work<'_>) -> Result<Outcome, JobError> {
+        let heights = generate(self.generator.as_ref(), &self.streams)?;
+        dem::write(&work.output(HEIGHTS), &heights, &Crs::default(), &Default::default()).map_err(JobError::new)?;
+        let id = &self.id;
+        let content = digest::heights(&heights);
+        let mut products = vec![Product::released(HEIGHTS, format!("terrain/{id}.tif"), Some(content))];
+        let mut notes = self.generator.notes();
+        if self.png16 {
+            let note = write_png16(self.generator.as_ref(), &heights, &work.output("heights.png"))?;
+            products.push(Product::released("heights.png", format!("terrain/{id}.png"), None));
+            notes.push(note);
+        }
+        Ok(Outcome { products, notes, ..Outcome::default() })
+    }
+}
+
+/// A generator's heights, checked.
+///
+/// # Errors
+/// When the generator has no result, or one that is not finite everywhere (a bug).
+pub fn generate(generator: &dyn Generator, streams: &Streams) -> Result<Grid, JobError> {
+    let heights = generator.generate(streams).map_err(|e| JobError::new(format!("failed to {e}")))?;
+    if heights.finite_count() != heights.values.len() {
+        return Err(JobError::new("internal error: the generator left cells without a finite height"));
+    }
+    Ok(heights)
+}
+
+/// Writes heights as 16-bit levels: the generator's own where it has them, else from lowest to highest. Returns how to read
+/// them.
+///
+/// # Errors
+/// When the file cannot be written.
+pub fn write_png16(generator: &dyn Generator, heights: &Grid, path: &std::path::Path) -> Result<String, JobError> {
+    let Some(levels) = generator.levels(heights) else {
+        return dem::write_png_heights(path, heights).map(|scale| scale.sentence()).map_err(JobError::new);
+    };
+    dem::write_png16(path, &levels.grid).map_err(JobError::new)?;
+    Ok(format!(
+        "16-bit PNG: height_m = (level - {}) * {:e}; {} x {} posts",
+        levels.zero_level,
+        levels.metres_per_level,
+        levels.grid.rows(),
+        levels.grid.cols()
+    ))
+}

@@ -1,0 +1,197 @@
+//! From results to a sealed release: artifacts, tables, documents, report, checksums, one rename.
+//!
+//! Records are read one at a time, in order of their ids, so that memory does not grow with the number of items.
+
+use super::cache::{Record, load_record};
+use super::execute::Failure;
+use super::progress::Progress;
+use crate::error::Error;
+use crate::jobs::{ItemRef, Rows, roughness, traverse};
+use sastrugi_schemas::Record as Row;
+use sastrugi_schemas::manifest::{FailedItem, Origin};
+use sastrugi_schemas::study::StudyHead;
+use sastrugi_schemas::tables::SampleRow;
+use sastrugi_store::release::{Head, Release, ReleaseBuilder, ReleaseError};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// What goes into a release.
+pub struct Contents<'a> {
+    /// The study's head.
+    pub head: &'a StudyHead,
+    /// The study as it is released.
+    pub study: &'a str,
+    /// Every item, with the folder of its result.
+    pub items: Vec<(ItemRef, Option<PathBuf>)>,
+    /// Items without a result.
+    pub failures: &'a [Failure],
+}
+
+/// Assembles and seals a release.
+///
+/// # Errors
+/// A destination that is not ours, results that cannot be read, or a file system that refuses.
+pub fn assemble(mut contents: Contents<'_>, dest: &Path, progress: &dyn Progress) -> Result<Release, Error> {
+    contents.items.sort();
+    let head = Head {
+        name: contents.head.name.clone(),
+        study_sha256: sastrugi_store::digest::of_text(contents.study),
+        seed: contents.head.seed,
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        license: contents.head.license.clone(),
+    };
+    let mut builder = ReleaseBuilder::beside(dest, head).map_err(release_error)?;
+    progress.phase("assembling artifacts");
+    add_artifacts(&mut builder, &contents)?;
+    progress.phase("writing tables");
+    add_tables(&mut builder, &contents)?;
+    add_documents(&mut builder, &contents)?;
+    progress.phase("writing the report");
+    add_report(&mut builder)?;
+    progress.phase("writing checksums");
+    builder.seal(dest).map_err(release_error)
+}
+
+/// A store error as the caller should see it.
+pub fn release_error(error: ReleaseError) -> Error {
+    match error {
+        ReleaseError::Occupied { .. } => Error::Usage(error.to_string()),
+        _ if error.unusable_input() => Error::Input(error.to_string()),
+        _ => Error::Failed(error.to_string()),
+    }
+}
+
+impl Contents<'_> {
+    /// Results of one stage, in order of their ids.
+    fn results<'s>(&'s self, stage: &'s str) -> impl Iterator<Item = (&'s ItemRef, &'s PathBuf)> {
+        let of_stage = move |(item, _): &&(ItemRef, Option<PathBuf>)| item.stage == stage;
+        self.items.iter().filter(of_stage).filter_map(|(item, folder)| Some((item, folder.as_ref()?)))
+    }
+}
+
+fn record(folder: &Path) -> Result<Record, Error> {
+    load_record(folder)
+        .ok_or_else(|| Error::Failed(format!("{}: the result was changed while it was used", folder.display())))
+}
+
+fn add_artifacts(builder: &mut ReleaseBuilder, contents: &Contents<'_>) -> Result<(), Error> {
+    for (_, folder) in contents.items.iter() {
+        let Some(folder) = folder else { continue };
+        let record = record(folder)?;
+        for file in &record.files {
+            let Some(path) = &file.product.release_path else { continue };
+            let origin = Origin {
+                stage: record.item.stage.clone(),
+                item: record.item.id.clone(),
+                content_sha256: file.product.content.clone(),
+                records: None,
+                parents: record.ingredients.parents.keys().cloned().collect(),
+                stream: record.ingredients.stream.clone(),
+            };
+            builder.add_file(path, &folder.join(&file.product.file), origin).map_err(release_error)?;
+        }
+    }
+    for failure in contents.failures {
+        builder.failed(FailedItem {
+            stage: failure.item.stage.clone(),
+            item: failure.item.id.clone(),
+            error: failure.message.clone(),
+            parameters: failure.parameters.clone(),
+        });
+    }
+    Ok(())
+}
+
+fn add_tables(builder: &mut ReleaseBuilder, contents: &Contents<'_>) -> Result<(), Error> {
+    add_table(builder, contents, roughness::STAGE, |rows| rows.terrains)?;
+    add_table(builder, contents, roughness::STAGE, |rows| rows.psd)?;
+    add_table(builder, contents, roughness::STAGE, |rows| rows.height_distribution)?;
+    add_table(builder, contents, crate::jobs::fit::STAGE, |rows| rows.fits)?;
+    add_table(builder, contents, crate::jobs::fit::STAGE, |rows| rows.covariance)?;
+    add_missions(builder, contents)
+}
+
+/// One table, its rows taken item by item; the ids of items are the rows' first key.
+fn add_table<R: Row>(
+    builder: &mut ReleaseBuilder,
+    contents: &Contents<'_>,
+    stage: &str,
+    take: impl Fn(Rows) -> Vec<R>,
+) -> Result<(), Error> {
+    let mut trouble = None;
+    let rows = contents.results(stage).map_while(|(_, folder)| match record(folder) {
+        Ok(record) => Some(take(record.rows)),
+        Err(error) => {
+            trouble = Some(error);
+            None
+        }
+    });
+    let written = builder.write_table("0000", rows.flatten(), made_by(stage));
+    match trouble {
+        Some(error) => Err(error),
+        None => written.map_err(release_error),
+    }
+}
+
+fn made_by(stage: &str) -> Origin {
+    Origin { stage: stage.to_owned(), ..Origin::default() }
+}
+
+/// `missions` and `samples`: all runs on one terrain together, sorted by mission.
+fn add_missions(builder: &mut ReleaseBuilder, contents: &Contents<'_>) -> Result<(), Error> {
+    let mut by_terrain: BTreeMap<String, Vec<&PathBuf>> = BTreeMap::new();
+    for (item, folder) in contents.results(traverse::STAGE) {
+        by_terrain.entry(traverse::terrain_of(&item.id).to_owned()).or_default().push(folder);
+    }
+    let mut missions = Vec::new();
+    for (terrain, folders) in &by_terrain {
+        let mut samples: Vec<SampleRow> = Vec::new();
+        for folder in folders {
+            missions.extend(record(folder)?.rows.missions);
+            let path = folder.join(traverse::SAMPLES);
+            samples.extend(sastrugi_store::parquet::read_table::<SampleRow>(&path).map_err(Error::failed)?);
+        }
+        samples.sort_by(|a, b| (&a.mission_id, a.sample).cmp(&(&b.mission_id, b.sample)));
+        builder.write_table(terrain, samples, made_by(traverse::STAGE)).map_err(release_error)?;
+    }
+    missions.sort_by(|a, b| (&a.terrain_id, &a.mission_id).cmp(&(&b.terrain_id, &b.mission_id)));
+    builder.write_table("0000", missions, made_by(traverse::STAGE)).map_err(release_error)
+}
+
+fn add_documents(builder: &mut ReleaseBuilder, contents: &Contents<'_>) -> Result<(), Error> {
+    let documents = [
+        ("study.toml", contents.study.to_owned()),
+        ("README.md", super::documents::readme(contents)),
+        ("CITATION.cff", super::documents::citation(contents.head)),
+        ("LICENSE", super::documents::license(contents.head)),
+    ];
+    for (path, text) in documents {
+        builder.write_text(path, &text, Origin::default()).map_err(release_error)?;
+    }
+    Ok(())
+}
+
+fn add_report(builder: &mut ReleaseBuilder) -> Result<(), Error> {
+    let staging = builder.staging().to_owned();
+    sastrugi_report::render(&staging, &staging.join("report"), &|_| {}).map_err(Error::failed)?;
+    for path in files_below(&staging, Path::new("report"))? {
+        builder.adopt(&path, Origin { stage: "report".to_owned(), ..Origin::default() }).map_err(release_error)?;
+    }
+    Ok(())
+}
+
+/// Paths of all files below a folder of `root`, sorted, relative to it.
+fn files_below(root: &Path, folder: &Path) -> Result<Vec<String>, Error> {
+    let mut paths = Vec::new();
+    for entry in std::fs::read_dir(root.join(folder)).map_err(Error::failed)? {
+        let entry = entry.map_err(Error::failed)?;
+        let path = folder.join(entry.file_name());
+        if entry.path().is_dir() {
+            paths.extend(files_below(root, &path)?);
+        } else {
+            paths.push(path.to_string_lossy().into_owned());
+        }
+    }
+    paths.sort();
+    Ok(paths)
+}

@@ -1,0 +1,220 @@
+//! The work area: finished items by key, each in a folder that appears whole or not at all.
+//!
+//! `items/<stage>/<id>/<key>/` holds an item's files and `record.json`. A job writes into a folder with a name that no
+//! reader takes for a result; every file is flushed as it is written, the record comes last, then one rename makes it a
+//! result.
+
+use super::graph::{Graph, Ingredients};
+use crate::jobs::{ItemRef, Outcome, Product, Rows};
+use sastrugi_store::{atomic, digest};
+use serde::{Deserialize, Serialize};
+use std::fs::{self, File, TryLockError};
+use std::io;
+use std::path::{Path, PathBuf};
+
+const RECORD: &str = "record.json";
+const UNFINISHED: &str = "unfinished-";
+
+/// A finished item.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Record {
+    /// Its name.
+    pub item: ItemRef,
+    /// Its key.
+    pub key: String,
+    /// What the key is made of.
+    pub ingredients: Ingredients,
+    /// Its files.
+    pub files: Vec<StoredFile>,
+    /// Rows for the tables.
+    pub rows: Rows,
+    /// Sentences that a reader must know.
+    pub notes: Vec<String>,
+}
+
+/// A file of a finished item.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct StoredFile {
+    /// What it is.
+    #[serde(flatten)]
+    pub product: Product,
+    /// Length, bytes.
+    pub bytes: u64,
+    /// SHA-256 of the bytes.
+    pub sha256: String,
+}
+
+/// Why the work area cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum CacheError {
+    /// Another run holds it.
+    #[error("another run is using {0}; wait for it, or name another work area with --work")]
+    Busy(PathBuf),
+    /// The file system refused.
+    #[error("{action} {path}: {source}")]
+    Io {
+        /// What was tried.
+        action: &'static str,
+        /// Where.
+        path: PathBuf,
+        /// Why not.
+        source: io::Error,
+    },
+}
+
+fn io_error<'a>(action: &'static str, path: &'a Path) -> impl FnOnce(io::Error) -> CacheError + 'a {
+    move |source| CacheError::Io { action, path: path.to_owned(), source }
+}
+
+/// An open work area; one process at a time.
+#[derive(Debug)]
+pub struct Cache {
+    folder: PathBuf,
+    _lock: File,
+}
+
+impl Cache {
+    /// Opens or makes a work area, takes its lock, and clears what killed runs left unfinished.
+    ///
+    /// # Errors
+    /// When another run holds it, or the file system refuses.
+    pub fn open(folder: &Path) -> Result<Self, CacheError> {
+        fs::create_dir_all(folder).map_err(io_error("cannot make the work area", folder))?;
+        let path = folder.join("lock");
+        let lock = File::create(&path).map_err(io_error("cannot write", &path))?;
+        match lock.try_lock() {
+            Ok(()) => {}
+            Err(TryLockError::WouldBlock) => return Err(CacheError::Busy(folder.to_owned())),
+            Err(TryLockError::Error(e)) => return Err(io_error("cannot lock", &path)(e)),
+        }
+        let cache = Self { folder: folder.to_owned(), _lock: lock };
+        cache.for_each_result(
+            |path, name| if name.starts_with(UNFINISHED) { fs::remove_dir_all(path) } else { Ok(()) },
+        )?;
+        Ok(cache)
+    }
+
+    /// The work area's folder.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    fn item_folder(&self, item: &ItemRef) -> PathBuf {
+        self.folder.join("items").join(&item.stage).join(&item.id)
+    }
+
+    /// Folder of a result.
+    pub fn result_folder(&self, item: &ItemRef, key: &str) -> PathBuf {
+        self.item_folder(item).join(key)
+    }
+
+    /// The record of a result, if it is there and its files have their lengths.
+    pub fn load(&self, item: &ItemRef, key: &str) -> Option<Record> {
+        load_record(&self.result_folder(item, key))
+    }
+
+    /// The ingredients of any earlier result of this item.
+    pub fn earlier(&self, item: &ItemRef) -> Option<Ingredients> {
+        let mut folders: Vec<PathBuf> =
+            fs::read_dir(self.item_folder(item)).ok()?.flatten().map(|e| e.path()).collect();
+        folders.sort();
+        folders.iter().find_map(|folder| load_record(folder)).map(|record| record.ingredients)
+    }
+
+    /// A fresh folder for a job to write into.
+    ///
+    /// # Errors
+    /// When the file system refuses.
+    pub fn begin(&self, item: &ItemRef, key: &str) -> Result<PathBuf, CacheError> {
+        let folder = self.item_folder(item).join(format!("{UNFINISHED}{key}"));
+        if folder.exists() {
+            fs::remove_dir_all(&folder).map_err(io_error("cannot clear", &folder))?;
+        }
+        fs::create_dir_all(&folder).map_err(io_error("cannot make", &folder))?;
+        Ok(folder)
+    }
+
+    /// Makes a job's folder a result.
+    ///
+    /// # Errors
+    /// When a product is missing, or the file system refuses.
+    pub fn finish(
+        &self,
+        graph: &Graph,
+        position: usize,
+        folder: &Path,
+        outcome: Outcome,
+    ) -> Result<Record, CacheError> {
+        let item = graph.node(position).item.clone();
+        let key = graph.key(position).to_owned();
+        let files = outcome.products.into_iter().map(|p| stored(folder, p)).collect::<Result<Vec<_>, _>>()?;
+        let ingredients = graph.ingredients(position).clone();
+        let record = Record { item, key, ingredients, files, rows: outcome.rows, notes: outcome.notes };
+        let path = folder.join(RECORD);
+        let text = serde_json::to_vec(&record).map_err(|e| io_error("cannot encode", &path)(e.into()))?;
+        atomic::write(&path, &text).map_err(io_error("cannot write", &path))?;
+        let target = self.result_folder(&record.item, &record.key);
+        if target.exists() {
+            fs::remove_dir_all(&target).map_err(io_error("cannot clear", &target))?;
+        }
+        let parent = self.item_folder(&record.item);
+        fs::rename(folder, &target).map_err(io_error("cannot rename to", &target))?;
+        atomic::sync_folder(&parent).map_err(io_error("cannot flush", &parent))?;
+        Ok(record)
+    }
+
+    /// Drops every result that no item of the graph has.
+    ///
+    /// # Errors
+    /// When the file system refuses.
+    pub fn drop_orphans(&self, graph: &Graph) -> Result<usize, CacheError> {
+        let keys: std::collections::BTreeSet<PathBuf> =
+            (0..graph.len()).map(|p| self.result_folder(&graph.node(p).item, graph.key(p))).collect();
+        let mut dropped = 0;
+        self.for_each_result(|path, _| {
+            if keys.contains(path) {
+                return Ok(());
+            }
+            dropped += 1;
+            fs::remove_dir_all(path)
+        })?;
+        Ok(dropped)
+    }
+
+    fn for_each_result(&self, mut f: impl FnMut(&Path, &str) -> io::Result<()>) -> Result<(), CacheError> {
+        for stage in children(&self.folder.join("items"))? {
+            for item in children(&stage)? {
+                for result in children(&item)? {
+                    let name = result.file_name().unwrap_or_default().to_string_lossy().into_owned();
+                    f(&result, &name).map_err(io_error("cannot remove", &result))?;
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Folders below a folder, sorted; none when it is not there.
+fn children(folder: &Path) -> Result<Vec<PathBuf>, CacheError> {
+    let entries = match fs::read_dir(folder) {
+        Ok(entries) => entries,
+        Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
+        Err(e) => return Err(io_error("cannot list", folder)(e)),
+    };
+    let mut paths: Vec<PathBuf> = entries.flatten().map(|e| e.path()).filter(|p| p.is_dir()).collect();
+    paths.sort();
+    Ok(paths)
+}
+
+/// The record in a result's folder, if it is whole and the files have their lengths.
+pub fn load_record(folder: &Path) -> Option<Record> {
+    let record: Record = serde_json::from_slice(&fs::read(folder.join(RECORD)).ok()?).ok()?;
+    let whole = |f: &StoredFile| fs::metadata(folder.join(&f.product.file)).is_ok_and(|m| m.len() == f.bytes);
+    record.files.iter().all(whole).then_some(record)
+}
+
+fn stored(folder: &Path, product: Product) -> Result<StoredFile, CacheError> {
+    let path = folder.join(&product.file);
+    let (bytes, sha256) = digest::of_file(&path).map_err(io_error("cannot read back", &path))?;
+    Ok(StoredFile { product, bytes, sha256 })
+}

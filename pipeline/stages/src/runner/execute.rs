@@ -1,0 +1,241 @@
+//! Runs the items of a graph: as many at once as there are workers and memory for, parents first, each at most once.
+
+use super::cache::Cache;
+use super::graph::Graph;
+use super::progress::{End, Progress};
+use crate::jobs::{ItemRef, JobError, Work};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use std::collections::{BTreeMap, BTreeSet};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
+
+/// Limits of a run. None of them changes a byte of the result.
+#[derive(Clone, Copy, Debug)]
+pub struct Limits {
+    /// Items at once.
+    pub workers: usize,
+    /// Sum of the working memory of the items at once, bytes; an item that needs more runs alone.
+    pub memory_bytes: u64,
+}
+
+/// An item without a result.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Failure {
+    /// The item.
+    pub item: ItemRef,
+    /// Why.
+    pub message: String,
+    /// The cause lies in input data.
+    pub unusable_input: bool,
+    /// The parent without a result that kept this item from being tried.
+    pub skipped_for: Option<ItemRef>,
+    /// Its recipe.
+    pub parameters: Value,
+}
+
+/// What a run came to.
+#[derive(Debug, Default)]
+pub struct Execution {
+    /// Positions with a result, sorted.
+    pub done: Vec<usize>,
+    /// Items without one, in graph order.
+    pub failures: Vec<Failure>,
+    /// Wall time of each item that ran, s.
+    pub seconds: BTreeMap<String, f64>,
+}
+
+struct State {
+    waiting_for: BTreeMap<usize, usize>,
+    ready: BTreeSet<usize>,
+    running: usize,
+    memory_bytes: u64,
+    execution: Execution,
+    failed: BTreeMap<usize, Failure>,
+}
+
+struct Run<'a> {
+    graph: &'a Graph,
+    cache: &'a Cache,
+    limits: Limits,
+    progress: &'a dyn Progress,
+    children: BTreeMap<usize, Vec<usize>>,
+    state: Mutex<State>,
+    changed: Condvar,
+}
+
+/// Brings the `needed` items (parents included) to results.
+///
+/// A process may be ended at any moment: an item that has not finished leaves no result.
+pub fn execute(graph: &Graph, cache: &Cache, needed: &[usize], limits: Limits, progress: &dyn Progress) -> Execution {
+    let (ready, missing): (Vec<usize>, Vec<usize>) =
+        needed.iter().partition(|&&p| cache.load(&graph.node(p).item, graph.key(p)).is_some());
+    let seconds = missing.iter().map(|&p| graph.node(p).job.estimate().seconds).sum();
+    progress.begin(needed.len(), ready.len(), seconds);
+    let run = Run {
+        graph,
+        cache,
+        limits,
+        progress,
+        children: children(graph, &missing),
+        state: Mutex::new(initial(graph, &missing)),
+        changed: Condvar::new(),
+    };
+    std::thread::scope(|scope| {
+        for _ in 0..limits.workers.clamp(1, missing.len().max(1)) {
+            scope.spawn(|| run.work());
+        }
+    });
+    let state = run.state.into_inner().unwrap_or_else(PoisonError::into_inner);
+    let mut execution = state.execution;
+    execution.done.extend(ready);
+    execution.done.sort_unstable();
+    execution.failures = state.failed.into_values().collect();
+    execution
+}
+
+fn children(graph: &Graph, missing: &[usize]) -> BTreeMap<usize, Vec<usize>> {
+    let mut children: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+    for &position in missing {
+        for parent in graph.parents(position) {
+            children.entry(parent).or_default().push(position);
+        }
+    }
+    children
+}
+
+fn initial(graph: &Graph, missing: &[usize]) -> State {
+    let open: BTreeSet<usize> = missing.iter().copied().collect();
+    let waiting_for: BTreeMap<usize, usize> =
+        missing.iter().map(|&p| (p, graph.parents(p).filter(|q| open.contains(q)).count())).collect();
+    let ready = waiting_for.iter().filter(|(_, n)| **n == 0).map(|(p, _)| *p).collect();
+    State { waiting_for, ready, running: 0, memory_bytes: 0, execution: Execution::default(), failed: BTreeMap::new() }
+}
+
+impl Run<'_> {
+    fn lock(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn work(&self) {
+        while let Some(position) = self.take() {
+            let start = Instant::now();
+            let end = self.run_item(position);
+            self.settle(position, end, start.elapsed().as_secs_f64());
+        }
+    }
+
+    /// The next item that may start; `None` when nothing will ever be.
+    fn take(&self) -> Option<usize> {
+        let mut state = self.lock();
+        loop {
+            if state.ready.is_empty() && state.running == 0 {
+                return None;
+            }
+            if let Some(position) = self.first_that_fits(&state) {
+                state.ready.remove(&position);
+                state.running += 1;
+                state.memory_bytes += self.graph.node(position).job.memory_bytes();
+                return Some(position);
+            }
+            state = self.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
+        }
+    }
+
+    fn first_that_fits(&self, state: &State) -> Option<usize> {
+        let fits = |p: &usize| {
+            state.running == 0
+                || state.memory_bytes + self.graph.node(*p).job.memory_bytes() <= self.limits.memory_bytes
+        };
+        state.ready.iter().copied().find(fits)
+    }
+
+    fn run_item(&self, position: usize) -> Result<Vec<String>, JobError> {
+        let node = self.graph.node(position);
+        let key = self.graph.key(position);
+        let folder = self.cache.begin(&node.item, key).map_err(JobError::new)?;
+        let parents = self
+            .graph
+            .parents(position)
+            .map(|p| {
+                (self.graph.node(p).item.clone(), self.cache.result_folder(&self.graph.node(p).item, self.graph.key(p)))
+            })
+            .collect();
+        let work = Work { folder: &folder, parents: &parents };
+        // A panic is a bug; it must cost one item, not the run.
+        let outcome = catch_unwind(AssertUnwindSafe(|| node.job.run(&work)))
+            .unwrap_or_else(|panic| Err(JobError::new(format!("internal error: {}", panic_text(&*panic)))));
+        let outcome = outcome.inspect_err(|_| {
+            // The reason for the failure matters more than a folder that stays behind; the next run clears it.
+            let _ = std::fs::remove_dir_all(&folder);
+        })?;
+        let record = self.cache.finish(self.graph, position, &folder, outcome).map_err(JobError::new)?;
+        Ok(record.notes)
+    }
+
+    fn settle(&self, position: usize, end: Result<Vec<String>, JobError>, seconds: f64) {
+        let job = &self.graph.node(position).job;
+        let item = &self.graph.node(position).item;
+        let mut state = self.lock();
+        state.running -= 1;
+        state.memory_bytes -= job.memory_bytes();
+        state.execution.seconds.insert(item.to_string(), seconds);
+        match end {
+            Ok(notes) => {
+                state.execution.done.push(position);
+                self.release_children(&mut state, position);
+                self.progress.ended(item, &End::Done(notes), job.estimate().seconds);
+            }
+            Err(error) => {
+                self.progress.ended(item, &End::Failed(error.message.clone()), job.estimate().seconds);
+                let failure = Failure {
+                    item: item.clone(),
+                    message: error.message,
+                    unusable_input: error.unusable_input,
+                    skipped_for: None,
+                    parameters: job.recipe(),
+                };
+                state.failed.insert(position, failure);
+                self.skip_children(&mut state, position, item);
+            }
+        }
+        drop(state);
+        self.changed.notify_all();
+    }
+
+    fn release_children(&self, state: &mut State, position: usize) {
+        for child in self.children.get(&position).into_iter().flatten() {
+            if let Some(count) = state.waiting_for.get_mut(child) {
+                *count -= 1;
+                if *count == 0 && !state.failed.contains_key(child) {
+                    state.ready.insert(*child);
+                }
+            }
+        }
+    }
+
+    fn skip_children(&self, state: &mut State, position: usize, cause: &ItemRef) {
+        for &child in self.children.get(&position).into_iter().flatten() {
+            if state.failed.contains_key(&child) {
+                continue;
+            }
+            let node = self.graph.node(child);
+            let failure = Failure {
+                item: node.item.clone(),
+                message: format!("not tried, because {cause} failed"),
+                unusable_input: false,
+                skipped_for: Some(cause.clone()),
+                parameters: node.job.recipe(),
+            };
+            state.failed.insert(child, failure);
+            self.progress.ended(&node.item, &End::Skipped(cause.clone()), node.job.estimate().seconds);
+            self.skip_children(state, child, cause);
+        }
+    }
+}
+
+fn panic_text(panic: &(dyn std::any::Any + Send)) -> String {
+    let text = panic.downcast_ref::<&str>().map(|s| (*s).to_owned());
+    text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_else(|| "panic".to_owned())
+}

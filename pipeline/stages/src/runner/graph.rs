@@ -1,0 +1,146 @@
+//! The graph of items: what depends on what, and the key of each.
+
+use crate::jobs::{ItemRef, Job};
+use crate::revision::revision;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+/// One item of a study with all that decides its bytes.
+pub struct Node {
+    /// Its name.
+    pub item: ItemRef,
+    /// Items whose artifacts it reads; they stand before it in the graph.
+    pub parents: Vec<ItemRef>,
+    /// Files from outside.
+    pub inputs: Vec<InputFile>,
+    /// Words of its random streams, when it draws.
+    pub stream: Option<String>,
+    /// What it does.
+    pub job: Box<dyn Job>,
+}
+
+/// A file from outside and the hash of its bytes.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct InputFile {
+    /// Where it is.
+    pub path: PathBuf,
+    /// SHA-256 of its bytes.
+    pub sha256: String,
+}
+
+/// What a key is made of; kept with every result, so that a plan can say why an item is stale.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Ingredients {
+    /// The job's recipe.
+    pub recipe: Value,
+    /// Words of the random streams.
+    pub stream: Option<String>,
+    /// SHA-256 of the input files, in order.
+    pub inputs: Vec<String>,
+    /// Keys of the parents.
+    pub parents: BTreeMap<String, String>,
+    /// Revision of the code.
+    pub revision: String,
+}
+
+/// All items of a study, parents before children.
+#[derive(Default)]
+pub struct Graph {
+    nodes: Vec<Node>,
+    keys: Vec<String>,
+    ingredients: Vec<Ingredients>,
+    index: BTreeMap<ItemRef, usize>,
+}
+
+impl Graph {
+    /// Adds an item; its parents must be there. False when the name is taken or a parent is missing.
+    #[must_use]
+    pub fn add(&mut self, node: Node) -> bool {
+        if self.index.contains_key(&node.item) {
+            return false;
+        }
+        let Some(parents) = node.parents.iter().map(|p| self.find(p)).collect::<Option<Vec<usize>>>() else {
+            return false;
+        };
+        let ingredients = Ingredients {
+            recipe: node.job.recipe(),
+            stream: node.stream.clone(),
+            inputs: node.inputs.iter().map(|i| i.sha256.clone()).collect(),
+            parents: parents.iter().map(|&p| (self.nodes[p].item.to_string(), self.keys[p].clone())).collect(),
+            revision: revision(node.job.rooms()),
+        };
+        self.keys.push(key(&node.item, &ingredients));
+        self.ingredients.push(ingredients);
+        self.index.insert(node.item.clone(), self.nodes.len());
+        self.nodes.push(node);
+        true
+    }
+
+    /// Number of items.
+    pub fn len(&self) -> usize {
+        self.nodes.len()
+    }
+
+    /// True without items.
+    pub fn is_empty(&self) -> bool {
+        self.nodes.is_empty()
+    }
+
+    /// Position of an item.
+    pub fn find(&self, item: &ItemRef) -> Option<usize> {
+        self.index.get(item).copied()
+    }
+
+    /// The item at a position.
+    pub fn node(&self, position: usize) -> &Node {
+        &self.nodes[position]
+    }
+
+    /// All items, parents before children.
+    pub fn nodes(&self) -> &[Node] {
+        &self.nodes
+    }
+
+    /// Key of the item at a position: 32 hexadecimal digits.
+    pub fn key(&self, position: usize) -> &str {
+        &self.keys[position]
+    }
+
+    /// What the key at a position is made of.
+    pub fn ingredients(&self, position: usize) -> &Ingredients {
+        &self.ingredients[position]
+    }
+
+    /// Positions of the parents of the item at a position.
+    pub fn parents(&self, position: usize) -> impl Iterator<Item = usize> {
+        self.nodes[position].parents.iter().filter_map(|p| self.find(p))
+    }
+
+    /// The chosen items and all that they need, parents before children.
+    pub fn closure(&self, chosen: impl IntoIterator<Item = usize>) -> Vec<usize> {
+        let mut needed = vec![false; self.len()];
+        chosen.into_iter().for_each(|p| needed[p] = true);
+        for position in (0..self.len()).rev().filter(|&p| needed[p]).collect::<Vec<_>>() {
+            self.mark(position, &mut needed);
+        }
+        (0..self.len()).filter(|&p| needed[p]).collect()
+    }
+
+    fn mark(&self, position: usize, needed: &mut [bool]) {
+        for parent in self.parents(position) {
+            if !std::mem::replace(&mut needed[parent], true) {
+                self.mark(parent, needed);
+            }
+        }
+    }
+}
+
+fn key(item: &ItemRef, ingredients: &Ingredients) -> String {
+    let mut hasher = blake3::Hasher::new_derive_key("sastrugi 2026-11 item keys v1");
+    // Maps keep a fixed order (struct fields, BTreeMap, parameters as the kernels print them), so the text is canonical.
+    let text = serde_json::json!([item, ingredients]).to_string();
+    hasher.update(text.as_bytes());
+    hasher.finalize().to_hex()[..32].to_owned()
+}

@@ -1,0 +1,120 @@
+//! What a run would do, and why.
+
+use super::cache::Cache;
+use super::graph::{Graph, Ingredients};
+use serde::Serialize;
+use serde_json::Value;
+
+/// One item that a run would compute.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Stale {
+    /// Stage and id.
+    pub item: String,
+    /// Why.
+    pub reason: String,
+    /// Estimated time on one core, s.
+    pub seconds: f64,
+    /// Estimated bytes.
+    pub bytes: f64,
+}
+
+/// What a run would do.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct PlanSummary {
+    /// Items of the study.
+    pub items: usize,
+    /// Items with a result.
+    pub ready: usize,
+    /// Items to compute.
+    pub stale: Vec<Stale>,
+}
+
+/// Compares a graph with a work area; without one everything is new.
+pub fn plan(graph: &Graph, cache: Option<&Cache>) -> PlanSummary {
+    let mut stale = Vec::new();
+    for position in 0..graph.len() {
+        let node = graph.node(position);
+        if cache.is_some_and(|c| c.load(&node.item, graph.key(position)).is_some()) {
+            continue;
+        }
+        let earlier = cache.and_then(|c| c.earlier(&node.item));
+        let reason = earlier.map_or_else(|| "new".to_owned(), |e| difference(&e, graph.ingredients(position)));
+        let estimate = node.job.estimate();
+        stale.push(Stale { item: node.item.to_string(), reason, seconds: estimate.seconds, bytes: estimate.bytes });
+    }
+    PlanSummary { items: graph.len(), ready: graph.len() - stale.len(), stale }
+}
+
+/// What changed between two lists of ingredients, in words.
+fn difference(old: &Ingredients, new: &Ingredients) -> String {
+    let mut reasons = Vec::new();
+    if old.recipe != new.recipe {
+        let mut changes = Vec::new();
+        changed_values("", &old.recipe, &new.recipe, &mut changes);
+        reasons.push(format!("changed: {}", changes.join(", ")));
+    }
+    if old.stream != new.stream {
+        reasons.push("the seed or the id changed".to_owned());
+    }
+    if old.inputs != new.inputs {
+        reasons.push("the input file changed".to_owned());
+    }
+    let parents = new.parents.iter().filter(|(name, key)| old.parents.get(*name) != Some(key));
+    let parents: Vec<&str> = parents.map(|(name, _)| name.as_str()).collect();
+    if !parents.is_empty() {
+        reasons.push(format!("made from {}, which changed", parents.join(", ")));
+    }
+    if old.revision != new.revision {
+        reasons.push("its code changed".to_owned());
+    }
+    if reasons.is_empty() { "its result is incomplete".to_owned() } else { reasons.join("; ") }
+}
+
+/// Paths whose values differ, `path old -> new`.
+fn changed_values(path: &str, old: &Value, new: &Value, changes: &mut Vec<String>) {
+    if old == new {
+        return;
+    }
+    match (old.as_object(), new.as_object()) {
+        (Some(a), Some(b)) => {
+            let names: std::collections::BTreeSet<&String> = a.keys().chain(b.keys()).collect();
+            for name in names {
+                let below = if path.is_empty() { name.clone() } else { format!("{path}.{name}") };
+                changed_values(
+                    &below,
+                    a.get(name).unwrap_or(&Value::Null),
+                    b.get(name).unwrap_or(&Value::Null),
+                    changes,
+                );
+            }
+        }
+        _ => changes.push(format!("{path} {old} -> {new}")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    fn ingredients(recipe: Value) -> Ingredients {
+        Ingredients {
+            recipe,
+            stream: None,
+            inputs: Vec::new(),
+            parents: [("dem/a".to_owned(), "k1".to_owned())].into(),
+            revision: "r".to_owned(),
+        }
+    }
+
+    #[test]
+    fn val_reasons() {
+        let old = ingredients(json!({"params": {"d": 2.3, "m": 16}}));
+        let mut new = ingredients(json!({"params": {"d": 2.4, "m": 16}}));
+        assert_eq!(difference(&old, &new), "changed: params.d 2.3 -> 2.4");
+        new.recipe = old.recipe.clone();
+        new.parents.insert("dem/a".to_owned(), "k2".to_owned());
+        new.revision = "s".to_owned();
+        assert_eq!(difference(&old, &new), "made from dem/a, which changed; its code changed");
+    }
+}

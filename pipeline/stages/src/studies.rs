@@ -1,0 +1,396 @@
+//! What a command does with a whole study: run, plan, merge, verify.
+
+use crate::error::{Error, of_build};
+use crate::jobs::ItemRef;
+use crate::registry::{self, Plan};
+use crate::runner::assemble::{Contents, assemble, release_error};
+use crate::runner::cache::Cache;
+use crate::runner::execute::{Execution, Failure, Limits, execute};
+use crate::runner::graph::Graph;
+use crate::runner::plan::{PlanSummary, plan};
+use crate::runner::progress::Progress;
+use crate::runner::shard::{self, Part};
+use crate::study::Study;
+use sastrugi_store::release::{self, ProblemKind, Release};
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use toml_edit::{DocumentMut, Item, Value};
+
+/// A study with its graph.
+pub struct Loaded {
+    /// The study.
+    pub study: Study,
+    /// Its items.
+    pub graph: Graph,
+    /// The study's text as released: input files by their place in the release.
+    pub released: String,
+}
+
+/// Reads a study file.
+///
+/// # Errors
+/// A missing file, a wrong study, or a missing input file.
+pub fn load(path: &Path) -> Result<Loaded, Error> {
+    let text = fs::read(path).map_err(|e| Error::Input(format!("{}: {}", path.display(), io_reason(&e))))?;
+    let text = String::from_utf8(text)
+        .map_err(|_| Error::Usage(format!("{}: the study is not UTF-8 text", path.display())))?;
+    load_text(&text, &path.display().to_string(), path.parent().unwrap_or(Path::new("")))
+}
+
+fn io_reason(error: &std::io::Error) -> String {
+    if error.kind() == std::io::ErrorKind::NotFound { "no such file".to_owned() } else { error.to_string() }
+}
+
+/// Reads a study from text; relative paths start from `folder`.
+///
+/// # Errors
+/// As [`load`].
+pub fn load_text(text: &str, name: &str, folder: &Path) -> Result<Loaded, Error> {
+    let study = Study::parse(text, folder, &registry::section_names()).map_err(|error| Error::Study {
+        name: name.to_owned(),
+        text: text.to_owned(),
+        error,
+    })?;
+    let plan = registry::build(&study).map_err(|error| of_build(name, text, error))?;
+    let released = released_text(text, &plan);
+    Ok(Loaded { study, graph: plan.graph, released })
+}
+
+/// The study with its input files at their places in the release; every other character stays.
+fn released_text(text: &str, plan: &Plan) -> String {
+    let Ok(mut document) = text.parse::<DocumentMut>() else { return text.to_owned() };
+    for place in &plan.inputs {
+        let file = match document.get_mut("dem") {
+            Some(Item::ArrayOfTables(tables)) => {
+                tables.get_mut(place.index).and_then(|t| t.get_mut("file")).and_then(Item::as_value_mut)
+            }
+            Some(Item::Value(Value::Array(list))) => {
+                list.get_mut(place.index).and_then(Value::as_inline_table_mut).and_then(|t| t.get_mut("file"))
+            }
+            _ => None,
+        };
+        if let Some(value) = file {
+            let decor = value.decor().clone();
+            *value = Value::from(place.release_path.as_str());
+            *value.decor_mut() = decor;
+        }
+    }
+    document.to_string()
+}
+
+/// A run.
+pub struct RunRequest<'a> {
+    /// Release folder, or folder of the shard.
+    pub output: &'a Path,
+    /// Work area; `<output>.work` when absent.
+    pub work: Option<&'a Path>,
+    /// Part of the study to run.
+    pub part: Option<Part>,
+    /// Limits.
+    pub limits: Limits,
+}
+
+/// What a run came to.
+#[derive(Debug, Serialize)]
+pub struct RunSummary {
+    /// Release or shard folder.
+    pub output: PathBuf,
+    /// Items that were needed.
+    pub items: usize,
+    /// Items that were computed now.
+    pub computed: usize,
+    /// Items without a result.
+    pub failures: Vec<Failure>,
+}
+
+/// The work area that belongs to a release folder.
+pub fn default_work(output: &Path) -> PathBuf {
+    let name = output.file_name().map_or_else(|| "release".into(), |n| n.to_string_lossy().into_owned());
+    output.with_file_name(format!("{name}.work"))
+}
+
+/// Runs a study to a release, or a shard of it to a partial folder.
+///
+/// # Errors
+/// A destination that is not ours, a busy work area, or no item with a result. Failed items are no error as long as some
+/// have a result: they are listed.
+pub fn run(loaded: &Loaded, request: &RunRequest<'_>, progress: &dyn Progress) -> Result<RunSummary, Error> {
+    check_destination(request)?;
+    let work = request.work.map_or_else(|| default_work(request.output), Path::to_owned);
+    let cache = Cache::open(&work)?;
+    let graph = &loaded.graph;
+    let chosen = (0..graph.len()).filter(|&p| request.part.is_none_or(|part| part.owns(graph.key(p))));
+    let needed = graph.closure(chosen);
+    let execution = execute(graph, &cache, &needed, request.limits, progress);
+    write_timings(&cache, &execution)?;
+    if execution.done.is_empty() && !execution.failures.is_empty() {
+        return Err(all_failed(&execution.failures));
+    }
+    match request.part {
+        Some(part) => shard::write(request.output, graph, &cache, part, &loaded.released, &execution.failures)?,
+        None => {
+            let items = (0..graph.len()).map(|p| located(graph, &cache, &execution, p)).collect();
+            let contents =
+                Contents { head: &loaded.study.head, study: &loaded.released, items, failures: &execution.failures };
+            assemble(contents, request.output, progress)?;
+        }
+    }
+    cache.drop_orphans(graph)?;
+    let computed = execution.seconds.len() - execution.failures.iter().filter(|f| f.skipped_for.is_none()).count();
+    Ok(RunSummary { output: request.output.to_owned(), items: needed.len(), computed, failures: execution.failures })
+}
+
+/// A folder that is not ours is refused before any work is done.
+fn check_destination(request: &RunRequest<'_>) -> Result<(), Error> {
+    let ours = if request.part.is_some() { "shard.json" } else { release::MANIFEST };
+    match fs::read_dir(request.output).map(|mut entries| entries.next().is_some()) {
+        Ok(true) if !request.output.join(ours).is_file() => {
+            let what = if request.part.is_some() { "shard" } else { "release" };
+            let path = request.output.display();
+            Err(Error::Usage(format!(
+                "{path}: the folder is not empty and no {what} of ours; name another one with -o"
+            )))
+        }
+        Err(e) if e.kind() == std::io::ErrorKind::NotADirectory => {
+            Err(Error::Usage(format!("{}: is a file; -o names a folder", request.output.display())))
+        }
+        _ => Ok(()),
+    }
+}
+
+fn located(graph: &Graph, cache: &Cache, execution: &Execution, position: usize) -> (ItemRef, Option<PathBuf>) {
+    let item = graph.node(position).item.clone();
+    let done = execution.done.binary_search(&position).is_ok();
+    let folder = done.then(|| cache.result_folder(&item, graph.key(position)));
+    (item, folder)
+}
+
+fn all_failed(failures: &[Failure]) -> Error {
+    let causes: Vec<&Failure> = failures.iter().filter(|f| f.skipped_for.is_none()).collect();
+    let first = causes.first().map_or_else(String::new, |f| format!("{}: {}", f.item, f.message));
+    let message = match causes.len() {
+        0 | 1 => first,
+        n => format!("every item failed, {n} of them by themselves; the first: {first}"),
+    };
+    if causes.iter().all(|f| f.unusable_input) { Error::Input(message) } else { Error::Failed(message) }
+}
+
+/// Keeps the wall time of every item that ran, for people; no result depends on it.
+fn write_timings(cache: &Cache, execution: &Execution) -> Result<(), Error> {
+    let path = cache.folder().join("timings.json");
+    let earlier = fs::read(&path).ok().and_then(|bytes| serde_json::from_slice(&bytes).ok());
+    let mut seconds: BTreeMap<String, f64> = earlier.unwrap_or_default();
+    seconds.extend(execution.seconds.clone());
+    let text = serde_json::to_vec_pretty(&seconds).map_err(Error::failed)?;
+    sastrugi_store::atomic::write(&path, &text).map_err(|e| Error::failed(format!("{}: {e}", path.display())))
+}
+
+/// What a run would do, without doing it.
+///
+/// # Errors
+/// When another run holds the work area.
+pub fn plan_of(loaded: &Loaded, output: &Path, work: Option<&Path>) -> Result<PlanSummary, Error> {
+    let work = work.map_or_else(|| default_work(output), Path::to_owned);
+    let cache = if work.is_dir() { Some(Cache::open(&work)?) } else { None };
+    Ok(plan(&loaded.graph, cache.as_ref()))
+}
+
+/// Joins shards to a release.
+///
+/// # Errors
+/// Shards that do not make one study, or a destination that is not ours.
+pub fn merge(shards: &[PathBuf], output: &Path, progress: &dyn Progress) -> Result<RunSummary, Error> {
+    let joined = shard::join(shards)?;
+    let study = Study::parse(&joined.study, Path::new(""), &registry::section_names()).map_err(Error::failed)?;
+    let items = joined.items.len();
+    let contents =
+        Contents { head: &study.head, study: &joined.study, items: joined.items, failures: &joined.failures };
+    assemble(contents, output, progress)?;
+    Ok(RunSummary { output: output.to_owned(), items, computed: 0, failures: joined.failures })
+}
+
+/// Which items to compute again.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Recompute {
+    /// Every one, and the tables and the report.
+    All,
+    /// This many, chosen by their keys.
+    Some(usize),
+}
+
+/// One difference that verification found.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Difference {
+    /// File in the release.
+    pub path: String,
+    /// What is wrong.
+    pub problem: String,
+}
+
+/// What verification found.
+#[derive(Debug, Serialize)]
+pub struct Verification {
+    /// Files checked.
+    pub files: u64,
+    /// Bytes checked.
+    pub bytes: u64,
+    /// Items computed again.
+    pub recomputed: Vec<String>,
+    /// Differences; none in a good release.
+    pub differences: Vec<Difference>,
+    /// Why bytes cannot be compared, where they cannot.
+    pub not_comparable: Option<String>,
+}
+
+/// Checks a release; with `recompute`, also against what its own study gives here and now.
+///
+/// # Errors
+/// A folder that is no release, or work that cannot be done.
+pub fn verify(
+    folder: &Path,
+    recompute: Option<Recompute>,
+    limits: Limits,
+    progress: &dyn Progress,
+) -> Result<Verification, Error> {
+    progress.phase("checking files");
+    let report = release::verify(folder).map_err(release_error)?;
+    let differences: Vec<Difference> = report
+        .problems
+        .iter()
+        .map(|p| Difference { path: p.path.clone(), problem: problem_text(p.kind, &p.message) })
+        .collect();
+    let mut verification = Verification {
+        files: report.files,
+        bytes: report.bytes,
+        recomputed: Vec::new(),
+        differences,
+        not_comparable: None,
+    };
+    let Some(recompute) = recompute.filter(|_| verification.differences.is_empty()) else { return Ok(verification) };
+    let release = Release::open(folder).map_err(release_error)?;
+    let ours = env!("CARGO_PKG_VERSION");
+    if release.manifest().version != ours {
+        let theirs = &release.manifest().version;
+        verification.not_comparable =
+            Some(format!("made by version {theirs}, this is {ours}: not comparable byte by byte"));
+        return Ok(verification);
+    }
+    let loaded = load(&folder.join("study.toml"))?;
+    let scratch = default_work(&folder.with_extension("verify"));
+    let _cleared = Scratch::new(&scratch)?;
+    match recompute {
+        Recompute::All => recompute_all(&release, &loaded, &scratch, limits, progress, &mut verification)?,
+        Recompute::Some(count) => {
+            recompute_some(&release, &loaded, &scratch, count, limits, progress, &mut verification)?
+        }
+    }
+    Ok(verification)
+}
+
+fn problem_text(kind: ProblemKind, message: &str) -> String {
+    let kind = format!("{kind:?}").to_lowercase();
+    if message.is_empty() { kind } else { format!("{kind}: {message}") }
+}
+
+/// A folder that is gone when its holder is.
+struct Scratch(PathBuf);
+
+impl Scratch {
+    fn new(path: &Path) -> Result<Self, Error> {
+        let scratch = Self(path.to_owned());
+        scratch.clear();
+        fs::create_dir_all(path).map_err(|e| Error::failed(format!("{}: {e}", path.display())))?;
+        Ok(scratch)
+    }
+
+    fn clear(&self) {
+        // What cannot be removed is cleared by the next run.
+        let _ = fs::remove_dir_all(&self.0);
+    }
+}
+
+impl Drop for Scratch {
+    fn drop(&mut self) {
+        self.clear();
+    }
+}
+
+fn recompute_all(
+    release: &Release,
+    loaded: &Loaded,
+    scratch: &Path,
+    limits: Limits,
+    progress: &dyn Progress,
+    verification: &mut Verification,
+) -> Result<(), Error> {
+    let output = scratch.join("release");
+    let work = scratch.join("work");
+    run(loaded, &RunRequest { output: &output, work: Some(&work), part: None, limits }, progress)?;
+    let again = Release::open(&output).map_err(release_error)?;
+    verification.recomputed = loaded.graph.nodes().iter().map(|n| n.item.to_string()).collect();
+    let sums = |r: &Release| -> BTreeMap<String, String> {
+        r.manifest().artifacts.iter().map(|a| (a.path.clone(), a.sha256.clone())).collect()
+    };
+    verification.differences.extend(compare_sums(&sums(release), &sums(&again)));
+    Ok(())
+}
+
+fn compare_sums(there: &BTreeMap<String, String>, here: &BTreeMap<String, String>) -> Vec<Difference> {
+    let paths: std::collections::BTreeSet<&String> = there.keys().chain(here.keys()).collect();
+    let problem = |path: &&String| match (there.get(*path), here.get(*path)) {
+        (Some(a), Some(b)) if a == b => None,
+        (Some(_), Some(_)) => Some("computed again, its bytes differ"),
+        (Some(_), None) => Some("computed again, it does not appear"),
+        _ => Some("computed again, it appears, and is not in the release"),
+    };
+    paths.iter().filter_map(|p| Some(Difference { path: (*p).clone(), problem: problem(p)?.to_owned() })).collect()
+}
+
+fn recompute_some(
+    release: &Release,
+    loaded: &Loaded,
+    scratch: &Path,
+    count: usize,
+    limits: Limits,
+    progress: &dyn Progress,
+    verification: &mut Verification,
+) -> Result<(), Error> {
+    let graph = &loaded.graph;
+    let mut by_key: Vec<usize> = (0..graph.len()).collect();
+    by_key.sort_by_key(|&p| graph.key(p).to_owned());
+    let chosen: Vec<usize> = by_key.into_iter().take(count).collect();
+    let cache = Cache::open(scratch)?;
+    execute(graph, &cache, &graph.closure(chosen.iter().copied()), limits, progress);
+    let there: BTreeMap<&str, &str> =
+        release.manifest().artifacts.iter().map(|a| (a.path.as_str(), a.sha256.as_str())).collect();
+    for position in chosen {
+        let item = &graph.node(position).item;
+        verification.recomputed.push(item.to_string());
+        let files = cache.load(item, graph.key(position)).map(|r| r.files).unwrap_or_default();
+        for file in files {
+            let Some(path) = file.product.release_path else { continue };
+            if there.get(path.as_str()) != Some(&file.sha256.as_str()) {
+                verification
+                    .differences
+                    .push(Difference { path, problem: "computed again, its bytes differ".to_owned() });
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Runs a study that a verb made up, to a release of its own.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_text(
+    text: &str,
+    folder: &Path,
+    request: &RunRequest<'_>,
+    progress: &dyn Progress,
+) -> Result<RunSummary, Error> {
+    let loaded = load_text(text, "this command", folder)?;
+    run(&loaded, request, progress)
+}

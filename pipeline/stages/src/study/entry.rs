@@ -1,0 +1,236 @@
+//! One item table of a section: envelope and kernel parameters taken apart, replicates and sweeps spelled out.
+
+use super::keys::{self, UnknownKey};
+use super::text::{StudyError, StudyText};
+use super::{check_id, segments, unknown_key};
+use sastrugi_schemas::ParameterError;
+use sastrugi_schemas::kind::{read_parameters, schema_of};
+use schemars::JsonSchema;
+use serde::de::DeserializeOwned;
+use serde_json::{Map, Value};
+use std::collections::BTreeMap;
+
+/// Most items that one table may stand for.
+const ITEMS_MAX: usize = 1_000_000;
+
+/// One item table.
+#[derive(Clone, Copy)]
+pub struct Entry<'a> {
+    section: &'static str,
+    index: usize,
+    table: &'a Map<String, Value>,
+    text: &'a StudyText,
+}
+
+/// One item that a table stands for.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Expanded {
+    /// Full id.
+    pub id: String,
+    /// Position among the replicates, from 0.
+    pub replicate: u64,
+    /// Label for statistics that the sweep gives, if there is one.
+    pub sweep_group: Option<String>,
+    /// Kernel parameters.
+    pub params: Value,
+}
+
+impl<'a> Entry<'a> {
+    /// The `index`-th table of `[[section]]`.
+    pub fn new(section: &'static str, index: usize, table: &'a Map<String, Value>, text: &'a StudyText) -> Self {
+        Self { section, index, table, text }
+    }
+
+    /// Takes the envelope and the kernel's parameters apart.
+    ///
+    /// # Errors
+    /// An envelope key of the wrong type, or an id that is not well formed.
+    pub fn read<E: DeserializeOwned + JsonSchema>(&self) -> Result<(E, Value), StudyError> {
+        let names = keys::properties(&schema_of::<E>());
+        let (envelope, params): (Map<_, _>, Map<_, _>) =
+            self.table.clone().into_iter().partition(|(key, _)| names.contains(key));
+        if let Some(id) = envelope.get("id").and_then(Value::as_str) {
+            check_id("id", id).map_err(|e| self.refuse(e))?;
+        }
+        let envelope = read_parameters(&Value::Object(envelope)).map_err(|e| self.refuse(e))?;
+        Ok((envelope, Value::Object(params)))
+    }
+
+    /// Refuses parameter keys that the schema does not have; `E` is the envelope, whose keys are suggested too.
+    ///
+    /// # Errors
+    /// The first unknown key.
+    pub fn check_keys<E: JsonSchema>(&self, params: &Value, schema: &Value) -> Result<(), StudyError> {
+        let Some(mut unknown) = keys::find_unknown(params, schema).or_else(|| any_key(params, schema)) else {
+            return Ok(());
+        };
+        if unknown.path.len() == 1 {
+            unknown.known.extend(keys::properties(&schema_of::<E>()));
+        }
+        Err(unknown_key(self.text, &self.path(), &unknown))
+    }
+
+    /// Spells out sweeps and replicates.
+    ///
+    /// # Errors
+    /// A count of 0 or too large, an empty sweep, or a swept parameter that is also set.
+    pub fn expand(
+        &self,
+        id: &str,
+        count: Option<u32>,
+        sweep: &BTreeMap<String, Vec<Value>>,
+        params: &Value,
+    ) -> Result<Vec<Expanded>, StudyError> {
+        if count == Some(0) {
+            return Err(self.error("count", "`count` is 0; it must be 1 or more"));
+        }
+        let total = sweep.values().map(Vec::len).product::<usize>() * count.unwrap_or(1) as usize;
+        if total > ITEMS_MAX {
+            return Err(self.error("count", format!("this stands for {total} items; at most {ITEMS_MAX} are possible")));
+        }
+        let mut items = vec![Expanded { id: id.to_owned(), replicate: 0, sweep_group: None, params: params.clone() }];
+        for (parameter, values) in sweep {
+            items = self.sweep(items, parameter, values)?;
+        }
+        let items: Vec<Expanded> = items.into_iter().flat_map(|item| replicates(item, count)).collect();
+        for item in &items {
+            check_id("id", &item.id).map_err(|e| self.refuse(e))?;
+        }
+        Ok(items)
+    }
+
+    fn sweep(&self, items: Vec<Expanded>, parameter: &str, values: &[Value]) -> Result<Vec<Expanded>, StudyError> {
+        if values.is_empty() {
+            return Err(self.error("sweep", format!("the sweep of `{parameter}` has no values")));
+        }
+        let mut swept = Vec::new();
+        for item in items {
+            for value in values {
+                let word = id_word(value).ok_or_else(|| {
+                    self.error(
+                        "sweep",
+                        format!("the sweep of `{parameter}` holds {value}; it takes numbers, words, true and false"),
+                    )
+                })?;
+                let mut params = item.params.clone();
+                if !set_at(&mut params, parameter, value.clone()) {
+                    return Err(self.error("sweep", format!("`{parameter}` is swept and set as well")));
+                }
+                let label =
+                    format!("{parameter} = {}", value.as_str().map_or_else(|| value.to_string(), str::to_owned));
+                let group = item.sweep_group.as_ref().map_or(label.clone(), |g| format!("{g}, {label}"));
+                swept.push(Expanded {
+                    id: format!("{}-{word}", item.id),
+                    sweep_group: Some(group),
+                    params,
+                    ..item.clone()
+                });
+            }
+        }
+        Ok(swept)
+    }
+
+    /// An error about a key of this table (dotted path), or about the table where the key is not written.
+    pub fn error(&self, key: &str, message: impl Into<String>) -> StudyError {
+        let mut path = self.path();
+        path.extend(segments(key).map(str::to_owned));
+        let id = self
+            .table
+            .get("id")
+            .and_then(Value::as_str)
+            .map_or_else(|| format!("number {}", self.index + 1), |id| format!("\"{id}\""));
+        StudyError::at(self.text.span(&path, false), format!("{} {id}: {}", self.section, message.into()))
+    }
+
+    /// A kernel's refusal, with its place.
+    pub fn refuse(&self, error: ParameterError) -> StudyError {
+        self.error(&error.key, error.to_string())
+    }
+
+    fn path(&self) -> Vec<String> {
+        vec![self.section.to_owned(), self.index.to_string()]
+    }
+}
+
+/// For a schema without properties every key is unknown.
+fn any_key(params: &Value, schema: &Value) -> Option<UnknownKey> {
+    let key = params.as_object()?.keys().next()?;
+    keys::properties(schema).is_empty().then(|| UnknownKey { path: vec![key.clone()], known: Vec::new() })
+}
+
+fn replicates(item: Expanded, count: Option<u32>) -> Vec<Expanded> {
+    let Some(count) = count else { return vec![item] };
+    (0..count)
+        .map(|k| Expanded { id: format!("{}-{:04}", item.id, k + 1), replicate: u64::from(k), ..item.clone() })
+        .collect()
+}
+
+/// A value as part of an id: lower case, other signs as `-`.
+fn id_word(value: &Value) -> Option<String> {
+    let text = match value {
+        Value::String(s) => s.to_lowercase(),
+        Value::Number(_) | Value::Bool(_) => value.to_string(),
+        _ => return None,
+    };
+    let plain = |c: char| if c.is_ascii_lowercase() || c.is_ascii_digit() || c == '.' { c } else { '-' };
+    Some(text.chars().map(plain).collect())
+}
+
+/// Sets a dotted parameter; false when it is set already or its parent is no table.
+fn set_at(params: &mut Value, dotted: &str, value: Value) -> bool {
+    let mut at = params;
+    let mut words = dotted.split('.').peekable();
+    while let Some(word) = words.next() {
+        let Some(map) = at.as_object_mut() else { return false };
+        if words.peek().is_none() {
+            return map.insert(word.to_owned(), value).is_none();
+        }
+        at = map.entry(word).or_insert_with(|| Value::Object(Map::new()));
+    }
+    false
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sastrugi_schemas::study::TerrainItem;
+
+    fn with<T>(toml: &str, f: impl FnOnce(Entry<'_>) -> T) -> T {
+        let text = StudyText::parse(toml).unwrap();
+        let json = text.to_json().unwrap();
+        let table = json["terrain"][0].as_object().unwrap().clone();
+        f(Entry::new("terrain", 0, &table, &text))
+    }
+
+    fn expand(toml: &str) -> Result<Vec<Expanded>, StudyError> {
+        with(toml, |entry| {
+            let (item, params): (TerrainItem, _) = entry.read()?;
+            entry.expand(&item.id, item.count, &item.sweep, &params)
+        })
+    }
+
+    #[test]
+    fn val_replicates_and_sweeps() {
+        let items =
+            expand("[[terrain]]\nid = \"a\"\nkind = \"k\"\ncount = 2\nsweep.\"high.d\" = [2.3, 2.6]\nlow.s = 1\n")
+                .unwrap();
+        let ids: Vec<&str> = items.iter().map(|i| i.id.as_str()).collect();
+        assert_eq!(ids, ["a-2.3-0001", "a-2.3-0002", "a-2.6-0001", "a-2.6-0002"]);
+        assert_eq!(items[2].params, serde_json::json!({"low": {"s": 1}, "high": {"d": 2.6}}));
+        assert_eq!(items[3].sweep_group.as_deref(), Some("high.d = 2.6"));
+        assert_eq!(items[3].replicate, 1);
+    }
+
+    #[test]
+    fn val_refusals() {
+        let message = |toml: &str| expand(toml).unwrap_err().message;
+        assert!(message("[[terrain]]\nid = \"a\"\nkind = \"k\"\ncount = 0\n").contains("1 or more"));
+        assert!(message("[[terrain]]\nid = \"A\"\nkind = \"k\"\n").contains("a-z"));
+        assert!(message("[[terrain]]\nid = \"a\"\nkind = \"k\"\nsweep.d = []\n").contains("no values"));
+        assert!(message("[[terrain]]\nid = \"a\"\nkind = \"k\"\nd = 1\nsweep.d = [1]\n").contains("set as well"));
+        assert!(message("[[terrain]]\nkind = \"k\"\n").contains("missing field `id`"));
+        assert!(
+            message("[[terrain]]\nid = \"a\"\nkind = \"k\"\ncount = 4000000000\nsweep.d = [1,2]\n").contains("at most")
+        );
+    }
+}

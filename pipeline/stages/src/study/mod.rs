@@ -1,0 +1,214 @@
+//! A study: its text, its head, and the tables of its sections.
+
+pub mod entry;
+pub mod keys;
+pub mod text;
+
+pub use entry::Entry;
+pub use text::{StudyError, StudyText};
+
+use sastrugi_schemas::ParameterError;
+use sastrugi_schemas::kind::{read_parameters, schema_of};
+use sastrugi_schemas::study::{RoughnessSection, StudyHead};
+use serde_json::{Map, Value};
+use std::path::{Path, PathBuf};
+
+/// A study as read: the head checked, the items still tables.
+pub struct Study {
+    /// `[study]`.
+    pub head: StudyHead,
+    /// `[roughness]`.
+    pub roughness: RoughnessSection,
+    /// Folder that relative paths start from.
+    pub folder: PathBuf,
+    text: StudyText,
+    root: Map<String, Value>,
+    raw: String,
+}
+
+impl Study {
+    /// Reads a study from its text; `folder` is where relative paths start.
+    ///
+    /// # Errors
+    /// The first thing that is wrong, with its place.
+    pub fn parse(raw: &str, folder: &Path, sections: &[&'static str]) -> Result<Self, StudyError> {
+        let text = StudyText::parse(raw)?;
+        let Value::Object(root) = text.to_json()? else {
+            return Err(StudyError::at(None, "a study is a table of sections"));
+        };
+        let head = read_head(&root, &text)?;
+        let roughness = read_section::<RoughnessSection>(&root, &text, "roughness")?.unwrap_or_default();
+        check_roughness(&roughness).map_err(|e| section_error(&text, "roughness", e))?;
+        let study = Self { head, roughness, folder: folder.to_owned(), text, root, raw: raw.to_owned() };
+        study.check_sections(sections)?;
+        Ok(study)
+    }
+
+    /// The study's text as given.
+    pub fn raw(&self) -> &str {
+        &self.raw
+    }
+
+    /// The tables of `[[section]]`, in order.
+    ///
+    /// # Errors
+    /// A section that is not an array of tables.
+    pub fn entries(&self, section: &'static str) -> Result<Vec<Entry<'_>>, StudyError> {
+        let Some(value) = self.root.get(section) else { return Ok(Vec::new()) };
+        let tables = value.as_array().map(|list| list.iter().map(Value::as_object).collect::<Option<Vec<_>>>());
+        let Some(Some(tables)) = tables else {
+            let message = format!("`{section}` is written as [[{section}]], once for each item");
+            return Err(StudyError::at(self.text.span(&[section.to_owned()], true), message));
+        };
+        Ok(tables.into_iter().enumerate().map(|(index, table)| Entry::new(section, index, table, &self.text)).collect())
+    }
+
+    fn check_sections(&self, sections: &[&'static str]) -> Result<(), StudyError> {
+        let known = || ["study", "roughness"].into_iter().chain(sections.iter().copied());
+        let Some(unknown) = self.root.keys().find(|k| !known().any(|s| s == *k)) else { return Ok(()) };
+        let names: Vec<&str> = known().collect();
+        let message = format!("unknown section `{unknown}`; a study has {}", names.join(", "));
+        let help = keys::nearest(unknown, known()).map(|n| format!("did you mean `{n}`?"));
+        Err(StudyError::at(self.text.span(std::slice::from_ref(unknown), true), message).with_help(help))
+    }
+}
+
+fn read_head(root: &Map<String, Value>, text: &StudyText) -> Result<StudyHead, StudyError> {
+    let Some(mut head) = read_section::<StudyHead>(root, text, "study")? else {
+        return Err(StudyError::at(None, "the section [study] is missing; it holds at least name, seed and date"));
+    };
+    if head.title.is_empty() {
+        head.title.clone_from(&head.name);
+    }
+    let checks = [check_id("name", &head.name), check_date(&head.date), check_license(&head.license)];
+    checks.into_iter().collect::<Result<Vec<()>, _>>().map_err(|e| section_error(text, "study", e))?;
+    Ok(head)
+}
+
+/// Reads a section that is one table.
+fn read_section<T>(root: &Map<String, Value>, text: &StudyText, section: &str) -> Result<Option<T>, StudyError>
+where
+    T: serde::de::DeserializeOwned + schemars::JsonSchema,
+{
+    let Some(value) = root.get(section) else { return Ok(None) };
+    if let Some(unknown) = keys::find_unknown(value, &schema_of::<T>()) {
+        return Err(unknown_key(text, &[section.to_owned()], &unknown));
+    }
+    read_parameters(value).map(Some).map_err(|e| section_error(text, section, e))
+}
+
+fn section_error(text: &StudyText, section: &str, error: ParameterError) -> StudyError {
+    let path: Vec<String> = [section].into_iter().chain(segments(&error.key)).map(str::to_owned).collect();
+    StudyError::at(text.span(&path, false), format!("[{section}] {error}"))
+}
+
+/// The words of a dotted path; array positions stand alone.
+fn segments(key: &str) -> impl Iterator<Item = &str> {
+    key.split(['.', '[', ']']).filter(|s| !s.is_empty())
+}
+
+fn unknown_key(text: &StudyText, parent: &[String], unknown: &keys::UnknownKey) -> StudyError {
+    let path: Vec<String> = parent.iter().chain(&unknown.path).cloned().collect();
+    let place = parent.first().map_or("", String::as_str);
+    let message = format!("unknown key `{}` in {place}", unknown.path.join("."));
+    let help = match unknown.nearest() {
+        Some(nearest) => format!("did you mean `{nearest}`?"),
+        None => format!("known keys: {}", unknown.known.join(", ")),
+    };
+    StudyError::at(text.span(&path, true), message).with_help(Some(help))
+}
+
+/// Refuses settings of `[roughness]` that are out of range.
+///
+/// # Errors
+/// The first one.
+pub fn check_roughness(section: &RoughnessSection) -> Result<(), ParameterError> {
+    ParameterError::positive("low_max", section.low_max)?;
+    ParameterError::positive("semi_max", section.semi_max)?;
+    ParameterError::not_negative("border_m", section.border_m)?;
+    ParameterError::not_negative("closing_radius_m", section.closing_radius_m)?;
+    section.band_window_m.map_or(Ok(0.0), |w| ParameterError::positive("band_window_m", w))?;
+    if section.semi_max <= section.low_max {
+        let message = format!("is {}; it must be above low_max = {}", section.semi_max, section.low_max);
+        return Err(ParameterError::new("semi_max", message));
+    }
+    Ok(())
+}
+
+/// Ids match [a-z0-9][a-z0-9.-]{0,63}.
+fn check_id(key: &str, id: &str) -> Result<(), ParameterError> {
+    let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit();
+    let right = id.len() <= 64 && id.starts_with(plain) && id.chars().all(|c| plain(c) || c == '.' || c == '-');
+    if right {
+        return Ok(());
+    }
+    let rule = "it must be 1 to 64 of a-z, 0-9, `.` and `-`, and start with a letter or digit";
+    Err(ParameterError::new(key, format!("is \"{id}\"; {rule}")))
+}
+
+/// Dates are days that the Gregorian calendar has.
+fn check_date(date: &str) -> Result<(), ParameterError> {
+    let part = |range: std::ops::Range<usize>| date.get(range)?.parse::<u32>().ok();
+    let shape = date.len() == 10
+        && date.bytes().enumerate().all(|(i, b)| match i {
+            4 | 7 => b == b'-',
+            _ => b.is_ascii_digit(),
+        });
+    let day_exists = || {
+        let (year, month, day) = (part(0..4)?, part(5..7)?, part(8..10)?);
+        let leap = year % 4 == 0 && (year % 100 != 0 || year % 400 == 0);
+        let days = [31, if leap { 29 } else { 28 }, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31];
+        let last = *days.get((month as usize).checked_sub(1)?)?;
+        (1..=last).contains(&day).then_some(())
+    };
+    if shape && day_exists().is_some() {
+        return Ok(());
+    }
+    Err(ParameterError::new("date", format!("is \"{date}\"; it must be a day, YYYY-MM-DD")))
+}
+
+fn check_license(license: &str) -> Result<(), ParameterError> {
+    if license.trim().is_empty() {
+        return Err(ParameterError::new("license", "is empty; it must be an SPDX expression such as CC-BY-4.0"));
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HEAD: &str = "[study]\nname = \"x\"\nseed = 1\ndate = \"2024-02-29\"\n";
+
+    fn parse(text: &str) -> Result<Study, StudyError> {
+        Study::parse(text, Path::new("."), &["terrain", "dem"])
+    }
+
+    fn refusal(text: &str) -> (String, String) {
+        let error = parse(text).err().expect("refused");
+        (error.message, error.span.map(|s| text[s].to_owned()).unwrap_or_default())
+    }
+
+    #[test]
+    fn val_defaults() {
+        let study = parse(HEAD).unwrap();
+        assert_eq!((study.head.title.as_str(), study.head.epoch_ns), ("x", 1_700_000_000_000_000_000));
+        assert!((study.roughness.low_max - 0.293).abs() < 1e-3 && (study.roughness.semi_max - 0.820).abs() < 1e-3);
+    }
+
+    #[test]
+    fn val_refusals_name_the_place() {
+        let at = |text: &str, words: &str, place: &str| {
+            let (message, span) = refusal(text);
+            assert!(message.contains(words) && span == place, "{message:?} at {span:?}");
+        };
+        at(&HEAD.replace("02-29", "02-30"), "YYYY-MM-DD", "\"2024-02-30\"");
+        at(&HEAD.replace("2024-02-29", "2024-€2-29"), "YYYY-MM-DD", "\"2024-€2-29\"");
+        at(&HEAD.replace("seed", "sead"), "unknown key `sead`", "sead");
+        at(&HEAD.replace("\"x\"", "\"X y\""), "a-z", "\"X y\"");
+        at(&HEAD.replace("seed = 1", "seed = -1"), "seed", "-1");
+        at(&format!("{HEAD}[roughness]\nlow_max = 2.0\n"), "above low_max", "[roughness]");
+        at(&format!("{HEAD}[[terain]]\nid = \"a\"\n"), "unknown section `terain`", "terain");
+        at(&format!("{HEAD}[extra]\n"), "unknown section", "extra");
+    }
+}

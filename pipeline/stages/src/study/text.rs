@@ -1,0 +1,151 @@
+//! The text of a study: TOML to JSON values, with the place of every key kept for error messages.
+
+use serde_json::{Map, Number, Value};
+use std::ops::Range;
+use toml_edit::{Document, Item, TableLike};
+
+/// Something wrong in a study's text.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{message}")]
+pub struct StudyError {
+    /// What is wrong and what would be right.
+    pub message: String,
+    /// Bytes of the study's text that it is about.
+    pub span: Option<Range<usize>>,
+    /// A suggestion.
+    pub help: Option<String>,
+}
+
+impl StudyError {
+    /// An error about a place in the text.
+    pub fn at(span: Option<Range<usize>>, message: impl Into<String>) -> Self {
+        Self { message: message.into(), span, help: None }
+    }
+
+    /// The error with a suggestion.
+    pub fn with_help(self, help: Option<String>) -> Self {
+        Self { help, ..self }
+    }
+}
+
+/// A parsed TOML text.
+#[derive(Debug)]
+pub struct StudyText {
+    document: Document<String>,
+}
+
+impl StudyText {
+    /// Parses TOML.
+    ///
+    /// # Errors
+    /// The parser's message and place.
+    pub fn parse(text: &str) -> Result<Self, StudyError> {
+        let document = Document::parse(text.to_owned())
+            .map_err(|e| StudyError::at(e.span(), format!("not valid TOML: {}", e.message().trim())))?;
+        Ok(Self { document })
+    }
+
+    /// The whole text as JSON.
+    ///
+    /// # Errors
+    /// A date or a number that is not finite, with its place.
+    pub fn to_json(&self) -> Result<Value, StudyError> {
+        table_to_json(self.document.as_table())
+    }
+
+    /// Place of the value at a path (array positions as numbers), or of its nearest parent that has one. `key` asks for the
+    /// key's own place instead of its value's.
+    pub fn span(&self, path: &[String], key: bool) -> Option<Range<usize>> {
+        let mut item: &Item = self.document.as_item();
+        let mut best = None;
+        for segment in path {
+            let Some((span, next)) = step(item, segment, key) else { break };
+            best = span.or(best);
+            let Some(next) = next else { break };
+            item = next;
+        }
+        best
+    }
+}
+
+/// The place of `segment` below `item`, and the item there. Values inside arrays have a place but no item.
+fn step<'a>(item: &'a Item, segment: &str, key: bool) -> Option<(Option<Range<usize>>, Option<&'a Item>)> {
+    if let Some(table) = item.as_table_like() {
+        let (name, value) = table.get_key_value(segment)?;
+        let span = if key { name.span() } else { value.span() };
+        return Some((span.or(name.span()), Some(value)));
+    }
+    let index: usize = segment.parse().ok()?;
+    if let Some(array) = item.as_array() {
+        return Some((array.get(index)?.span(), None));
+    }
+    // One table of an array of tables is not an `Item`; descend through the array's own index.
+    item.as_array_of_tables()?.get(index)?;
+    Some((item.get(index).and_then(Item::span), item.get(index)))
+}
+
+fn table_to_json(table: &dyn TableLike) -> Result<Value, StudyError> {
+    let entries = table.iter().map(|(key, item)| Ok((key.to_owned(), item_to_json(item)?)));
+    Ok(Value::Object(entries.collect::<Result<Map<_, _>, StudyError>>()?))
+}
+
+fn item_to_json(item: &Item) -> Result<Value, StudyError> {
+    match item {
+        Item::None => Ok(Value::Null),
+        Item::Value(value) => value_to_json(value),
+        Item::Table(table) => table_to_json(table),
+        Item::ArrayOfTables(tables) => {
+            tables.iter().map(|t| table_to_json(t)).collect::<Result<_, _>>().map(Value::Array)
+        }
+    }
+}
+
+/// A TOML value as JSON.
+///
+/// # Errors
+/// Dates, and numbers that are not finite: no parameter takes them.
+pub fn value_to_json(value: &toml_edit::Value) -> Result<Value, StudyError> {
+    use toml_edit::Value as Toml;
+    let refuse = |what: &str| StudyError::at(value.span(), what);
+    match value {
+        Toml::String(v) => Ok(Value::String(v.value().clone())),
+        Toml::Integer(v) => Ok(Value::Number((*v.value()).into())),
+        Toml::Float(v) => Number::from_f64(*v.value())
+            .map(Value::Number)
+            .ok_or_else(|| refuse("the number is not finite; every parameter takes finite numbers only")),
+        Toml::Boolean(v) => Ok(Value::Bool(*v.value())),
+        Toml::Datetime(_) => Err(refuse("dates are written as text, \"YYYY-MM-DD\"")),
+        Toml::Array(v) => v.iter().map(value_to_json).collect::<Result<_, _>>().map(Value::Array),
+        Toml::InlineTable(v) => table_to_json(v),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TEXT: &str =
+        "[study]\nname = \"x\"\n[[terrain]]\nid = \"a\"\nlow.sigma = 1\n[[terrain]]\nid = \"b\"\nlist = [1, 2]\n";
+
+    fn path(words: &[&str]) -> Vec<String> {
+        words.iter().map(|w| (*w).to_owned()).collect()
+    }
+
+    #[test]
+    fn val_places() {
+        let text = StudyText::parse(TEXT).unwrap();
+        let at = |words: &[&str], key| text.span(&path(words), key).map(|s| &TEXT[s]);
+        assert_eq!(at(&["study", "name"], false), Some("\"x\""));
+        assert_eq!(at(&["terrain", "0", "low", "sigma"], true), Some("sigma"));
+        assert_eq!(at(&["terrain", "1", "id"], false), Some("\"b\""));
+        assert_eq!(at(&["terrain", "1", "list", "1"], false), Some("2"));
+        assert_eq!(at(&["terrain", "1", "nothing"], false), Some("[[terrain]]"));
+    }
+
+    #[test]
+    fn val_refusals() {
+        let error = StudyText::parse("a = nan").unwrap().to_json().unwrap_err();
+        assert!(error.message.contains("not finite") && error.span == Some(4..7));
+        assert!(StudyText::parse("a = [").unwrap_err().message.contains("TOML"));
+    }
+}

@@ -1,0 +1,52 @@
+//! Verbs that work on single files: the same kernels as in a study, without a study.
+
+pub mod fit;
+pub mod parameters;
+pub mod roughness;
+pub mod terrain;
+pub mod texture;
+pub mod traverse;
+
+use crate::error::Error;
+use sastrugi_numeric::Grid;
+use sastrugi_store::dem::Format;
+use serde_json::{Value, json};
+use std::path::Path;
+
+/// Refuses an output name that no format has, before any work is done.
+fn check_output(path: &Path) -> Result<(), Error> {
+    if Format::of_name(path).is_some() {
+        return Ok(());
+    }
+    let message =
+        format!("{}: the ending names no DEM format; .tif, .asc, .hgt, .png, .npy and .obj do", path.display());
+    Err(Error::Usage(message))
+}
+
+/// Shape and height range for people.
+pub fn describe_grid(grid: &Grid) -> Value {
+    let g = &grid.geometry;
+    let (low, high) = grid.range().map_or((None, None), |(low, high)| (Some(low), Some(high)));
+    json!({
+        "rows": g.rows,
+        "cols": g.cols,
+        "cell": g.cell,
+        "origin": g.origin,
+        "size": g.size(),
+        "valid_cells": grid.finite_count(),
+        "height_min": low,
+        "height_max": high,
+    })
+}
+
+/// Numbers separated by commas (or `x`).
+///
+/// # Errors
+/// Anything that is not `n` finite numbers.
+pub fn numbers<const N: usize>(option: &str, text: &str) -> Result<[f64; N], Error> {
+    let numbers: Option<Vec<f64>> = text.split([',', 'x']).map(|w| w.trim().parse().ok()).collect();
+    let numbers = numbers.filter(|v| v.iter().all(|x: &f64| x.is_finite()));
+    numbers
+        .and_then(|v| <[f64; N]>::try_from(v).ok())
+        .ok_or_else(|| Error::Usage(format!("`{option} {text}`: it takes {N} numbers")))
+}

@@ -1,0 +1,109 @@
+//! Parameters given on a command line or in a small TOML file, brought to the form that a study's items have.
+
+use crate::error::Error;
+use crate::study::keys;
+use crate::study::text::{StudyText, value_to_json};
+use sastrugi_schemas::Kind;
+use serde_json::{Map, Value};
+
+/// Sets `name=value` pairs (dotted names reach into tables); the value is TOML, a bare word is text.
+///
+/// # Errors
+/// A pair without `=`, or a value that is not finite.
+pub fn assign(params: &mut Value, pairs: &[String]) -> Result<(), Error> {
+    for pair in pairs {
+        let (name, text) = pair
+            .split_once('=')
+            .filter(|(name, _)| !name.trim().is_empty())
+            .ok_or_else(|| Error::Usage(format!("`--set {pair}`: it takes name=value")))?;
+        place(params, name.trim(), parse_value(pair, text.trim())?)?;
+    }
+    Ok(())
+}
+
+fn parse_value(pair: &str, text: &str) -> Result<Value, Error> {
+    match text.parse::<toml_edit::Value>() {
+        Ok(value) => value_to_json(&value).map_err(|e| Error::Usage(format!("`--set {pair}`: {e}"))),
+        Err(_) => Ok(Value::String(text.to_owned())),
+    }
+}
+
+fn place(params: &mut Value, dotted: &str, value: Value) -> Result<(), Error> {
+    let mut at = params;
+    for word in dotted.split('.') {
+        let map = at.as_object_mut().ok_or_else(|| Error::Usage(format!("`{dotted}`: its parent is no table")))?;
+        at = map.entry(word).or_insert_with(|| Value::Object(Map::new()));
+    }
+    *at = value;
+    Ok(())
+}
+
+/// A JSON value as TOML.
+///
+/// # Errors
+/// Nulls and integers beyond 64 bits, which TOML does not have.
+pub fn to_toml(value: &Value) -> Result<toml_edit::Value, Error> {
+    let refuse = || Error::Usage(format!("{value} has no TOML form"));
+    Ok(match value {
+        Value::Null => return Err(refuse()),
+        Value::Bool(b) => (*b).into(),
+        Value::String(s) => s.as_str().into(),
+        Value::Number(n) => match n.as_i64() {
+            Some(integer) => integer.into(),
+            None => n.as_f64().filter(|_| n.is_f64()).ok_or_else(refuse)?.into(),
+        },
+        Value::Array(list) => list.iter().map(to_toml).collect::<Result<toml_edit::Array, _>>()?.into(),
+        Value::Object(map) => {
+            let pairs = map.iter().map(|(k, v)| Ok((k.as_str(), to_toml(v)?)));
+            pairs.collect::<Result<toml_edit::InlineTable, Error>>()?.into()
+        }
+    })
+}
+
+/// A TOML file of parameters.
+///
+/// # Errors
+/// A file that is missing, or not valid TOML.
+pub fn read_file(path: &std::path::Path) -> Result<Value, Error> {
+    let text = std::fs::read_to_string(path).map_err(|e| Error::Input(format!("{}: {e}", path.display())))?;
+    let name = path.display().to_string();
+    StudyText::parse(&text).and_then(|t| t.to_json()).map_err(|error| Error::Study { name, text, error })
+}
+
+/// Refuses parameters that a kind does not have.
+///
+/// # Errors
+/// The first unknown parameter, with the nearest known one.
+pub fn check(params: &Value, kind: &Kind) -> Result<(), Error> {
+    check_schema(params, &kind.parameters, kind.kind)
+}
+
+/// Refuses keys that a schema does not have.
+///
+/// # Errors
+/// The first unknown key, with the nearest known one.
+pub fn check_schema(params: &Value, schema: &Value, of: &str) -> Result<(), Error> {
+    let Some(unknown) = keys::find_unknown(params, schema) else { return Ok(()) };
+    let hint = match unknown.nearest() {
+        Some(nearest) => format!("did you mean `{nearest}`?"),
+        None => format!("it has {}", unknown.known.join(", ")),
+    };
+    Err(Error::Usage(format!("`{of}` has no parameter `{}`; {hint}", unknown.path.join("."))))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn val_pairs() {
+        let mut params = json!({});
+        let pairs = ["a=1", "b.c=[1.5, 2]", "word=gaussian", "t=\"x y\"", "u={v=true}"].map(str::to_owned);
+        assign(&mut params, &pairs).unwrap();
+        assert_eq!(params, json!({"a": 1, "b": {"c": [1.5, 2]}, "word": "gaussian", "t": "x y", "u": {"v": true}}));
+        assert!(assign(&mut params, &["x".to_owned()]).is_err());
+        assert!(assign(&mut params, &["x=nan".to_owned()]).is_err());
+        assert!(assign(&mut params, &["a.b=1".to_owned()]).is_err());
+    }
+}

@@ -1,0 +1,77 @@
+//! `terrain`: one generated heightfield to a file.
+
+use super::parameters;
+use crate::error::Error;
+use crate::jobs::terrain::{STAGE, generate, write_png16};
+use sastrugi_numeric::Streams;
+use sastrugi_store::dem::{self, Crs, Format, WriteOptions};
+use serde_json::{Value, json};
+use std::path::Path;
+
+/// What to generate.
+pub struct Request<'a> {
+    /// A generator's name, or a TOML file with `kind` and its parameters.
+    pub spec: &'a str,
+    /// `name=value` pairs.
+    pub set: &'a [String],
+    /// Seed of the random streams; the file's, or 0, when absent.
+    pub seed: Option<u64>,
+    /// Where to write.
+    pub output: &'a Path,
+    /// How to write.
+    pub options: WriteOptions,
+}
+
+/// Generates a terrain and writes it. A study's item with the same parameters and an explicit `seed` has the same bytes.
+/// Returns what was made.
+///
+/// # Errors
+/// Unknown kinds and parameters, parameters out of range, files that cannot be written.
+pub fn terrain(request: &Request<'_>) -> Result<Value, Error> {
+    let (kind, mut params, seed) = read_spec(request.spec)?;
+    parameters::assign(&mut params, request.set)?;
+    if let Some(known) = sastrugi_terrain::kinds().iter().find(|k| k.kind == kind) {
+        parameters::check(&params, known)?;
+    }
+    let generator = sastrugi_terrain::prepare(&kind, &params)?;
+    let seed = request.seed.or(seed).unwrap_or(0);
+    super::check_output(request.output)?;
+    let streams = Streams::for_seed(seed, STAGE);
+    let heights = generate(generator.as_ref(), &streams)?;
+    let mut notes = generator.notes();
+    if Format::of_name(request.output) == Some(Format::Png) {
+        notes.push(write_png16(generator.as_ref(), &heights, request.output)?);
+    } else {
+        let lost = dem::write(request.output, &heights, &Crs::default(), &request.options).map_err(Error::failed)?;
+        notes.extend(lost);
+    }
+    Ok(json!({
+        "file": request.output.display().to_string(),
+        "kind": kind,
+        "seed": seed,
+        "stream": streams.label(),
+        "parameters": generator.parameters(),
+        "grid": super::describe_grid(&heights),
+        "notes": notes,
+    }))
+}
+
+/// Kind, parameters and seed of a specification.
+fn read_spec(spec: &str) -> Result<(String, Value, Option<u64>), Error> {
+    if !spec.to_ascii_lowercase().ends_with(".toml") {
+        return Ok((spec.to_owned(), json!({}), None));
+    }
+    let mut table = parameters::read_file(Path::new(spec))?;
+    let map = table.as_object_mut().ok_or_else(|| Error::Usage(format!("{spec}: it holds no table")))?;
+    let Some(Value::String(kind)) = map.remove("kind") else {
+        return Err(Error::Usage(format!("{spec}: `kind` is missing; it names a generator (see `sastrugi kinds`)")));
+    };
+    let seed =
+        match map.remove("seed") {
+            None => None,
+            Some(seed) => Some(seed.as_u64().ok_or_else(|| {
+                Error::Usage(format!("{spec}: `seed` is {seed}; it must be a whole number, 0 or above"))
+            })?),
+        };
+    Ok((kind, table, seed))
+}

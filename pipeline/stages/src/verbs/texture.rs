@@ -1,0 +1,80 @@
+//! `texture`: a field that matches a fit file.
+
+use super::parameters;
+use crate::error::Error;
+use crate::jobs::dem::input_error;
+use crate::jobs::texture::{STAGE, kinds};
+use sastrugi_numeric::Streams;
+use sastrugi_schemas::fit::FitFile;
+use sastrugi_store::dem::{self, Crs, WriteOptions};
+use serde_json::{Value, json};
+use std::path::Path;
+
+/// What to synthesise.
+pub struct Request<'a> {
+    /// Fit file.
+    pub fit: &'a Path,
+    /// Synthesis method.
+    pub method: &'a str,
+    /// Parameters of the method.
+    pub parameters: Value,
+    /// Seed of the random streams.
+    pub seed: u64,
+    /// Base DEM to add the texture to.
+    pub onto: Option<&'a Path>,
+    /// DEM to write.
+    pub output: &'a Path,
+    /// How to write.
+    pub options: WriteOptions,
+}
+
+/// Synthesises a texture and writes it. A study's item with the same fit, parameters and explicit `seed` has the same bytes.
+/// Returns what was made.
+///
+/// # Errors
+/// Unknown methods and parameters, an unusable fit file or base, a file that cannot be written.
+pub fn texture(request: &Request<'_>) -> Result<Value, Error> {
+    if let Some(known) = kinds().iter().find(|k| k.kind == request.method) {
+        parameters::check(&request.parameters, known)?;
+    }
+    let fit = read_fit(request.fit)?;
+    let synthesis = sastrugi_texture::prepare(request.method, &request.parameters, &fit)?;
+    super::check_output(request.output)?;
+    let streams = Streams::for_seed(request.seed, STAGE);
+    let outcome = synthesis.generate(&streams).map_err(Error::failed)?;
+    let (heights, crs) = match request.onto {
+        None => (outcome.grid, Crs::default()),
+        Some(path) => {
+            let base = dem::read(path).map_err(|e| Error::from(input_error(&e)))?;
+            let sum = sastrugi_texture::onto(&base.grid, &outcome.grid).map_err(|e| Error::Usage(e.to_string()))?;
+            (sum, base.info.crs)
+        }
+    };
+    let mut notes = synthesis.notes();
+    notes.extend(dem::write(request.output, &heights, &crs, &request.options).map_err(Error::failed)?);
+    Ok(json!({
+        "file": request.output.display().to_string(),
+        "method": request.method,
+        "seed": request.seed,
+        "stream": streams.label(),
+        "parameters": synthesis.parameters(),
+        "covariance_error_max_m2": outcome.covariance_error_max_m2,
+        "clip_share": outcome.clip_share,
+        "grid": super::describe_grid(&heights),
+        "notes": notes,
+    }))
+}
+
+/// Reads a fit file; `model` and `parameters` are enough.
+///
+/// # Errors
+/// A missing file, or one that is no fit.
+pub fn read_fit(path: &Path) -> Result<FitFile, Error> {
+    let name = path.display();
+    let bytes = std::fs::read(path).map_err(|e| Error::Input(format!("{name}: {e}")))?;
+    let fit: FitFile = serde_json::from_slice(&bytes).map_err(|e| Error::Input(format!("{name}: no fit file: {e}")))?;
+    if fit.model.is_empty() || fit.parameters.is_empty() {
+        return Err(Error::Input(format!("{name}: no fit file: it needs `model` and `parameters`")));
+    }
+    Ok(fit)
+}

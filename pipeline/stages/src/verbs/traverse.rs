@@ -1,0 +1,66 @@
+//! `traverse`: missions over one DEM, as a small study of its own.
+
+use super::parameters;
+use crate::error::Error;
+use crate::runner::progress::Progress;
+use crate::studies::{RunRequest, RunSummary, run_text};
+use serde_json::{Map, Value, json};
+use std::path::Path;
+use toml_edit::{ArrayOfTables, DocumentMut, Item, Table};
+
+/// What to drive.
+pub struct Request<'a> {
+    /// DEM.
+    pub dem: &'a Path,
+    /// Seed of the random streams.
+    pub seed: u64,
+    /// Rules of the missions.
+    pub missions: Value,
+    /// Parameters of the run, vehicle included.
+    pub parameters: Value,
+    /// Date that the release carries.
+    pub date: &'a str,
+}
+
+/// Drives missions over a DEM and writes a release with recordings, tables and report.
+///
+/// # Errors
+/// As [`crate::studies::run`].
+pub fn traverse(request: &Request<'_>, run: &RunRequest<'_>, progress: &dyn Progress) -> Result<RunSummary, Error> {
+    let path = std::path::absolute(request.dem).map_err(|e| Error::Input(format!("{}: {e}", request.dem.display())))?;
+    if !path.is_file() {
+        return Err(Error::Input(format!("{}: no such file", request.dem.display())));
+    }
+    let study = json!({ "name": "traverse", "seed": request.seed, "date": request.date });
+    let dem = json!({ "id": "dem", "file": path.to_string_lossy() });
+    let missions = with(json!({ "id": "missions", "terrains": ["dem"], "seed": request.seed }), &request.missions)?;
+    let drive = with(json!({ "id": "mission", "missions": "missions" }), &request.parameters)?;
+    let mut document = DocumentMut::new();
+    document["study"] = Item::Table(table(&study)?);
+    for (section, item) in [("dem", dem), ("missions", missions), ("traverse", drive)] {
+        let mut tables = ArrayOfTables::new();
+        tables.push(table(&item)?);
+        document[section] = Item::ArrayOfTables(tables);
+    }
+    run_text(&document.to_string(), Path::new(""), run, progress)
+}
+
+/// An envelope with parameters beside its keys; the envelope's keys are not the caller's to set.
+fn with(mut envelope: Value, more: &Value) -> Result<Value, Error> {
+    let (Some(map), Some(more)) = (envelope.as_object_mut(), more.as_object()) else { return Ok(envelope) };
+    for (key, value) in more {
+        if map.insert(key.clone(), value.clone()).is_some() {
+            return Err(Error::Usage(format!("`{key}` cannot be set here")));
+        }
+    }
+    Ok(envelope)
+}
+
+fn table(value: &Value) -> Result<Table, Error> {
+    let empty = Map::new();
+    let mut table = Table::new();
+    for (key, value) in value.as_object().unwrap_or(&empty) {
+        table.insert(key, Item::Value(parameters::to_toml(value)?));
+    }
+    Ok(table)
+}
