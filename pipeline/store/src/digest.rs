@@ -55,7 +55,8 @@ impl ContentHash {
     }
 }
 
-/// Content hash of heights as a release stores them: shape, place and single-precision values, no data as one NaN.
+/// Content hash of heights as a release stores them: shape, cell size and single-precision values, no data as one NaN.
+/// (Not the place, which formats state in different ways that round differently.)
 pub fn heights(grid: &Grid) -> String {
     let mut hash = ContentHash::new("heights");
     geometry(&mut hash, grid);
@@ -78,9 +79,7 @@ fn geometry<T>(hash: &mut ContentHash, grid: &Grid<T>) {
     let g = &grid.geometry;
     hash.u64(g.rows as u64);
     hash.u64(g.cols as u64);
-    for v in g.cell.iter().chain(&g.origin) {
-        hash.f64(*v);
-    }
+    g.cell.iter().for_each(|v| hash.f64(*v));
 }
 
 fn canonical_f32(value: f64) -> f32 {

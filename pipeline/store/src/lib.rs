@@ -10,6 +10,7 @@
 pub mod atomic;
 pub mod dem;
 pub mod digest;
+pub mod mcap;
 pub mod parquet;
 pub mod release;
 

@@ -1,0 +1,347 @@
+//! The messages of a mission, topic by topic.
+
+use super::mesh::{self, Patch, Square};
+use super::protobuf::{self, Value};
+use super::{McapError, MissionMcap, Pending, log_time, timestamp};
+use foxglove::Encode;
+use foxglove::messages as fox;
+use foxglove::messages::{Color, Point3, Pose, Quaternion, Timestamp, Vector2, Vector3};
+use prost::Message;
+use sastrugi_numeric::{Geometry, Surface};
+use sastrugi_schemas::RoughnessClass;
+use sastrugi_schemas::topics::{
+    self, CommandSample, Event, EventKind, ImuSample, Recording, StateSample, Topic, VIEWER, WheelSample, WheelState,
+};
+
+const MAP: &str = "map";
+const BASE: &str = "base_link";
+/// Most cells along a side of `/terrain/grid`.
+const GRID_CELLS: usize = 64;
+/// Poses per second of `/vehicle/path`.
+const PATH_RATE_HZ: f64 = 2.0;
+/// Steps per unit in which sensor-like values are stored: finer than any sensor's noise, and short to compress.
+/// Angles, rates and ratios.
+const FINE: f64 = 4096.0;
+/// Specific forces and torques.
+const MEDIUM: f64 = 512.0;
+/// Forces.
+const COARSE: f64 = 32.0;
+/// Coordinates of contact points.
+const CONTACT: f64 = 16384.0;
+const GREY: [u8; 3] = [0x9a, 0x9a, 0x94];
+const IDENTITY: [f64; 4] = [0.0, 0.0, 0.0, 1.0];
+
+/// The schema of a topic that carries one of Foxglove's messages.
+pub(super) fn public_schema(topic: &Topic) -> Option<Vec<u8>> {
+    let schema = match topic.schema {
+        "foxglove.FrameTransforms" => fox::FrameTransforms::get_schema(),
+        "foxglove.Grid" => fox::Grid::get_schema(),
+        "foxglove.Log" => fox::Log::get_schema(),
+        "foxglove.PoseInFrame" => fox::PoseInFrame::get_schema(),
+        "foxglove.PosesInFrame" => fox::PosesInFrame::get_schema(),
+        "foxglove.SceneUpdate" => fox::SceneUpdate::get_schema(),
+        _ => None,
+    };
+    schema.map(|s| s.data.into_owned())
+}
+
+/// All messages of a mission, in no particular order.
+pub(super) fn of_mission(mission: &MissionMcap) -> Result<Vec<Pending>, McapError> {
+    let mut out = Messages { epoch_ns: mission.epoch_ns, pending: vec![] };
+    let recording = mission.recording;
+    out.add(&topics::terrain_mesh::TOPIC, 0.0, |t| terrain_mesh(mission, t).encode_to_vec())?;
+    out.add(&topics::terrain_grid::TOPIC, 0.0, |t| terrain_grid(mission, t).encode_to_vec())?;
+    out.add(&topics::vehicle_shape::TOPIC, 0.0, |t| vehicle_shape(mission, t).encode_to_vec())?;
+    out.add(&topics::vehicle_path::TOPIC, 0.0, |t| vehicle_path(recording, t).encode_to_vec())?;
+    let wheels = recording.wheels.iter().map(Some).chain(std::iter::repeat(None));
+    for (state, wheels) in recording.states.iter().zip(wheels) {
+        out.add(&topics::tf::TOPIC, state.time_s, |t| transforms(recording, state, wheels, t).encode_to_vec())?;
+        out.add(&topics::vehicle_pose::TOPIC, state.time_s, |t| vehicle_pose(state, t).encode_to_vec())?;
+        out.add(&topics::state::TOPIC, state.time_s, |t| protobuf::encode(&t, &state_values(state)))?;
+    }
+    for sample in &recording.imu {
+        out.add(&topics::imu::TOPIC, sample.time_s, |t| protobuf::encode(&t, &imu_values(sample)))?;
+    }
+    let names: Vec<String> = recording.vehicle.wheels.iter().map(|w| w.name.clone()).collect();
+    for sample in &recording.wheels {
+        out.add(&topics::wheels::TOPIC, sample.time_s, |t| protobuf::encode(&t, &wheel_values(&names, sample)))?;
+    }
+    for sample in &recording.commands {
+        out.add(&topics::command::TOPIC, sample.time_s, |t| protobuf::encode(&t, &command_values(sample)))?;
+    }
+    for event in &recording.events {
+        out.add(&topics::events::TOPIC, event.time_s, |t| log(event, t).encode_to_vec())?;
+    }
+    Ok(out.pending)
+}
+
+struct Messages {
+    epoch_ns: u64,
+    pending: Vec<Pending>,
+}
+
+impl Messages {
+    fn add(&mut self, topic: &Topic, time_s: f64, data: impl FnOnce(Timestamp) -> Vec<u8>) -> Result<(), McapError> {
+        let log_time = log_time(self.epoch_ns, time_s);
+        let topic = VIEWER.iter().position(|t| t.name == topic.name);
+        let topic = topic.ok_or_else(|| McapError::unfit("a topic is not listed"))?;
+        self.pending.push(Pending { topic, log_time, data: data(timestamp(log_time)?) });
+        Ok(())
+    }
+}
+
+pub(super) fn state_values(s: &StateSample) -> Vec<Value> {
+    let parts = [&s.position_m[..], &s.orientation, &s.velocity_m_s, &s.angular_velocity_rad_s];
+    parts.concat().into_iter().map(Value::Double).collect()
+}
+
+pub(super) fn imu_values(s: &ImuSample) -> Vec<Value> {
+    let rates = s.angular_velocity_rad_s.map(|v| in_steps(v, FINE));
+    let forces = s.specific_force_m_s2.map(|v| in_steps(v, MEDIUM));
+    rates.into_iter().chain(forces).map(Value::Float).collect()
+}
+
+pub(super) fn command_values(c: &CommandSample) -> Vec<Value> {
+    let values = [c.speed_m_s, c.yaw_rate_rad_s, c.cross_track_m, c.heading_error_rad, c.distance_to_goal_m];
+    values.map(|v| Value::Float(in_steps(v, FINE))).into()
+}
+
+pub(super) fn wheel_values(names: &[String], sample: &WheelSample) -> Vec<Value> {
+    let all = |steps: f64, f: fn(&WheelState) -> f64| {
+        Value::Floats(sample.wheels.iter().map(|w| in_steps(f(w), steps)).collect())
+    };
+    let contact = |axis: usize| {
+        let touching =
+            |w: &WheelState| if w.normal_force_n == 0.0 { 0.0 } else { in_steps(w.contact_m[axis], CONTACT) };
+        Value::Doubles(sample.wheels.iter().map(touching).collect())
+    };
+    vec![
+        Value::Texts(names.to_vec()),
+        all(FINE, |w| w.angle_rad),
+        all(FINE, |w| w.spin_rad_s),
+        all(MEDIUM, |w| w.torque_n_m),
+        all(COARSE, |w| w.normal_force_n),
+        all(COARSE, |w| w.longitudinal_force_n),
+        all(COARSE, |w| w.lateral_force_n),
+        all(FINE, |w| w.slip_ratio),
+        contact(0),
+        contact(1),
+        contact(2),
+    ]
+}
+
+fn in_steps(value: f64, steps: f64) -> f64 {
+    (value * steps).round() / steps
+}
+
+fn transforms(
+    recording: &Recording,
+    state: &StateSample,
+    wheels: Option<&WheelSample>,
+    time: Timestamp,
+) -> fox::FrameTransforms {
+    let transform = |parent: &str, child: &str, translation: [f64; 3], rotation: [f64; 4]| fox::FrameTransform {
+        timestamp: Some(time),
+        parent_frame_id: parent.to_owned(),
+        child_frame_id: child.to_owned(),
+        translation: Some(vector(translation)),
+        rotation: Some(quaternion(rotation)),
+    };
+    let mut all = vec![transform(MAP, BASE, state.position_m, state.orientation)];
+    for (index, outline) in recording.vehicle.wheels.iter().enumerate() {
+        let angle = wheels.and_then(|sample| sample.wheels.get(index)).map_or(0.0, |w| w.angle_rad);
+        // Forward rolling turns z towards x: a positive turn about y.
+        let (sin, cos) = libm::sincos(0.5 * angle);
+        all.push(transform(BASE, &outline.name, outline.hub_m, [0.0, sin, 0.0, cos]));
+    }
+    fox::FrameTransforms { transforms: all }
+}
+
+fn vehicle_pose(state: &StateSample, time: Timestamp) -> fox::PoseInFrame {
+    fox::PoseInFrame { timestamp: Some(time), frame_id: MAP.to_owned(), pose: Some(pose_of(state)) }
+}
+
+fn vehicle_path(recording: &Recording, time: Timestamp) -> fox::PosesInFrame {
+    let step = (recording.sample_rate_hz / PATH_RATE_HZ).round().max(1.0) as usize;
+    let last = recording.states.last().filter(|_| !(recording.states.len() - 1).is_multiple_of(step));
+    let poses = recording.states.iter().step_by(step).chain(last).map(pose_of).collect();
+    fox::PosesInFrame { timestamp: Some(time), frame_id: MAP.to_owned(), poses }
+}
+
+fn log(event: &Event, time: Timestamp) -> fox::Log {
+    let level = match event.kind {
+        EventKind::Start | EventKind::Success => fox::log::Level::Info,
+        EventKind::Timeout | EventKind::OutOfBounds | EventKind::Stuck => fox::log::Level::Warning,
+        EventKind::Tipped => fox::log::Level::Error,
+    };
+    fox::Log {
+        timestamp: Some(time),
+        level: level as i32,
+        message: event.text.clone(),
+        name: event.kind.name().to_owned(),
+        ..fox::Log::default()
+    }
+}
+
+fn vehicle_shape(mission: &MissionMcap, time: Timestamp) -> fox::SceneUpdate {
+    let vehicle = &mission.recording.vehicle;
+    let body = fox::SceneEntity {
+        cubes: vec![fox::CubePrimitive {
+            pose: Some(pose(vehicle.chassis_centre_m, IDENTITY)),
+            size: Some(vector(vehicle.chassis_size_m)),
+            color: Some(colour([0xd8, 0xb0, 0x20], 0.9)),
+        }],
+        ..entity(time, BASE, "chassis", true)
+    };
+    let wheels = vehicle.wheels.iter().map(|wheel| {
+        let half = std::f64::consts::FRAC_1_SQRT_2;
+        let cylinder = fox::CylinderPrimitive {
+            // A cylinder stands along z; turned by a right angle about x it lies along the axle.
+            pose: Some(pose([0.0; 3], [half, 0.0, 0.0, half])),
+            size: Some(vector([2.0 * wheel.radius_m, 2.0 * wheel.radius_m, wheel.width_m])),
+            bottom_scale: 1.0,
+            top_scale: 1.0,
+            color: Some(colour([0x28, 0x28, 0x28], 1.0)),
+        };
+        fox::SceneEntity { cylinders: vec![cylinder], ..entity(time, &wheel.name, &wheel.name, true) }
+    });
+    let marker = |id: &str, [x, y]: [f64; 2], rgb| fox::SceneEntity {
+        spheres: vec![fox::SpherePrimitive {
+            pose: Some(pose([x, y, mission.dem.height(x, y).unwrap_or(0.0)], IDENTITY)),
+            size: Some(vector([0.4; 3])),
+            color: Some(colour(rgb, 0.8)),
+        }],
+        ..entity(time, MAP, id, false)
+    };
+    let markers =
+        [marker("start", mission.start_m, [0x2c, 0xa0, 0x5a]), marker("goal", mission.goal_m, [0xc8, 0x32, 0x32])];
+    fox::SceneUpdate { deletions: vec![], entities: std::iter::once(body).chain(wheels).chain(markers).collect() }
+}
+
+fn terrain_mesh(mission: &MissionMcap, time: Timestamp) -> fox::SceneUpdate {
+    let patches = mesh::terrain(mission.dem, mission.classes, &corridor(mission));
+    let triangles = patches.into_iter().map(triangle_list).collect();
+    let entity = fox::SceneEntity { triangles, ..entity(time, MAP, "terrain", false) };
+    fox::SceneUpdate { deletions: vec![], entities: vec![entity] }
+}
+
+/// Where the terrain is drawn in full: under the wheels and the chassis at every sample.
+pub(super) fn corridor(mission: &MissionMcap) -> Vec<Square> {
+    let Recording { vehicle, states, wheels, .. } = mission.recording;
+    let cell = mission.dem.geometry.cell[0].max(mission.dem.geometry.cell[1]);
+    let mut near = vec![];
+    for state in states {
+        let [x, y, _] = state.position_m;
+        near.push(Square { centre: [x, y], half_side: cell });
+        for wheel in &vehicle.wheels {
+            let [dx, dy, _] = rotated(state.orientation, wheel.hub_m);
+            let half_side = wheel.radius_m.max(0.5 * wheel.width_m) + cell;
+            near.push(Square { centre: [x + dx, y + dy], half_side });
+        }
+    }
+    let touching = wheels.iter().flat_map(|sample| &sample.wheels).filter(|wheel| wheel.normal_force_n != 0.0);
+    near.extend(touching.map(|w| Square { centre: [w.contact_m[0], w.contact_m[1]], half_side: cell }));
+    near
+}
+
+/// `v` turned by a unit quaternion `[x, y, z, w]`: v + 2 w (q x v) + 2 q x (q x v).
+fn rotated([qx, qy, qz, qw]: [f64; 4], v: [f64; 3]) -> [f64; 3] {
+    let cross =
+        |a: [f64; 3], b: [f64; 3]| [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+    let q = [qx, qy, qz];
+    let t = cross(q, v).map(|c| 2.0 * c);
+    let u = cross(q, t);
+    [v[0] + qw * t[0] + u[0], v[1] + qw * t[1] + u[1], v[2] + qw * t[2] + u[2]]
+}
+
+fn triangle_list(patch: Patch) -> fox::TriangleListPrimitive {
+    let colours = patch.codes.iter().map(|&code| class_colour(code));
+    let uniform = patch.codes.iter().all(|code| Some(code) == patch.codes.first());
+    fox::TriangleListPrimitive {
+        pose: Some(pose(patch.origin, IDENTITY)),
+        points: patch.points.iter().map(|&[x, y, z]| Point3 { x, y, z }).collect(),
+        color: colours.clone().next(),
+        colors: if uniform { vec![] } else { colours.collect() },
+        indices: patch.triangles.into_flattened(),
+    }
+}
+
+fn terrain_grid(mission: &MissionMcap, time: Timestamp) -> fox::Grid {
+    use fox::packed_element_field::NumericType;
+    let dem = mission.dem;
+    let g = &dem.geometry;
+    let step = g.rows.max(g.cols).div_ceil(GRID_CELLS);
+    let (rows, cols) = (g.rows.div_ceil(step), g.cols.div_ceil(step));
+    let mut data = Vec::with_capacity(rows * cols * 8);
+    // The message's rows run from south to north.
+    for (row, col) in (0..rows).rev().flat_map(|r| (0..cols).map(move |c| (r, c))) {
+        let (row, col) = ((row * step + step / 2).min(g.rows - 1), (col * step + step / 2).min(g.cols - 1));
+        let z = dem.at(row, col);
+        let rgb = mission.classes.map_or(GREY, |classes| class_rgb(classes.at(row, col)));
+        data.extend(rgb);
+        data.push(if z.is_finite() { 255 } else { 0 });
+        data.extend((if z.is_finite() { z as f32 } else { 0.0 }).to_le_bytes());
+    }
+    let field = |name: &str, offset, kind: NumericType| fox::PackedElementField {
+        name: name.to_owned(),
+        offset,
+        r#type: kind as i32,
+    };
+    let bytes = ["red", "green", "blue", "alpha"].into_iter().zip(0..).map(|(n, at)| field(n, at, NumericType::Uint8));
+    fox::Grid {
+        timestamp: Some(time),
+        frame_id: MAP.to_owned(),
+        pose: Some(pose(grid_corner(g, rows, step, dem.range().map_or(0.0, |(low, _)| low)), IDENTITY)),
+        column_count: cols as u32,
+        cell_size: Some(Vector2 { x: g.cell[0] * step as f64, y: g.cell[1] * step as f64 }),
+        row_stride: cols as u32 * 8,
+        cell_stride: 8,
+        fields: bytes.chain([field("elevation", 4, NumericType::Float32)]).collect(),
+        data: data.into(),
+    }
+}
+
+/// South-west corner of a thinned grid whose rows count from the north.
+fn grid_corner(g: &Geometry, rows: usize, step: usize, z: f64) -> [f64; 3] {
+    let north = g.origin[1] + g.rows as f64 * g.cell[1];
+    [g.origin[0], north - (rows * step) as f64 * g.cell[1], z]
+}
+
+fn entity(time: Timestamp, frame: &str, id: &str, frame_locked: bool) -> fox::SceneEntity {
+    fox::SceneEntity {
+        timestamp: Some(time),
+        frame_id: frame.to_owned(),
+        id: id.to_owned(),
+        frame_locked,
+        ..fox::SceneEntity::default()
+    }
+}
+
+fn class_rgb(code: u8) -> [u8; 3] {
+    RoughnessClass::from_code(code).map_or(GREY, RoughnessClass::colour)
+}
+
+fn class_colour(code: u8) -> Color {
+    colour(class_rgb(code), 1.0)
+}
+
+fn colour(rgb: [u8; 3], a: f64) -> Color {
+    let [r, g, b] = rgb.map(|v| f64::from(v) / 255.0);
+    Color { r, g, b, a }
+}
+
+fn pose_of(state: &StateSample) -> Pose {
+    pose(state.position_m, state.orientation)
+}
+
+fn pose(position: [f64; 3], orientation: [f64; 4]) -> Pose {
+    Pose { position: Some(vector(position)), orientation: Some(quaternion(orientation)) }
+}
+
+fn vector([x, y, z]: [f64; 3]) -> Vector3 {
+    Vector3 { x, y, z }
+}
+
+fn quaternion([x, y, z, w]: [f64; 4]) -> Quaternion {
+    Quaternion { x, y, z, w }
+}

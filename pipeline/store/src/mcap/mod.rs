@@ -1,0 +1,173 @@
+//! MCAP recordings of missions, viewer flavour: the topics of `sastrugi_schemas::topics`.
+//!
+//! Messages stand in the order of their time; chunks are compressed with Zstandard on one thread and carry checksums;
+//! bytes follow from the recording alone. The map frame is the terrain's own coordinates.
+
+mod mesh;
+mod messages;
+mod protobuf;
+
+#[cfg(test)]
+mod tests;
+
+use crate::digest::ContentHash;
+use crate::{PROGRAM, atomic};
+use foxglove::messages::Timestamp;
+use mcap::records::{MessageHeader, Metadata};
+use mcap::{Compression, WriteOptions, Writer};
+use sastrugi_numeric::Grid;
+use sastrugi_schemas::topics::{Recording, Topic, VIEWER};
+use std::collections::BTreeMap;
+use std::io::{self, Cursor};
+use std::path::{Path, PathBuf};
+
+/// Level of Zstandard.
+const ZSTD_LEVEL: u32 = 1;
+/// Uncompressed size of a chunk, bytes.
+const CHUNK_BYTES: u64 = 4 << 20;
+
+/// Why a recording was not written.
+#[derive(Debug, thiserror::Error)]
+pub enum McapError {
+    /// The recording cannot be put into messages.
+    #[error("the recording cannot be written: {reason}")]
+    Unfit {
+        /// What does not fit.
+        reason: String,
+    },
+    /// The MCAP writer failed.
+    #[error("the recording could not be encoded: {0}")]
+    Encoding(#[from] mcap::McapError),
+    /// The file system failed.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What failed.
+        source: io::Error,
+    },
+}
+
+impl McapError {
+    fn unfit(reason: impl Into<String>) -> Self {
+        Self::Unfit { reason: reason.into() }
+    }
+}
+
+/// A mission to write.
+#[derive(Clone, Copy, Debug)]
+pub struct MissionMcap<'a> {
+    /// What happened.
+    pub recording: &'a Recording,
+    /// Terrain it happened on.
+    pub dem: &'a Grid,
+    /// Roughness classes of the terrain, on the same cells.
+    pub classes: Option<&'a Grid<u8>>,
+    /// Start point, m.
+    pub start_m: [f64; 2],
+    /// Goal point, m.
+    pub goal_m: [f64; 2],
+    /// Start of the mission's clock, ns since 1970-01-01 UTC.
+    pub epoch_ns: u64,
+    /// Metadata records by name: `study`, `terrain`, `mission`, `vehicle`, `outcome`, `hashes` (with the terrain's
+    /// SHA-256 in place of an attachment).
+    pub metadata: &'a BTreeMap<String, BTreeMap<String, String>>,
+}
+
+/// What was written.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct McapSummary {
+    /// Number of messages.
+    pub messages: u64,
+    /// Hash of the decoded stream: topic, time and data of every message in order.
+    pub content_sha256: String,
+}
+
+/// A message before it gets its place in the file.
+struct Pending {
+    /// Position of its topic in [`VIEWER`].
+    topic: usize,
+    log_time: u64,
+    data: Vec<u8>,
+}
+
+/// Writes a mission to a file.
+///
+/// # Errors
+/// See [`McapError`].
+pub fn write_mission(path: &Path, mission: &MissionMcap) -> Result<McapSummary, McapError> {
+    let (bytes, summary) = encode_mission(mission)?;
+    atomic::write(path, &bytes).map_err(|source| McapError::Io { path: path.to_owned(), source })?;
+    Ok(summary)
+}
+
+/// A mission as the bytes of an MCAP file.
+///
+/// # Errors
+/// As [`write_mission`], without the file system.
+pub fn encode_mission(mission: &MissionMcap) -> Result<(Vec<u8>, McapSummary), McapError> {
+    check(mission)?;
+    let mut messages = messages::of_mission(mission)?;
+    messages.sort_by_key(|m| (m.log_time, m.topic));
+    let options = WriteOptions::new()
+        .profile("")
+        .library(PROGRAM)
+        .compression(Some(Compression::Zstd))
+        .compression_level(ZSTD_LEVEL)
+        .compression_threads(0)
+        .chunk_size(Some(CHUNK_BYTES));
+    let mut writer = options.create(Cursor::new(Vec::new()))?;
+    let channels = VIEWER.iter().map(|topic| add_channel(&mut writer, topic)).collect::<Result<Vec<_>, _>>()?;
+    let mut content = ContentHash::new("messages");
+    for (sequence, Pending { topic, log_time, data }) in (0..).zip(&messages) {
+        let header =
+            MessageHeader { channel_id: channels[*topic], sequence, log_time: *log_time, publish_time: *log_time };
+        writer.write_to_known_channel(&header, data)?;
+        content.text(VIEWER[*topic].name);
+        content.u64(*log_time);
+        content.bytes(data);
+    }
+    for (name, metadata) in mission.metadata {
+        writer.write_metadata(&Metadata { name: name.clone(), metadata: metadata.clone() })?;
+    }
+    writer.finish()?;
+    let summary = McapSummary { messages: messages.len() as u64, content_sha256: content.finish() };
+    Ok((writer.into_inner().into_inner(), summary))
+}
+
+fn check(mission: &MissionMcap) -> Result<(), McapError> {
+    let MissionMcap { recording, dem, classes, .. } = mission;
+    if recording.states.is_empty() {
+        return Err(McapError::unfit("it holds no state"));
+    }
+    if classes.is_some_and(|c| (c.rows(), c.cols()) != (dem.rows(), dem.cols())) {
+        return Err(McapError::unfit("the class map has another shape than the terrain"));
+    }
+    let wheels = recording.vehicle.wheels.len();
+    if let Some(sample) = recording.wheels.iter().find(|sample| sample.wheels.len() != wheels) {
+        return Err(McapError::unfit(format!("{} of {wheels} wheels at {} s", sample.wheels.len(), sample.time_s)));
+    }
+    Ok(())
+}
+
+fn add_channel(writer: &mut Writer<Cursor<Vec<u8>>>, topic: &Topic) -> Result<u16, McapError> {
+    let schema = match messages::public_schema(topic) {
+        Some(data) => data,
+        None => protobuf::descriptor_set(topic)?,
+    };
+    let schema = writer.add_schema(topic.schema, "protobuf", &schema)?;
+    let description = BTreeMap::from([("description".to_owned(), topic.description.to_owned())]);
+    Ok(writer.add_channel(schema, topic.name, "protobuf", &description)?)
+}
+
+/// Time of a sample, ns since 1970-01-01 UTC.
+fn log_time(epoch_ns: u64, time_s: f64) -> u64 {
+    // A negative or NaN time becomes the epoch.
+    epoch_ns.saturating_add((time_s * 1e9).round() as u64)
+}
+
+fn timestamp(log_time: u64) -> Result<Timestamp, McapError> {
+    let seconds = u32::try_from(log_time / 1_000_000_000);
+    let seconds = seconds.map_err(|_| McapError::unfit(format!("{log_time} ns is beyond the year 2106")))?;
+    Ok(Timestamp::new(seconds, (log_time % 1_000_000_000) as u32))
+}

@@ -1,0 +1,301 @@
+use super::mesh::{Patch, Square, terrain};
+use super::*;
+use ::mcap::MessageStream;
+use sastrugi_numeric::{Geometry, Streams, Surface};
+use sastrugi_schemas::topics::{
+    self, CommandSample, Event, EventKind, ImuSample, StateSample, VehicleOutline, WheelOutline, WheelSample,
+    WheelState,
+};
+use std::collections::BTreeMap as Map;
+use std::f64::consts::TAU;
+
+/// Rough ground: `waves` waves of random direction and phase, amplitude proportional to wavelength.
+fn rough(rows: usize, cols: usize, cell: f64, origin: [f64; 2], waves: usize) -> Grid {
+    let mut stream = Streams::for_seed(11, "test").stream("waves");
+    let waves: Vec<[f64; 4]> = (0..waves)
+        .map(|k| {
+            let wavelength = 8.0 / (1.0 + k as f64);
+            let (sin, cos) = libm::sincos(stream.uniform_in(0.0, TAU));
+            let wavenumber = TAU / wavelength;
+            [wavenumber * cos, wavenumber * sin, stream.uniform_in(0.0, TAU), 0.03 * wavelength]
+        })
+        .collect();
+    let geometry = Geometry { rows, cols, cell: [cell; 2], origin };
+    let height = |x: f64, y: f64| waves.iter().map(|[a, b, p, s]| s * libm::sin(a * x + b * y + p)).sum::<f64>();
+    let values = (0..rows).flat_map(|r| {
+        let height = &height;
+        (0..cols).map(move |c| height(c as f64 * cell, (rows - r) as f64 * cell))
+    });
+    Grid::new(geometry, values.collect())
+}
+
+fn outline() -> VehicleOutline {
+    let wheel = |name: &str, x: f64, y: f64| WheelOutline {
+        name: format!("{name}_wheel"),
+        hub_m: [x, y, 0.0328],
+        radius_m: 0.1651,
+        width_m: 0.1143,
+    };
+    VehicleOutline {
+        name: "husky_a200".to_owned(),
+        chassis_size_m: [0.9874, 0.5709, 0.2475],
+        chassis_centre_m: [0.0, 0.0, 0.12],
+        wheels: vec![
+            wheel("front_left", 0.256, 0.2854),
+            wheel("front_right", 0.256, -0.2854),
+            wheel("rear_left", -0.256, 0.2854),
+            wheel("rear_right", -0.256, -0.2854),
+        ],
+    }
+}
+
+/// A straight drive eastwards over the ground, level, with contact points on the bilinear surface under the wheels.
+fn drive(dem: &Grid, start: [f64; 2], seconds: usize) -> Recording {
+    let vehicle = outline();
+    let mut stream = Streams::for_seed(12, "test").stream("imu");
+    let time = |n: usize, rate: f64| n as f64 / rate;
+    let at = |t: f64| {
+        let (x, y) = (start[0] + t, start[1] + 0.1 * libm::sin(t));
+        [x, y, dem.height(x, y).unwrap() + 0.13]
+    };
+    let states: Vec<StateSample> = (0..=20 * seconds)
+        .map(|n| StateSample {
+            time_s: time(n, 20.0),
+            position_m: at(time(n, 20.0)),
+            orientation: {
+                let (s, c) = libm::sincos(0.05 * libm::sin(time(n, 20.0)));
+                [0.0, s, 0.0, c]
+            },
+            velocity_m_s: [1.0, 0.1 * libm::cos(time(n, 20.0)), stream.normal() * 0.1],
+            angular_velocity_rad_s: [stream.normal() * 0.1, stream.normal() * 0.1, stream.normal() * 0.02],
+        })
+        .collect();
+    let wheel = |state: &StateSample, outline: &WheelOutline, stream: &mut sastrugi_numeric::Stream| {
+        let [x, y] = [0, 1].map(|axis| state.position_m[axis] + outline.hub_m[axis]);
+        WheelState {
+            angle_rad: state.time_s / 0.1651,
+            spin_rad_s: 6.0 + stream.normal() * 0.1,
+            torque_n_m: stream.normal(),
+            normal_force_n: 140.0 + 20.0 * stream.normal(),
+            longitudinal_force_n: 10.0 * stream.normal(),
+            lateral_force_n: 10.0 * stream.normal(),
+            slip_ratio: 0.01 * stream.normal(),
+            contact_m: [x, y, dem.height(x, y).unwrap()],
+        }
+    };
+    let wheels = states
+        .iter()
+        .map(|s| WheelSample {
+            time_s: s.time_s,
+            wheels: vehicle.wheels.iter().map(|w| wheel(s, w, &mut stream)).collect(),
+        })
+        .collect();
+    let imu = (0..=100 * seconds)
+        .map(|n| ImuSample {
+            time_s: time(n, 100.0),
+            orientation: [0.0, 0.0, 0.0, 1.0],
+            angular_velocity_rad_s: [0.1, 0.1, 0.02].map(|s| s * stream.normal()),
+            specific_force_m_s2: [0.3 * stream.normal(), 0.3 * stream.normal(), 9.81 + stream.normal()],
+        })
+        .collect();
+    let commands = states
+        .iter()
+        .map(|s| CommandSample {
+            time_s: s.time_s,
+            speed_m_s: 1.0,
+            yaw_rate_rad_s: 0.1 * stream.normal(),
+            cross_track_m: s.position_m[1] - start[1],
+            heading_error_rad: 0.05 * stream.normal(),
+            distance_to_goal_m: seconds as f64 - s.time_s,
+        })
+        .collect();
+    let event = |time_s, kind, text: &str| Event { time_s, kind, text: text.to_owned() };
+    Recording {
+        vehicle,
+        sample_rate_hz: 20.0,
+        imu_rate_hz: 100.0,
+        states,
+        imu,
+        wheels,
+        commands,
+        events: vec![
+            event(0.0, EventKind::Start, "start"),
+            event(seconds as f64, EventKind::Success, "reached the goal after 36 s"),
+        ],
+    }
+}
+
+fn metadata() -> Map<String, Map<String, String>> {
+    let record = |key: &str, value: &str| Map::from([(key.to_owned(), value.to_owned())]);
+    Map::from([
+        ("mission".to_owned(), record("mission_id", "drive-0001")),
+        ("hashes".to_owned(), record("terrain_sha256", "00")),
+    ])
+}
+
+fn classes(dem: &Grid) -> Grid<u8> {
+    dem.map(|z| if z < -0.1 { 0 } else { u8::from(z > 0.1) + 1 })
+}
+
+struct Scene {
+    dem: Grid,
+    classes: Grid<u8>,
+    recording: Recording,
+    metadata: Map<String, Map<String, String>>,
+}
+
+impl Scene {
+    fn new(cells: usize, seconds: usize) -> Self {
+        let dem = rough(cells, cells, 0.05, [500_000.0, 4_000_000.0], 24);
+        let start = [500_002.0, 4_000_000.0 + 0.025 * cells as f64];
+        let recording = drive(&dem, start, seconds);
+        Self { classes: classes(&dem), dem, recording, metadata: metadata() }
+    }
+
+    fn mission(&self) -> MissionMcap<'_> {
+        MissionMcap {
+            recording: &self.recording,
+            dem: &self.dem,
+            classes: Some(&self.classes),
+            start_m: [500_002.0, 4_000_000.0 + 2.0],
+            goal_m: [500_004.0, 4_000_000.0 + 2.0],
+            epoch_ns: 1_700_000_000_000_000_000,
+            metadata: &self.metadata,
+        }
+    }
+}
+
+#[test]
+fn val_messages_come_back_in_order_with_every_checksum() {
+    let scene = Scene::new(160, 3);
+    let (bytes, summary) = encode_mission(&scene.mission()).unwrap();
+    let messages: Vec<_> = MessageStream::new(&bytes).unwrap().collect::<Result<_, _>>().unwrap();
+    assert_eq!(messages.len() as u64, summary.messages);
+    assert!(messages.windows(2).all(|pair| pair[0].log_time <= pair[1].log_time));
+    let count = |topic: &str| messages.iter().filter(|m| m.channel.topic == topic).count();
+    let counts = VIEWER.map(|topic| count(topic.name));
+    assert_eq!(counts, [1, 1, 1, 1, 61, 61, 61, 301, 61, 61, 2]);
+    assert_eq!(messages.last().unwrap().log_time, 1_700_000_003_000_000_000);
+    let found = ::mcap::Summary::read(&bytes).unwrap().unwrap();
+    assert_eq!(found.metadata_indexes.len(), 2);
+    assert_eq!(encode_mission(&scene.mission()).unwrap().0, bytes);
+}
+
+#[test]
+fn val_own_messages_are_as_described() {
+    let scene = Scene::new(120, 1);
+    let r = &scene.recording;
+    let names = vec![String::new(); 4];
+    for (topic, values) in [
+        (&topics::state::TOPIC, messages::state_values(&r.states[0])),
+        (&topics::imu::TOPIC, messages::imu_values(&r.imu[0])),
+        (&topics::wheels::TOPIC, messages::wheel_values(&names, &r.wheels[0])),
+        (&topics::command::TOPIC, messages::command_values(&r.commands[0])),
+    ] {
+        let described: Vec<_> = topic.fields.iter().map(|f| f.kind).collect();
+        assert_eq!(values.iter().map(protobuf::Value::kind).collect::<Vec<_>>(), described, "{}", topic.name);
+    }
+    for topic in VIEWER {
+        assert_ne!(topic.fields.is_empty(), messages::public_schema(topic).is_none(), "{}", topic.name);
+    }
+}
+
+/// Triangles of all patches by their corners in the map frame.
+fn triangles(patches: &[Patch]) -> Vec<[[f64; 3]; 3]> {
+    let corner = |p: &Patch, i: u32| [0, 1, 2].map(|axis| p.origin[axis] + p.points[i as usize][axis]);
+    patches.iter().flat_map(|p| p.triangles.iter().map(move |t| t.map(|i| corner(p, i)))).collect()
+}
+
+fn plan_area([a, b, c]: &[[f64; 3]; 3]) -> f64 {
+    0.5 * ((b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1]))
+}
+
+#[test]
+fn prop_the_mesh_covers_the_terrain_once_and_has_no_gaps() {
+    for (rows, cols) in [(160, 160), (97, 130), (58, 34), (9, 300), (2, 2), (10, 18)] {
+        let dem = rough(rows, cols, 0.5, [0.0; 2], 8);
+        let near: Vec<Square> =
+            (0..cols).map(|c| Square { centre: [c as f64 * 0.5, 0.1 * c as f64], half_side: 1.0 }).collect();
+        let triangles = triangles(&terrain(&dem, None, &near));
+        assert!(triangles.iter().all(|t| plan_area(t) > -1e-12));
+        let area: f64 = triangles.iter().map(plan_area).sum();
+        let expected = (rows - 1) as f64 * (cols - 1) as f64 * 0.25;
+        assert!((area - expected).abs() < 1e-9 * expected, "{rows} x {cols}: {area} of {expected}");
+        // An edge inside has two triangles, one on the border has one.
+        let key = |p: &[f64; 3]| [0, 1, 2].map(|axis| (p[axis] * 1024.0).round() as i64);
+        let mut edges: Map<_, u32> = Map::new();
+        for t in &triangles {
+            for (a, b) in [(0, 1), (1, 2), (2, 0)] {
+                let (a, b) = (key(&t[a]), key(&t[b]));
+                *edges.entry(if a < b { (a, b) } else { (b, a) }).or_default() += 1;
+            }
+        }
+        let border = |p: &[i64; 3]| {
+            let [col, row] = [p[0] as f64 / 512.0 - 0.5, p[1] as f64 / 512.0 - 0.5];
+            col == 0.0 || row == 0.0 || col == (cols - 1) as f64 || row == (rows - 1) as f64
+        };
+        let open = edges.iter().filter(|(_, n)| **n == 1).all(|((a, b), _)| border(a) && border(b));
+        assert!(open && edges.values().all(|&n| n <= 2), "{rows} x {cols} has a gap");
+    }
+}
+
+/// Largest distance in height between contact points and the mesh: 1 cm allowed.
+#[test]
+fn val_wheels_stand_on_the_mesh() {
+    let scene = Scene::new(400, 12);
+    let mission = scene.mission();
+    let triangles = triangles(&terrain(&scene.dem, None, &messages::corridor(&mission)));
+    let contacts = scene.recording.wheels.iter().flat_map(|s| &s.wheels).map(|w| w.contact_m);
+    let worst = contacts.step_by(7).map(|p| off_mesh(&triangles, p)).fold(0.0, f64::max);
+    eprintln!("largest distance of a contact from the mesh: {:.2} mm", 1e3 * worst);
+    assert!(worst < 0.01, "{worst} m");
+}
+
+fn off_mesh(triangles: &[[[f64; 3]; 3]], p: [f64; 3]) -> f64 {
+    let height = |t: &[[f64; 3]; 3]| {
+        let area = plan_area(t);
+        let share = |k: usize| {
+            let mut part = *t;
+            part[k] = p;
+            plan_area(&part) / area
+        };
+        let shares = [share(0), share(1), share(2)];
+        let inside = area > 0.0 && shares.iter().all(|&s| s >= -1e-9);
+        inside.then(|| (0..3).map(|k| shares[k] * t[k][2]).sum::<f64>())
+    };
+    triangles.iter().find_map(height).map_or(f64::INFINITY, |z| (z - p[2]).abs())
+}
+
+/// A mission of 37 s on a terrain of 1009 x 1009 cells: the size of a file is a stated figure.
+#[test]
+fn val_a_mission_is_small() {
+    let scene = Scene::new(1009, 37);
+    let (bytes, summary) = encode_mission(&scene.mission()).unwrap();
+    eprintln!("{} bytes, {} messages", bytes.len(), summary.messages);
+    if let Ok(path) = std::env::var("SASTRUGI_KEEP_MCAP") {
+        std::fs::write(path, &bytes).unwrap();
+    }
+    assert!(bytes.len() < 700_000, "{} bytes", bytes.len());
+}
+
+#[test]
+fn val_holes_are_not_drawn() {
+    let mut scene = Scene::new(160, 3);
+    scene.dem.values[80 * 160 + 70] = f64::NAN;
+    scene.dem.values[3] = f64::NAN;
+    let patches = terrain(&scene.dem, None, &messages::corridor(&scene.mission()));
+    assert!(patches.iter().flat_map(|p| &p.points).flatten().all(|v| v.is_finite()));
+    encode_mission(&scene.mission()).unwrap();
+}
+
+#[test]
+fn val_impossible_recordings_are_refused() {
+    let mut scene = Scene::new(120, 1);
+    let mut late = scene.mission();
+    late.epoch_ns = u64::MAX;
+    assert!(matches!(encode_mission(&late), Err(McapError::Unfit { .. })));
+    scene.recording.wheels[3].wheels.pop();
+    assert!(matches!(encode_mission(&scene.mission()), Err(McapError::Unfit { .. })));
+    scene.recording.states.clear();
+    assert!(matches!(encode_mission(&scene.mission()), Err(McapError::Unfit { .. })));
+}

@@ -1,0 +1,11 @@
+//! Topic `/events`.
+
+use super::Topic;
+
+/// The topic.
+pub const TOPIC: Topic = Topic {
+    name: "/events",
+    schema: "foxglove.Log",
+    description: "what happened: start and outcome, with the kind of event as `name`",
+    fields: &[],
+};

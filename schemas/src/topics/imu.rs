@@ -1,0 +1,20 @@
+//! Topic `/imu`.
+
+use super::FieldKind::Float;
+use super::{Topic, field};
+
+/// The topic.
+pub const TOPIC: Topic = Topic {
+    name: "/imu",
+    schema: "sastrugi.Imu",
+    description: "an ideal inertial measurement unit at base_link, at its own rate; rates in steps of 1/4096 rad/s, \
+                  specific forces of 1/512 m/s2",
+    fields: &[
+        field("roll_rate_rad_s", Float, "rad/s", "angular velocity about the body's x axis"),
+        field("pitch_rate_rad_s", Float, "rad/s", "angular velocity about the body's y axis"),
+        field("yaw_rate_rad_s", Float, "rad/s", "angular velocity about the body's z axis"),
+        field("specific_force_x_m_s2", Float, "m/s2", "mean specific force since the sample before, forward"),
+        field("specific_force_y_m_s2", Float, "m/s2", "mean specific force since the sample before, left"),
+        field("specific_force_z_m_s2", Float, "m/s2", "mean specific force since the sample before, up (+g at rest)"),
+    ],
+};

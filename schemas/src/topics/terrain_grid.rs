@@ -1,0 +1,12 @@
+//! Topic `/terrain/grid`.
+
+use super::Topic;
+
+/// The topic.
+pub const TOPIC: Topic = Topic {
+    name: "/terrain/grid",
+    schema: "foxglove.Grid",
+    description: "the terrain seen from above, at most 64 cells a side: colour of the roughness class and elevation in \
+                  m; one message at the mission's start",
+    fields: &[],
+};

@@ -1,0 +1,11 @@
+//! Topic `/tf`.
+
+use super::Topic;
+
+/// The topic.
+pub const TOPIC: Topic = Topic {
+    name: "/tf",
+    schema: "foxglove.FrameTransforms",
+    description: "map -> base_link and base_link -> each wheel (turned by its angle), at the sampling rate",
+    fields: &[],
+};

@@ -1,0 +1,25 @@
+//! Topic `/wheels`.
+
+use super::FieldKind::{Doubles, Floats, Texts};
+use super::{Topic, field};
+
+/// The topic.
+pub const TOPIC: Topic = Topic {
+    name: "/wheels",
+    schema: "sastrugi.Wheels",
+    description: "all wheels at one instant, at the sampling rate; every field has one value per wheel; angles, spins and \
+                  ratios in steps of 1/4096, torques of 1/512 N m, forces of 1/32 N",
+    fields: &[
+        field("wheel", Texts, "", "name of the wheel and of its frame"),
+        field("angle_rad", Floats, "rad", "angle turned since the start, forward positive"),
+        field("spin_rad_s", Floats, "rad/s", "spin"),
+        field("torque_n_m", Floats, "N m", "drive torque on the wheel"),
+        field("normal_force_n", Floats, "N", "ground force along the contact normal, 0 without contact"),
+        field("longitudinal_force_n", Floats, "N", "ground force along the rolling direction"),
+        field("lateral_force_n", Floats, "N", "ground force across the rolling direction, left positive"),
+        field("slip_ratio", Floats, "1", "rim speed less ground speed over the larger of the two"),
+        field("contact_x_m", Doubles, "m", "contact point in the map frame, east, to 0.1 mm; 0 without contact"),
+        field("contact_y_m", Doubles, "m", "contact point in the map frame, north, to 0.1 mm; 0 without contact"),
+        field("contact_z_m", Doubles, "m", "contact point in the map frame, up, to 0.1 mm; 0 without contact"),
+    ],
+};
