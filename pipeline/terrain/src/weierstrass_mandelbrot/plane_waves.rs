@@ -24,9 +24,9 @@ use sastrugi_numeric::{Geometry, Grid};
 use std::f64::consts::{PI, TAU};
 
 /// Points that a wave is spread over along an axis.
-const WIDTH: usize = 15;
+const WIDTH: usize = 17;
 /// Size of the torus over the size of the grid.
-const UPSAMPLING: f64 = 2.0;
+const UPSAMPLING: f64 = 1.5;
 /// Shape of the kernel: 0.98 of the value where the kernel's own cut-off meets the torus's first alias.
 const BETA: f64 = 0.98 * PI * WIDTH as f64 * (1.0 - 0.5 / UPSAMPLING);
 /// Intervals of the trapezoid sum over half of the kernel.
