@@ -1,1 +1,145 @@
-//! Room under construction.
+//! What the tests of the whole program share: the built binary, work areas of their own, small studies.
+
+#![allow(clippy::expect_used, reason = "a test may end where it stands")]
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+/// The program built beside this test.
+///
+/// # Panics
+/// When it is not there: `./test` builds it first.
+pub fn program() -> PathBuf {
+    let test = std::env::current_exe().expect("the test has a path");
+    let folder = test.parent().and_then(Path::parent).expect("tests lie in target/<profile>/deps");
+    let program = folder.join("sastrugi");
+    assert!(program.is_file(), "{} is missing: build the workspace first (./test does)", program.display());
+    program
+}
+
+/// A call of the program with its result.
+pub struct Called {
+    /// Exit code.
+    pub code: i32,
+    /// Standard output.
+    pub stdout: String,
+    /// Standard error.
+    pub stderr: String,
+}
+
+/// Calls the program in a folder.
+///
+/// # Panics
+/// When it cannot be started.
+pub fn sastrugi_in(folder: &Path, arguments: &[&str]) -> Called {
+    called(Command::new(program()).args(arguments).current_dir(folder))
+}
+
+/// Runs a prepared command to its end.
+///
+/// # Panics
+/// When it cannot be started.
+pub fn called(command: &mut Command) -> Called {
+    let Output { status, stdout, stderr } = command.output().expect("the program starts");
+    Called {
+        code: status.code().unwrap_or(-1),
+        stdout: String::from_utf8_lossy(&stdout).into_owned(),
+        stderr: String::from_utf8_lossy(&stderr).into_owned(),
+    }
+}
+
+/// A folder of its own, gone with the value.
+///
+/// # Panics
+/// When none can be made.
+pub fn area() -> tempfile::TempDir {
+    tempfile::tempdir().expect("a temporary folder")
+}
+
+/// The checksums of a release by path.
+///
+/// # Panics
+/// When there is no release.
+pub fn sums(release: &Path) -> BTreeMap<String, String> {
+    let text = std::fs::read_to_string(release.join("SHA256SUMS")).expect("a sealed release");
+    text.lines().filter_map(|l| l.split_once("  ")).map(|(sum, path)| (path.to_owned(), sum.to_owned())).collect()
+}
+
+/// Paths whose sums differ, or that only one side has.
+pub fn differing(a: &BTreeMap<String, String>, b: &BTreeMap<String, String>) -> Vec<String> {
+    let paths: std::collections::BTreeSet<&String> = a.keys().chain(b.keys()).collect();
+    paths.into_iter().filter(|p| a.get(*p) != b.get(*p)).cloned().collect()
+}
+
+/// A study that has every stage and takes about a second.
+pub fn small_study() -> String {
+    let dem = sastrugi_fixtures::jacksboro();
+    format!(
+        r#"
+[study]
+name = "small"
+seed = 7
+date = "2026-01-01"
+
+[[dem]]
+id = "site"
+file = "{}"
+window = [-84.40, 36.46, -84.20, 36.66]
+
+[[fit]]
+id = "fit"
+dem = "site"
+outer_scale_m = 4000.0
+
+[[fit]]
+id = "naive"
+dem = "site"
+mode = "paper"
+outer_scale_m = 4000.0
+
+[[texture]]
+id = "tile"
+fit = "naive"
+phase = "gaussian"
+periodic = false
+size_m = [4500.0, 4500.0]
+cell_m = 90.0
+
+[[terrain]]
+id = "rough"
+kind = "multifractal"
+group = "a"
+count = 2
+size_px = [320, 300]
+
+[[terrain]]
+id = "smooth"
+kind = "weierstrass_mandelbrot"
+group = "b"
+size_px = [280, 300]
+
+[[missions]]
+id = "short"
+terrains = ["rough", "smooth"]
+count = 3
+length_m = 5.0
+border_m = 1.5
+
+[[traverse]]
+id = "husky"
+missions = "short"
+"#,
+        dem.display()
+    )
+}
+
+/// Writes a text file.
+///
+/// # Panics
+/// When the file system refuses.
+pub fn write(folder: &Path, name: &str, text: &str) -> PathBuf {
+    let path = folder.join(name);
+    std::fs::write(&path, text).expect("a file can be written");
+    path
+}

@@ -1,17 +1,19 @@
 //! Fourier transforms whose bits do not depend on the CPU.
 //!
-//! `rustfft`'s scalar planner gives the same bits everywhere for lengths 2^a 3^b 5^c. Other lengths go through
-//! Bluestein's chirp (1970) on such a length, with `libm` twiddles. Forward transforms are unnormalised with
+//! Lengths 2^a 3^b 5^c are transformed by [`stockham`] with `libm` twiddles, other lengths through Bluestein's chirp (1970)
+//! on such a length. Forward transforms are unnormalised with
 //! `exp(-2 pi i k n / N)`; inverse transforms divide by the number of points.
 //!
 //! Cost: a real 2-D transform is two complex half transforms and one blocked transposition; memory is twice the half
 //! spectrum (`rows * (cols / 2 + 1)` complex numbers) while it runs.
 
+mod stockham;
+
+pub use num_complex::Complex64;
 use rayon::prelude::*;
-pub use rustfft::num_complex::Complex64;
-use rustfft::{Fft, FftDirection, FftPlannerScalar};
 use std::f64::consts::PI;
 use std::sync::Arc;
+use stockham::Stockham;
 
 /// Columns transposed together: four cache lines of complex numbers a row.
 const TRANSPOSE_BLOCK: usize = 16;
@@ -40,7 +42,7 @@ pub struct Transform {
 
 #[derive(Clone)]
 enum Kind {
-    Direct { forward: Arc<dyn Fft<f64>>, inverse: Arc<dyn Fft<f64>> },
+    Direct(Arc<Stockham>),
     Bluestein(Arc<Bluestein>),
 }
 
@@ -51,14 +53,9 @@ impl Transform {
     /// If `len` is 0.
     pub fn new(len: usize) -> Self {
         assert!(len > 0, "a transform needs points");
-        let kind = if is_smooth(len) {
-            let mut planner = FftPlannerScalar::new();
-            Kind::Direct {
-                forward: planner.plan_fft(len, FftDirection::Forward),
-                inverse: planner.plan_fft(len, FftDirection::Inverse),
-            }
-        } else {
-            Kind::Bluestein(Arc::new(Bluestein::new(len)))
+        let kind = match Stockham::new(len) {
+            Some(direct) => Kind::Direct(Arc::new(direct)),
+            None => Kind::Bluestein(Arc::new(Bluestein::new(len))),
         };
         Self { len, kind }
     }
@@ -76,9 +73,7 @@ impl Transform {
     /// Working memory that [`Self::forward`] and [`Self::inverse`] need.
     pub fn scratch(&self) -> Vec<Complex64> {
         let len = match &self.kind {
-            Kind::Direct { forward, inverse } => {
-                forward.get_inplace_scratch_len().max(inverse.get_inplace_scratch_len())
-            }
+            Kind::Direct(_) => self.len,
             Kind::Bluestein(b) => b.scratch_len(),
         };
         vec![Complex64::default(); len]
@@ -87,7 +82,9 @@ impl Transform {
     /// Forward transform of one or more consecutive runs of `len` points.
     pub fn forward(&self, data: &mut [Complex64], scratch: &mut [Complex64]) {
         match &self.kind {
-            Kind::Direct { forward, .. } => forward.process_with_scratch(data, scratch),
+            Kind::Direct(direct) => {
+                data.chunks_exact_mut(self.len).for_each(|run| direct.process::<false>(run, scratch));
+            }
             Kind::Bluestein(b) => data.chunks_exact_mut(self.len).for_each(|run| b.forward(run, scratch)),
         }
     }
@@ -95,7 +92,9 @@ impl Transform {
     /// Inverse transform, not divided by `len`.
     pub fn inverse_unscaled(&self, data: &mut [Complex64], scratch: &mut [Complex64]) {
         match &self.kind {
-            Kind::Direct { inverse, .. } => inverse.process_with_scratch(data, scratch),
+            Kind::Direct(direct) => {
+                data.chunks_exact_mut(self.len).for_each(|run| direct.process::<true>(run, scratch));
+            }
             Kind::Bluestein(b) => {
                 for run in data.chunks_exact_mut(self.len) {
                     run.iter_mut().for_each(|v| *v = v.conj());
@@ -361,5 +360,45 @@ mod tests {
         for k in [0, 1, 500, 1008] {
             assert!((data[k] - direct(&re, 1, n, k, 0)).norm() < 1e-9);
         }
+    }
+
+    /// `rustfft` as an independent reference, on lengths of every mixture of radices.
+    #[test]
+    fn val_matches_rustfft() {
+        for n in [2, 3, 4, 5, 6, 8, 15, 16, 30, 60, 81, 125, 128, 2560, 4320, 8192] {
+            let (re, im) = (noise(n, "re"), noise(n, "im"));
+            let input: Vec<Complex64> = re.iter().zip(&im).map(|(&a, &b)| Complex64::new(a, b)).collect();
+            let transform = Transform::new(n);
+            let mut scratch = transform.scratch();
+            for inverse in [false, true] {
+                let (mut ours, mut theirs) = (input.clone(), input.clone());
+                let mut planner = rustfft::FftPlannerScalar::new();
+                if inverse {
+                    transform.inverse_unscaled(&mut ours, &mut scratch);
+                    planner.plan_fft_inverse(n).process(&mut theirs);
+                } else {
+                    transform.forward(&mut ours, &mut scratch);
+                    planner.plan_fft_forward(n).process(&mut theirs);
+                }
+                let worst = ours.iter().zip(&theirs).fold(0.0, |m, (a, b)| f64::max(m, (a - b).norm()));
+                assert!(worst < 1e-15 * n as f64 + 1e-13, "{n}: {worst}");
+            }
+        }
+    }
+
+    /// Bits of transforms at lengths where twiddles from the C library change with the CPU.
+    #[test]
+    fn gold_bits_are_frozen() {
+        let mut digest = 0u64;
+        for n in [60, 1009, 2560, 8192] {
+            let transform = Transform::new(n);
+            let mut data: Vec<Complex64> = noise(n, "re").into_iter().map(|v| Complex64::new(v, 0.25)).collect();
+            transform.forward(&mut data, &mut transform.scratch());
+            for v in data {
+                digest = (digest ^ v.re.to_bits()).wrapping_mul(0x0100_0000_01b3);
+                digest = (digest ^ v.im.to_bits()).wrapping_mul(0x0100_0000_01b3);
+            }
+        }
+        assert_eq!(digest, 7_467_512_922_136_635_467);
     }
 }

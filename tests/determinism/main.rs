@@ -1,0 +1,168 @@
+//! Same study, same bytes: any number of threads, any shards, after kills, on a CPU without FMA and AVX2.
+
+#![allow(clippy::unwrap_used, reason = "a test may end where it stands")]
+
+use sastrugi_tests::{area, called, differing, program, sastrugi_in, small_study, sums, write};
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::Duration;
+
+fn run(folder: &Path, arguments: &[&str]) -> BTreeMap<String, String> {
+    let mut all = vec!["run", "study.toml", "-o", "release", "--quiet"];
+    all.extend(arguments);
+    let call = sastrugi_in(folder, &all);
+    assert_eq!(call.code, 0, "{}", call.stderr);
+    sums(&folder.join("release"))
+}
+
+fn run_fresh(study: &str, arguments: &[&str]) -> BTreeMap<String, String> {
+    let folder = area();
+    write(folder.path(), "study.toml", study);
+    run(folder.path(), arguments)
+}
+
+fn assert_same(a: &BTreeMap<String, String>, b: &BTreeMap<String, String>, what: &str) {
+    assert!(a.len() > 20, "the release holds files");
+    assert_eq!(differing(a, b), Vec::<String>::new(), "{what}");
+}
+
+#[test]
+fn gold_threads_change_nothing() {
+    let one = run_fresh(&small_study(), &["--threads", "1"]);
+    for threads in ["2", "8"] {
+        assert_same(&one, &run_fresh(&small_study(), &["--threads", threads]), threads);
+    }
+}
+
+#[test]
+fn gold_shards_change_nothing() {
+    let whole = run_fresh(&small_study(), &[]);
+    for count in [1, 3] {
+        let folder = area();
+        write(folder.path(), "study.toml", &small_study());
+        let mut merge = vec!["merge".to_owned()];
+        for index in 1..=count {
+            let (shard, part) = (format!("{index}/{count}"), format!("part{index}"));
+            let arguments = ["run", "study.toml", "-o", &part, "--shard", &shard, "--quiet"];
+            let call = sastrugi_in(folder.path(), &arguments);
+            assert_eq!(call.code, 0, "{}", call.stderr);
+            merge.push(part);
+        }
+        merge.extend(["-o", "release", "--quiet"].map(str::to_owned));
+        let arguments: Vec<&str> = merge.iter().map(String::as_str).collect();
+        let call = sastrugi_in(folder.path(), &arguments);
+        assert_eq!(call.code, 0, "{}", call.stderr);
+        assert_same(&whole, &sums(&folder.path().join("release")), "shards");
+    }
+}
+
+/// Kills a run with SIGKILL at moments spread over its time (the moments need no seed: any of them must do), then lets it
+/// finish.
+#[test]
+fn gold_kills_change_nothing() {
+    let whole = run_fresh(&small_study(), &[]);
+    let folder = area();
+    write(folder.path(), "study.toml", &small_study());
+    for pause_ms in [5, 40, 80, 120, 170, 230, 300, 380, 470, 570, 700, 900] {
+        let mut child = Command::new(program())
+            .args(["run", "study.toml", "-o", "release", "--quiet"])
+            .current_dir(folder.path())
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        std::thread::sleep(Duration::from_millis(pause_ms));
+        child.kill().unwrap();
+        child.wait().unwrap();
+        if folder.path().join("release").exists() {
+            assert_same(&whole, &sums(&folder.path().join("release")), "a release that exists is whole");
+        }
+    }
+    assert_same(&whole, &run(folder.path(), &[]), "after kills");
+    let left: Vec<String> = std::fs::read_dir(folder.path())
+        .unwrap()
+        .map(|e| e.unwrap().file_name().to_string_lossy().into_owned())
+        .filter(|name| !["release", "release.work", "study.toml"].contains(&name.as_str()))
+        .collect();
+    assert_eq!(left, Vec::<String>::new(), "nothing half-written stays");
+}
+
+/// glibc is told that the CPU has neither FMA nor AVX2: its mathematical functions then change bits, ours must not.
+#[test]
+fn gold_the_cpu_changes_nothing() {
+    let study = sastrugi_fixtures::study("quickstart.toml");
+    let (plain, masked) = (area(), area());
+    let quick = |folder: &Path, tunables: Option<&str>| {
+        let mut command = Command::new(program());
+        command.arg("run").arg(&study).args(["-o", "release", "--quiet"]).current_dir(folder);
+        if let Some(tunables) = tunables {
+            command.env("GLIBC_TUNABLES", tunables);
+        }
+        let call = called(&mut command);
+        assert_eq!(call.code, 0, "{}", call.stderr);
+        sums(&folder.join("release"))
+    };
+    let a = quick(plain.path(), None);
+    let b = quick(masked.path(), Some("glibc.cpu.hwcaps=-FMA,-AVX2"));
+    assert_same(&a, &b, "without FMA and AVX2");
+}
+
+/// A build for this very CPU (FMA, AVX2, AVX-512 where it has them) gives the same bytes.
+#[test]
+#[ignore = "slow: ./test --full builds the program a second time"]
+fn gold_a_native_build_changes_nothing() {
+    let root = sastrugi_fixtures::workspace_root();
+    let target = root.join(".cache/target-native");
+    let built = Command::new(env!("CARGO"))
+        .args(["build", "--release", "--package", "sastrugi-cli", "--target-dir"])
+        .arg(&target)
+        .env("RUSTFLAGS", "-C target-cpu=native")
+        .current_dir(&root)
+        .status()
+        .unwrap();
+    assert!(built.success());
+    let folder = area();
+    write(folder.path(), "study.toml", &small_study());
+    let mut command = Command::new(target.join("release/sastrugi"));
+    let call = called(command.args(["run", "study.toml", "-o", "release", "--quiet"]).current_dir(folder.path()));
+    assert_eq!(call.code, 0, "{}", call.stderr);
+    assert_same(&run_fresh(&small_study(), &[]), &sums(&folder.path().join("release")), "target-cpu=native");
+}
+
+/// Streams go by id: one more terrain changes no artifact of the others.
+#[test]
+fn gold_an_added_terrain_changes_no_other_byte() {
+    let folder = area();
+    write(folder.path(), "study.toml", &small_study());
+    let before = run(folder.path(), &[]);
+    let added = "[[terrain]]\nid = \"added\"\nkind = \"weierstrass_mandelbrot\"\nsize_px = [64, 64]\n\n[[terrain]]\nid = \"smooth\"";
+    write(folder.path(), "study.toml", &small_study().replacen("[[terrain]]\nid = \"smooth\"", added, 1));
+    let plan = sastrugi_in(folder.path(), &["plan", "study.toml", "--json"]);
+    let plan: serde_json::Value = serde_json::from_str(&plan.stdout).unwrap();
+    let stale: Vec<&str> = plan["stale"].as_array().unwrap().iter().filter_map(|s| s["item"].as_str()).collect();
+    assert_eq!(stale, ["terrain/added", "roughness/added"]);
+    let after = run(folder.path(), &[]);
+    let of_items = ["dem/", "terrain/", "classes/", "fit/", "texture/", "mcap/"];
+    let changed: Vec<String> = differing(&before, &after)
+        .into_iter()
+        .filter(|p| of_items.iter().any(|folder| p.starts_with(folder)) && !p.contains("added"))
+        .collect();
+    assert_eq!(changed, Vec::<String>::new());
+    assert!(after.contains_key("terrain/added.tif"));
+}
+
+/// An edited study drops what it no longer asks for, from the release and from the work area.
+#[test]
+fn gold_an_edited_study_drops_its_orphans() {
+    let folder = area();
+    write(folder.path(), "study.toml", &small_study());
+    run(folder.path(), &[]);
+    write(folder.path(), "study.toml", &small_study().replace("count = 2\n", "count = 1\n"));
+    let after = run(folder.path(), &[]);
+    assert!(!after.keys().any(|p| p.contains("rough-0002")));
+    assert!(!folder.path().join("release.work/items/terrain/rough-0002").join("record.json").exists());
+    let kept = std::fs::read_dir(folder.path().join("release.work/items/terrain/rough-0002"));
+    assert!(kept.map_or(true, |mut entries| entries.next().is_none()));
+    assert_same(&after, &run_fresh(&small_study().replace("count = 2\n", "count = 1\n"), &[]), "edited or fresh");
+}
