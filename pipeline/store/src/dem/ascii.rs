@@ -108,8 +108,8 @@ fn count(word: &[u8], key: &str) -> Result<u64, Refusal> {
     parsed.ok_or_else(|| Refusal::new(format!("{key} of the ASCII grid is {}; it must be a count", quoted(word))))
 }
 
-/// Reads an ESRI ASCII grid.
-pub(super) fn parse(bytes: &[u8]) -> Result<Dem, Refusal> {
+/// Reads an ESRI ASCII grid, with the text of the `.prj` file beside it when there is one.
+pub(super) fn parse(bytes: &[u8], projection: Option<&str>) -> Result<Dem, Refusal> {
     let mut header = Header::default();
     let mut words = words(bytes).peekable();
     while let Some(key) = words.peek().copied().and_then(Key::of) {
@@ -125,7 +125,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Dem, Refusal> {
         return Err(Refusal::new(format!("claims {rows} rows of {cols} columns in {} bytes", bytes.len())));
     }
     let (values, integers) = read_values(words, cells, header.nodata)?;
-    let (crs, notes) = guess_crs(&geometry);
+    let (crs, notes) = projection.and_then(named_crs).unwrap_or_else(|| guess_crs(&geometry));
     let dtype = if integers { "int32" } else { "float32" };
     let info = DemInfo { format: Format::EsriAscii, dtype, nodata: header.nodata, crs, pixel_is_point: false, notes };
     Ok(Dem { grid: Grid::new(geometry, values), info })
@@ -150,6 +150,17 @@ fn read_values<'a>(
         return Err(Refusal::new(format!("holds {} of the {cells} values its header announces", values.len())));
     }
     Ok((values, integers))
+}
+
+/// The system of a `.prj` file (well-known text): its kind and name.
+fn named_crs(text: &str) -> Option<(Crs, Vec<String>)> {
+    let name = text.split('"').nth(1)?.to_owned();
+    let crs = match text.trim_start().get(..4)?.to_ascii_uppercase().as_str() {
+        "GEOG" => Crs { name, ..Crs::wgs84() },
+        "PROJ" => Crs { name, ..Crs::default() },
+        _ => return None,
+    };
+    Some((crs, vec![]))
 }
 
 /// The format names no reference system; coordinates on the globe at a usual arc-second spacing are taken as degrees.

@@ -18,6 +18,7 @@ const MAX_EXPANSION: u64 = 1 << 15;
 /// Raster bytes allowed for any file.
 const FREE_BYTES: u64 = 1 << 26;
 const RASTER_PIXEL_IS_POINT: u16 = 2;
+const SAMPLE_FORMATS_COMPLEX: [u16; 2] = [5, 6];
 const PHOTOMETRIC_PALETTE: u16 = 3;
 
 /// Reads a TIFF.
@@ -49,6 +50,10 @@ fn refused(error: &dyn std::error::Error) -> Refusal {
 fn parse_georeferenced(file: &GeoTiffFile, size: u64, options: &ReadOptions) -> Result<Dem, Refusal> {
     let ifd = file.tiff().ifd(file.base_ifd_index()).map_err(|e| refused(&e))?;
     single_band(u64::from(file.band_count()), ifd.photometric_interpretation())?;
+    let sample_format = ifd.tag(Tag::SampleFormat.to_u16()).and_then(|tag| tag.value.as_u16());
+    if sample_format.is_some_and(|format| SAMPLE_FORMATS_COMPLEX.contains(&format)) {
+        return Err(Refusal::new("holds complex numbers, not heights"));
+    }
     let layout = ifd.raster_layout().map_err(|e| refused(&e))?;
     let (rows, cols) = (u64::from(file.height()), u64::from(file.width()));
     affordable(cell_count(rows, cols)?, u64::from(layout.bits_per_sample).div_ceil(8), size)?;
@@ -112,7 +117,6 @@ fn read_samples(
         (2, 16) => read!(i16, "int16"),
         (1, 32) => read!(u32, "uint32"),
         (2, 32) => read!(i32, "int32"),
-        (5 | 6, _) => Err(Refusal::new("holds complex numbers, not heights")),
         _ => Err(Refusal::new(format!("holds {bits}-bit values of TIFF sample format {format}, which are no heights"))),
     }
 }

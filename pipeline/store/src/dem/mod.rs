@@ -211,7 +211,7 @@ fn parse(path: &Path, bytes: Vec<u8>, options: &ReadOptions) -> Result<Dem, Refu
     }
     match Format::of_file(path, &bytes) {
         Some(Format::GeoTiff) => geotiff::parse(bytes, options),
-        Some(Format::EsriAscii) => ascii::parse(&bytes),
+        Some(Format::EsriAscii) => ascii::parse(&bytes, fs::read_to_string(path.with_extension("prj")).ok().as_deref()),
         Some(Format::Hgt) => hgt::parse(path, &bytes),
         Some(Format::Npy) => npy::parse(&bytes, options),
         Some(Format::Png) => png::parse(&bytes, options),

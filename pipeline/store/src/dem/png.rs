@@ -105,6 +105,7 @@ pub(super) fn parse(bytes: &[u8], options: &ReadOptions) -> Result<Dem, Refusal>
     }
     let mut data = vec![0; cells * if wide { 2 } else { 1 }];
     reader.next_frame(&mut data).map_err(refused)?;
+    reader.finish().map_err(refused)?;
     let levels: Vec<f64> = if wide {
         data.chunks_exact(2).map(|v| f64::from(u16::from_be_bytes([v[0], v[1]]))).collect()
     } else {

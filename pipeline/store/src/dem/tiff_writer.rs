@@ -132,8 +132,11 @@ fn place_tags(g: &Geometry) -> [Tag; 2] {
     [Tag::double(33550, &[g.cell[0], g.cell[1], 0.0]), Tag::double(33922, &[0.0, 0.0, 0.0, g.origin[0], north, 0.0])]
 }
 
-/// The key directory with its two stores of values.
+/// The key directory with its two stores of values; none for a local plane (PixelIsArea is what its absence means).
 fn key_tags(crs: &Crs) -> Result<Vec<Tag>, Refusal> {
+    if crs.keys.is_empty() {
+        return Ok(vec![]);
+    }
     const DOUBLES: u16 = 34736;
     const TEXTS: u16 = 34737;
     let raster_type = (RASTER_TYPE, GeoKey::Short(RASTER_PIXEL_IS_AREA));
