@@ -10,6 +10,8 @@ use serde_json::{Value, json};
 pub struct Section {
     /// Anchor.
     pub id: &'static str,
+    /// Name in the list of sections.
+    pub name: &'static str,
     /// The question.
     pub title: &'static str,
     /// Its parts in order.
@@ -58,10 +60,10 @@ pub struct TableBlock {
 /// How much room a figure asks for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Size {
-    /// A map among several.
-    Small,
-    /// A chart.
-    Medium,
+    /// A map or chart among several.
+    Column,
+    /// A chart as wide as the page.
+    Wide,
 }
 
 /// A figure.

@@ -144,7 +144,8 @@ fn key_figures(data: &Data) -> Vec<(String, String)> {
         (recordings, "MCAP recording"),
         (data.artifacts.len(), "file"),
     ];
-    let named = |(n, what): (usize, &str)| (set::count(n), if n == 1 { what.to_owned() } else { format!("{what}s") });
+    let plural = |n: usize, what: &str| if n == 1 { what.to_owned() } else { format!("{what}s") };
+    let named = |(n, what): (usize, &str)| (set::count(n), plural(n, what));
     let mut figures: Vec<(String, String)> = counts.into_iter().filter(|(n, _)| *n > 0).map(named).collect();
     let bytes: u64 = data.artifacts.iter().map(|a| a.bytes).sum();
     if bytes > 0 {

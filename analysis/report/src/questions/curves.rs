@@ -1,14 +1,14 @@
 //! Spectra and height distributions of several heightfields in one frame.
 
 use crate::render::axis::Axis;
-use crate::render::chart::{Entry, Mark, Plot};
+use crate::render::chart::{Entry, Mark, Plot, WIDTH};
 use crate::render::svg::{Paint, Stroke};
 use crate::render::thin;
 use sastrugi_numeric::sums;
 use sastrugi_schemas::tables::{HeightDistributionRow, PsdRow};
 
 /// Height of a chart, px.
-pub const HEIGHT: f64 = 290.0;
+pub const HEIGHT: f64 = 280.0;
 
 /// A curve.
 #[derive(Clone, Debug)]
@@ -75,7 +75,7 @@ pub fn spectra(id: &str, curves: &[Curve], ranges: Ranges, slope: Option<Slope>)
     // Densities can fall to rounding noise beyond a band limit: ten decades are enough.
     let y = Axis::log(low.max(high * 1e-10) / 1.5, high * 1.5);
     let x = (Axis::log(ranges.x.0 / 1.1, ranges.x.1 * 1.1), "spatial frequency, cycles/m");
-    let mut plot = Plot::new(HEIGHT, x, (y, "power spectral density, m⁴"), &legend);
+    let mut plot = Plot::new((WIDTH, HEIGHT), x, (y, "power spectral density, m⁴"), &legend);
     draw(&mut plot, id, curves);
     if let Some(Slope { slope, centre }) = slope {
         let on_line = |x: f64| (x, libm::exp(centre.1 + slope * (libm::log(x) - centre.0)));
@@ -90,7 +90,7 @@ pub fn spectra(id: &str, curves: &[Curve], ranges: Ranges, slope: Option<Slope>)
 pub fn distributions(id: &str, curves: &[Curve], ranges: Ranges) -> Plot {
     let x = (Axis::linear(ranges.x.0, ranges.x.1), "height, m");
     let y = (Axis::linear(0.0, 1.06 * ranges.y.1), "density, 1/m");
-    let mut plot = Plot::new(HEIGHT, x, y, &entries(curves));
+    let mut plot = Plot::new((WIDTH, HEIGHT), x, y, &entries(curves));
     draw(&mut plot, id, curves);
     plot.svg.close();
     plot

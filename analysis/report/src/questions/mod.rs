@@ -19,6 +19,8 @@ use crate::data::Data;
 pub struct Question {
     /// Anchor on the page.
     pub id: &'static str,
+    /// Name in the list of sections.
+    pub name: &'static str,
     /// Heading.
     pub title: &'static str,
     /// Its answer; no block when the release says nothing about it.
@@ -40,6 +42,6 @@ impl Question {
     pub fn section(&self, data: &Data) -> Result<Option<Section>, ReportError> {
         let mut blocks = (self.answer)(data)?;
         blocks.retain(|block| !block.is_empty());
-        Ok((!blocks.is_empty()).then_some(Section { id: self.id, title: self.title, blocks }))
+        Ok((!blocks.is_empty()).then_some(Section { id: self.id, name: self.name, title: self.title, blocks }))
     }
 }

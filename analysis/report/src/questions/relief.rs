@@ -4,7 +4,7 @@ use crate::ReportError;
 use crate::content::{Figure, Numbers, Size, number, text};
 use crate::data::Data;
 use crate::render::map::{Key, Map};
-use crate::render::{colour, number as set, picture};
+use crate::render::{colour, number as set, picture, thin};
 use sastrugi_numeric::{Grid, sums};
 use sastrugi_schemas::Cell;
 
@@ -48,6 +48,23 @@ pub fn exaggeration_words(exaggeration: f64) -> String {
     } else {
         String::new()
     }
+}
+
+/// The heights between which nearly all cells of the files lie: 1st and 99th percentile, the widest of all files. `None`
+/// without any data.
+pub fn middle_range(data: &Data, paths: &[&str]) -> Result<Option<(f64, f64)>, ReportError> {
+    let mut range: Option<(f64, f64)> = None;
+    for path in paths {
+        let Some(grid) = data.files.grid(path)? else { continue };
+        let thin = thin::block_mean(&grid, thin::step(grid.rows(), grid.cols(), 256));
+        let mut heights = sums::finite(&thin.values);
+        heights.sort_by(f64::total_cmp);
+        let (low, high) = (sums::quantile_sorted(&heights, 0.01), sums::quantile_sorted(&heights, 0.99));
+        if low.is_finite() && high.is_finite() {
+            range = Some(range.map_or((low, high), |(a, b)| (a.min(low), b.max(high))));
+        }
+    }
+    Ok(range)
 }
 
 /// Shaded relief of the file at `path`; `None` when the release has no such file or it holds no data.
@@ -101,7 +118,7 @@ pub fn extent<T>(grid: &Grid<T>) -> String {
 
 fn figure(words: Words, description: String, map: Map, numbers: Numbers) -> Figure {
     let Words { id, title, caption } = words;
-    Figure { id, title, caption, description, svg: map.svg, size: Size::Small, numbers }
+    Figure { id, title, caption, description, svg: map.svg, size: Size::Column, numbers }
 }
 
 fn numbers(path: &str, grid: &Grid, (low, high): (f64, f64)) -> Numbers {

@@ -5,7 +5,7 @@ use super::svg::{Anchor, Paint, Stroke, Svg, Symbol, TEXT, fitted, text_width};
 use sastrugi_statistics::BoxPlot;
 
 /// Width of an ordinary figure, px: about that of a telephone, so that its text stays readable there.
-pub const WIDTH: f64 = 440.0;
+pub const WIDTH: f64 = 400.0;
 /// Free space at the right of every frame, px.
 const RIGHT: f64 = 16.0;
 /// Height of one row of a legend, px.
@@ -41,23 +41,27 @@ pub struct Plot {
 }
 
 impl Plot {
-    /// An empty frame of [`WIDTH`] x `height` px with grid, ticks, axis titles and legend.
-    pub fn new(height: f64, (x, x_title): (Axis, &str), (y, y_title): (Axis, &str), legend: &[Entry]) -> Self {
-        let top = 8.0 + legend_height(legend, WIDTH);
+    /// An empty frame of that size (px, px) with grid, ticks, axis titles and legend.
+    pub fn new(
+        (width, height): (f64, f64),
+        (x, x_title): (Axis, &str),
+        (y, y_title): (Axis, &str),
+        legend: &[Entry],
+    ) -> Self {
+        let top = 8.0 + legend_height(legend, width);
         let bottom = height - 44.0;
         let y = y.over(bottom, top);
         let y_ticks = fitting(&y, bottom - top, |_| TEXT + 12.0);
         let left = 30.0 + y_ticks.iter().map(|t| text_width(&t.label, TEXT)).fold(0.0, f64::max);
-        let x = x.over(left, WIDTH - RIGHT);
-        let mut svg = Svg::new(WIDTH, height);
-        draw_legend(&mut svg, legend, (0.0, 4.0), WIDTH);
-        let mut plot = Self { svg, x, y, corner: (left, top), size: (WIDTH - RIGHT - left, bottom - top) };
+        let x = x.over(left, width - RIGHT);
+        let mut svg = Svg::new(width, height);
+        draw_legend(&mut svg, legend, (0.0, 4.0), width);
+        let mut plot = Self { svg, x, y, corner: (left, top), size: (width - RIGHT - left, bottom - top) };
         plot.draw_x(x_title);
         plot.draw_y(&y_ticks, y_title);
         plot
     }
 
-    /// The same frame below another in one figure: no title of its own on x.
     fn draw_x(&mut self, title: &str) {
         let (left, bottom) = (self.corner.0, self.corner.1 + self.size.1);
         for (at, label) in places(&self.x, &fitting(&self.x, self.size.0, |t| text_width(&t.label, TEXT) + 16.0)) {
@@ -182,7 +186,8 @@ impl Rows {
         let [Some(q1), Some(median), Some(q3)] = [plot.quartile_low, plot.median, plot.quartile_high].map(at) else {
             return;
         };
-        let outliers: Vec<f64> = plot.outliers.iter().filter_map(|&v| at(v)).collect();
+        let (least, most) = self.x.range();
+        let (shown, beyond): (Vec<f64>, Vec<f64>) = plot.outliers.iter().partition(|v| **v >= least && **v <= most);
         let interval = beside.interval.and_then(|(a, b)| Some((at(a)?, at(b)?)));
         let published = beside.published.and_then(at);
         let line = Stroke::new(paint, 1.3);
@@ -195,7 +200,14 @@ impl Rows {
         self.svg.rect((q1, y - half), (q3 - q1, 2.0 * half), paint, 0.22);
         self.svg.frame((q1, y - half), (q3 - q1, 2.0 * half), line);
         self.svg.segment((median, y - half), (median, y + half), Stroke::new(paint, 3.0));
-        outliers.iter().for_each(|&x| self.svg.ring((x, y), 2.4, Stroke::new(paint, 1.1).faint(0.8)));
+        for x in shown.into_iter().filter_map(at) {
+            self.svg.ring((x, y), 2.4, Stroke::new(paint, 1.1).faint(0.8));
+        }
+        for x in beyond.into_iter().filter_map(at) {
+            let towards = if x > median { 1.0 } else { -1.0 };
+            self.svg
+                .polygon(&[(x - 3.0 * towards, y - 4.0), (x + 3.0 * towards, y), (x - 3.0 * towards, y + 4.0)], paint);
+        }
         if let Some((from, to)) = interval {
             let below = y + half + 6.0;
             self.svg.segment((from, below), (to, below), Stroke::new(Paint::Ink, 2.2));

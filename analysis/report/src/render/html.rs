@@ -28,7 +28,7 @@ pub struct Head {
 /// The whole page.
 pub fn page(head: &Head, sections: &[Section]) -> String {
     let title = escape(&head.title);
-    let links: String = sections.iter().map(|s| format!("<a href=\"#{}\">{}</a>", s.id, escape(s.title))).collect();
+    let links: String = sections.iter().map(|s| format!("<a href=\"#{}\">{}</a>", s.id, escape(s.name))).collect();
     let body: String = sections.iter().map(section).collect();
     format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
@@ -47,12 +47,18 @@ of the release are under <code>tables/</code> as Parquet.</p></footer>\n";
 fn head_parts(head: &Head) -> String {
     let description = if head.description.is_empty() { String::new() } else { paragraph("lead", &head.description) };
     let pair =
-        |(name, value): &(String, String)| format!("<div><dt>{}</dt><dd>{}</dd></div>", escape(name), escape(value));
+        |(name, value): &(String, String)| format!("<div><dt>{}</dt><dd>{}</dd></div>", escape(name), fact(value));
     let facts: String = head.facts.iter().map(pair).collect();
     let figure = |(value, what): &(String, String)| format!("<li><b>{}</b> {}</li>", escape(value), escape(what));
     let figures: String = head.figures.iter().map(figure).collect();
     let figures = if figures.is_empty() { figures } else { format!("<ul class=\"key\">{figures}</ul>\n") };
     format!("{description}<dl class=\"facts\">{facts}</dl>\n{figures}")
+}
+
+/// A value in the head of the page; a hash in the type of code.
+fn fact(value: &str) -> String {
+    let hash = value.len() == 64 && value.chars().all(|c| c.is_ascii_hexdigit());
+    if hash { format!("<code>{value}</code>") } else { escape(value) }
 }
 
 fn section(section: &Section) -> String {
@@ -79,9 +85,11 @@ fn paragraph(class: &str, text: &str) -> String {
 }
 
 fn figure_grid(figures: &[Figure]) -> String {
-    let class = if figures.iter().all(|f| f.size == Size::Small) { "figures small" } else { "figures" };
-    let items: String = figures.iter().map(figure).collect();
-    if items.is_empty() { items } else { format!("<div class=\"{class}\">\n{items}</div>\n") }
+    let grid = |run: &[Figure]| {
+        let class = if run[0].size == Size::Wide { "figures wide" } else { "figures" };
+        format!("<div class=\"{class}\">\n{}</div>\n", run.iter().map(figure).collect::<String>())
+    };
+    figures.chunk_by(|a, b| a.size == b.size).map(grid).collect()
 }
 
 fn figure(figure: &Figure) -> String {
@@ -90,7 +98,7 @@ fn figure(figure: &Figure) -> String {
     let numbers = match figure.numbers.rows.len() {
         0 => String::new(),
         1..=FIGURE_ROWS_MAX => folded("Numbers", &table(&figure.numbers, &figure.title)),
-        n => format!("<span>{} rows</span>", number::count(n)),
+        n => format!(" <span>({} rows)</span>", number::count(n)),
     };
     format!(
         "<figure id=\"fig-{id}\">\n{svg}<figcaption><b>{}</b> {}<div class=\"links\"><a href=\"figures/{id}.svg\">SVG</a> \
@@ -115,8 +123,9 @@ fn table_block(block: &TableBlock) -> String {
 }
 
 fn table(numbers: &Numbers, caption: &str) -> String {
-    let head: String = numbers.columns.iter().map(heading).collect();
-    let rows: String = numbers.rows.iter().take(TABLE_ROWS_MAX).map(|r| row(r)).collect();
+    let head: String = numbers.columns.iter().enumerate().map(|(i, c)| heading(c, numeric(numbers, i))).collect();
+    let decimals: Vec<Option<usize>> = (0..numbers.columns.len()).map(|i| decimals(numbers, i)).collect();
+    let rows: String = numbers.rows.iter().take(TABLE_ROWS_MAX).map(|r| row(r, &decimals)).collect();
     let caption = match numbers.rows.len().saturating_sub(TABLE_ROWS_MAX) {
         0 => escape(caption),
         _ => format!("{} (first {TABLE_ROWS_MAX} of {} rows)", escape(caption), number::count(numbers.rows.len())),
@@ -127,25 +136,50 @@ fn table(numbers: &Numbers, caption: &str) -> String {
     )
 }
 
-fn heading(heading: &Heading) -> String {
+/// True for a column that holds figures.
+fn numeric(numbers: &Numbers, column: usize) -> bool {
+    let mut cells = numbers.rows.iter().filter_map(|r| r.get(column));
+    cells.find(|c| **c != Cell::Null).is_some_and(|c| matches!(c, Cell::F64(_) | Cell::I64(_)))
+}
+
+/// Decimals that give the largest figure of a column four digits; `None` when that would leave nothing of the smallest.
+fn decimals(numbers: &Numbers, column: usize) -> Option<usize> {
+    let magnitude = |row: &Vec<Cell>| match row.get(column) {
+        Some(Cell::F64(v)) if *v != 0.0 => Some(v.abs()),
+        _ => None,
+    };
+    let magnitudes = || numbers.rows.iter().filter_map(magnitude);
+    if magnitudes().all(|v| v.fract() == 0.0) {
+        return Some(0);
+    }
+    let (low, high) = (magnitudes().fold(f64::INFINITY, f64::min), magnitudes().fold(0.0, f64::max));
+    let places =
+        (1..=7).find(|places| high >= libm::pow(10.0, 4.0 - f64::from(*places))).map(|p: u8| usize::from(p) - 1);
+    places.filter(|_| high < 1e6 && low > 1e-4 * high)
+}
+
+fn heading(heading: &Heading, numeric: bool) -> String {
     let name = escape(&heading.name).replace('_', "_<wbr>");
     let unit = match number::unit(&heading.unit) {
         u if u.is_empty() => u,
         u => format!("<br><small>{}</small>", escape(&u)),
     };
-    format!("<th scope=\"col\">{name}{unit}</th>")
+    let class = if numeric { " class=\"n\"" } else { "" };
+    format!("<th scope=\"col\"{class}>{name}{unit}</th>")
 }
 
-fn row(cells: &[Cell]) -> String {
-    let cells: String = cells.iter().map(cell).collect();
+fn row(cells: &[Cell], decimals: &[Option<usize>]) -> String {
+    let cells: String = cells.iter().zip(decimals).map(cell).collect();
     format!("<tr>{cells}</tr>\n")
 }
 
-fn cell(cell: &Cell) -> String {
+fn cell((cell, decimals): (&Cell, &Option<usize>)) -> String {
     match cell {
         Cell::Null => format!("<td class=\"n\">{}</td>", number::ABSENT),
         Cell::Text(v) => format!("<td>{}</td>", escape(v)),
-        Cell::F64(v) => format!("<td class=\"n\">{}</td>", number::significant(*v, 4)),
+        Cell::F64(v) => {
+            format!("<td class=\"n\">{}</td>", decimals.map_or_else(|| number::plain(*v, 4), |d| number::fixed(*v, d)))
+        }
         Cell::I64(v) => format!("<td class=\"n\">{v}</td>"),
         Cell::Bool(v) => format!("<td>{}</td>", if *v { "yes" } else { "no" }),
     }

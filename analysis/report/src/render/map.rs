@@ -119,14 +119,8 @@ fn key_height(key: &Key, width: f64) -> f64 {
 
 /// A length in m or km.
 fn distance(length_m: f64) -> String {
-    let short = |v: f64| number::significant(v, 3).trim_end_matches('0').trim_end_matches('.').to_string();
-    match length_m {
-        l if l >= 1000.0 => {
-            format!("{} km", number::significant(l / 1000.0, 3).trim_end_matches(".00").trim_end_matches(".0"))
-        }
-        l if l >= 1.0 => format!("{} m", number::fixed(l, 0)),
-        l => format!("{} m", short(l)),
-    }
+    let (length, unit) = if length_m >= 1000.0 { (length_m / 1000.0, "km") } else { (length_m, "m") };
+    format!("{} {unit}", number::plain(length, 3))
 }
 
 #[cfg(test)]

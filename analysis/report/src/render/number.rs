@@ -36,6 +36,16 @@ pub fn significant(value: f64, digits: usize) -> String {
     }
 }
 
+/// As [`significant`], without zeros at the end of a decimal fraction.
+pub fn plain(value: f64, digits: usize) -> String {
+    let text = significant(value, digits);
+    if text.contains('.') && !text.contains(' ') {
+        text.trim_end_matches('0').trim_end_matches('.').to_owned()
+    } else {
+        text
+    }
+}
+
 /// A count with its thousands apart.
 pub fn count(n: impl TryInto<u64>) -> String {
     let Ok(n) = n.try_into() else { return ABSENT.into() };
@@ -48,6 +58,11 @@ pub fn count(n: impl TryInto<u64>) -> String {
         out.push(c);
     }
     out
+}
+
+/// A count with the word it counts: `1 terrain`, `2 terrains`.
+pub fn counted(n: usize, word: &str) -> String {
+    format!("{} {word}{}", count(n), if n == 1 { "" } else { "s" })
 }
 
 /// A file size in decimal units.
@@ -112,10 +127,15 @@ mod tests {
         assert_eq!(significant(-12.345, 3), "−12.3");
         assert_eq!(significant(1.234e-7, 3), "1.23 × 10⁻⁷");
         assert_eq!(significant(99.96, 3), "100");
+        assert_eq!(
+            (plain(0.05, 4).as_str(), plain(640.0, 4).as_str(), plain(1e-9, 2).as_str()),
+            ("0.05", "640", "1.0 × 10⁻⁹")
+        );
         assert_eq!(significant(0.0, 3), "0");
         assert_eq!(fixed(-0.04, 1), "0.0");
         assert_eq!(count(1_234_567_i64), "1\u{202f}234\u{202f}567");
         assert_eq!(count(-1_i64), ABSENT);
+        assert_eq!((counted(1, "terrain"), counted(2, "terrain")), ("1 terrain".into(), "2 terrains".into()));
         assert_eq!(bytes(8_123_456), "8.12 MB");
         assert_eq!(percent(0.875, 1), "87.5 %");
         assert_eq!(unit("m/s2"), "m/s²");

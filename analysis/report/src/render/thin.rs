@@ -2,9 +2,6 @@
 
 use sastrugi_numeric::{Geometry, Grid};
 
-/// Largest number of rows or columns of a picture.
-pub const PICTURE_MAX: usize = 512;
-
 /// Cells per block side so that neither side has more than `most` blocks.
 pub fn step(rows: usize, cols: usize, most: usize) -> usize {
     rows.max(cols).div_ceil(most.max(1)).max(1)

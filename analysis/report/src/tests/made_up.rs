@@ -8,6 +8,7 @@ use sastrugi_schemas::tables::{
     CovarianceRow, FitRow, HeightDistributionRow, MissionRow, PsdRow, SampleRow, TerrainRow,
 };
 use std::collections::BTreeMap;
+use std::f64::consts::TAU;
 
 /// Rasters and samples held in memory.
 #[derive(Default)]
@@ -83,9 +84,9 @@ fn waves(geometry: Geometry, item: &str, amplitude_m: f64, hurst: f64) -> Grid {
     let extent = geometry.size()[0];
     let parts: Vec<[f64; 4]> = (0..70)
         .map(|i| {
-            let k = libm::pow(1.09, f64::from(i)) * 6.283 / extent;
-            let (sin, cos) = libm::sincos(s.uniform_in(0.0, 6.283));
-            [k * cos, k * sin, s.uniform_in(0.0, 6.283), amplitude_m * libm::pow(1.09, -hurst * f64::from(i))]
+            let k = libm::pow(1.09, f64::from(i)) * TAU / extent;
+            let (sin, cos) = libm::sincos(s.uniform_in(0.0, TAU));
+            [k * cos, k * sin, s.uniform_in(0.0, TAU), amplitude_m * libm::pow(1.09, -hurst * f64::from(i))]
         })
         .collect();
     let height = |x: f64, y: f64| parts.iter().map(|p| p[3] * libm::sin(p[0] * x + p[1] * y + p[2])).sum();

@@ -44,7 +44,8 @@ fn check(text: &str, html: bool) -> Result<(), String> {
             return Err(format!("bad name {name}"));
         }
         attributes(&body[name.len()..], html)?;
-        if !closed && !(html && VOID.contains(&name)) {
+        let void = html && VOID.contains(&name);
+        if !closed && !void {
             open.push(name.to_owned());
             if html && name == "style" {
                 rest = &rest[rest.find("</style>").ok_or("style without its end")?..];

@@ -8,7 +8,7 @@ use crate::ReportError;
 use crate::content::{Block, Figure, Numbers, Size, TableBlock, number, slug, text};
 use crate::data::Data;
 use crate::render::axis::Axis;
-use crate::render::chart::{Mark, Plot};
+use crate::render::chart::{Mark, Plot, WIDTH};
 use crate::render::number as set;
 use crate::render::svg::{Paint, Stroke, Symbol};
 use sastrugi_schemas::tables::{CovarianceRow, FitRow};
@@ -16,7 +16,7 @@ use std::collections::BTreeSet;
 
 /// Registry entry.
 pub const QUESTION: Question =
-    Question { id: "covariance", title: "How well do the fits describe the measured surface?", answer };
+    Question { id: "covariance", name: "Fits", title: "How well do the fits describe the measured surface?", answer };
 
 /// Measured DEMs whose maps are drawn; the fits of all are in the table.
 const DEMS_MAX: usize = 4;
@@ -42,17 +42,21 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     Ok(blocks)
 }
 
-/// What a reader must know about each fit, as full sentences.
+/// What a reader must know, as full sentences, each once with the fits it concerns.
 fn warnings(data: &Data, fits: &[&FitRow]) -> Result<Vec<String>, ReportError> {
-    let mut all = Vec::new();
+    let mut sentences: Vec<(String, Vec<&str>)> = Vec::new();
     for fit in fits {
         let file = data.files.fit(&format!("fit/{}.json", fit.fit_id))?;
         let of_table = || fit.warnings.split("; ").map(str::to_owned).collect();
         let list: Vec<String> = file.map_or_else(of_table, |f| f.warnings);
-        let own = list.iter().filter(|w| !w.trim().is_empty());
-        all.extend(own.map(|w| format!("{} ({} mode): {}", fit.fit_id, fit.mode, sentence(w))));
+        for sentence in list.iter().filter(|w| !w.trim().is_empty()).map(|w| sentence(w)) {
+            match sentences.iter_mut().find(|known| known.0 == sentence) {
+                Some((_, of)) => of.push(&fit.fit_id),
+                None => sentences.push((sentence, vec![&fit.fit_id])),
+            }
+        }
     }
-    Ok(all)
+    Ok(sentences.into_iter().map(|(sentence, of)| format!("{}: {sentence}", of.join(", "))).collect())
 }
 
 /// The words with a capital and a full stop.
@@ -87,7 +91,9 @@ fn covariance(fit: &FitRow, bins: &[&CovarianceRow], x: Axis, y: Axis) -> Figure
     let id = slug(&format!("covariance-{}", fit.fit_id));
     let seen = Stroke::new(Paint::Series(1), 2.0);
     let surface = Stroke::new(Paint::Series(0), 2.0).dashed("7 4");
-    let same = bins.iter().all(|b| (b.model_m2 - b.surface_model_m2).abs() <= 1e-9 * b.model_m2.abs());
+    // Closer than a line is wide.
+    let close = 0.01 * bins.iter().map(|b| b.model_m2.abs()).fold(0.0, f64::max);
+    let same = bins.iter().all(|b| (b.model_m2 - b.surface_model_m2).abs() <= close);
     let mut legend = vec![(Mark::Symbol(Symbol::Disc, Paint::Ink), "measured (area: pairs)".to_owned())];
     match same {
         true => legend.push((Mark::Line(seen), "fitted model".into())),
@@ -96,7 +102,7 @@ fn covariance(fit: &FitRow, bins: &[&CovarianceRow], x: Axis, y: Axis) -> Figure
             (Mark::Line(surface), "model of the surface".into()),
         ]),
     }
-    let mut plot = Plot::new(HEIGHT + 20.0, (x, "lag, m"), (y, "covariance, m²"), &legend);
+    let mut plot = Plot::new((WIDTH, HEIGHT + 20.0), (x, "lag, m"), (y, "covariance, m²"), &legend);
     plot.line([(0.0, 0.0), (x.range().1, 0.0)], Stroke::new(Paint::Muted, 1.0));
     plot.clip(&format!("{id}-clip"));
     if !same {
@@ -125,10 +131,10 @@ fn figure(id: String, fit: &FitRow, bins: &[&CovarianceRow], plot: Plot) -> Figu
     let pairs = bins.iter().map(|b| b.pairs);
     let (fewest, most) = (pairs.clone().min().unwrap_or(0), pairs.max().unwrap_or(0));
     let caption = format!(
-        "{} covariance of the residual after a moving average of {} × {} m; {} to {} pairs of cells in a bin.",
-        fit.model,
+        "Covariance of the residual after a moving average of {} × {} m, {} model; {} to {} pairs of cells in a bin.",
         set::significant(fit.window_x_m, 3),
         set::significant(fit.window_y_m, 3),
+        fit.model,
         set::count(fewest),
         set::count(most)
     );
@@ -143,7 +149,7 @@ fn figure(id: String, fit: &FitRow, bins: &[&CovarianceRow], plot: Plot) -> Figu
     let query = format!("tables/covariance where fit_id = '{}' and azimuth_deg is null", fit.fit_id);
     let numbers = Numbers::select(query, bins.iter().copied(), &names);
     let title = format!("{}, {} mode.", fit.fit_id, fit.mode);
-    Figure { id, title, caption, description, svg: plot.svg, size: Size::Medium, numbers }
+    Figure { id, title, caption, description, svg: plot.svg, size: Size::Column, numbers }
 }
 
 /// A parameter of every fit: name, unit, figure.
@@ -188,7 +194,7 @@ fn maps(data: &Data, dem: &str, fits: &[&FitRow]) -> Result<Vec<Figure>, ReportE
     let mut figures = Vec::new();
     let words =
         |what: &str, title: String, caption: String| Words { id: slug(&format!("{what}-{dem}")), title, caption };
-    let caption = format!("{dem} as imported, in metres. Light from the north-west.{shading}");
+    let caption = format!("{dem} as imported, in metres.{shading}");
     figures.extend(relief(data, &path, style, words("dem", "Measured DEM.".into(), caption))?);
     for fit in fits {
         figures.extend(background(data, fit, style)?);

@@ -7,7 +7,7 @@ use crate::data::Data;
 use crate::render::number as set;
 
 /// Registry entry.
-pub const QUESTION: Question = Question { id: "failures", title: "What is missing?", answer };
+pub const QUESTION: Question = Question { id: "failures", name: "Missing items", title: "What is missing?", answer };
 
 fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     if data.failed.is_empty() {

@@ -13,6 +13,9 @@ use sastrugi_schemas::tables::MissionRow;
 use sastrugi_statistics::{BoxPlot, Interval};
 use std::collections::{BTreeMap, BTreeSet};
 
+/// How much outliers may widen an axis on either side, in lengths of what stands without them.
+const OUTLIERS_WIDEN: f64 = 0.5;
+
 /// A group as it is drawn.
 struct Sample<'a> {
     group: String,
@@ -141,7 +144,12 @@ struct Words {
 fn figure(samples: &[Sample], words: Words) -> Figure {
     let label = |s: &Sample| RowLabel { name: s.group.clone(), detail: format!("n = {}", s.plot.count) };
     let labels: Vec<RowLabel> = samples.iter().map(label).collect();
-    let mut rows = Rows::new(&labels, 54.0, (axis(samples), &words.axis), &legend(samples));
+    let axis = axis(samples);
+    let beyond = match beyond(samples, &axis) {
+        0 => String::new(),
+        n => format!(" {} beyond the axis: triangles at its edge.", set::counted(n, "value")),
+    };
+    let mut rows = Rows::new(&labels, 54.0, (axis, &words.axis), &legend(samples));
     for (row, s) in samples.iter().enumerate() {
         let beside = Beside { interval: s.interval.map(|i| (i.low, i.high)), published: s.published };
         rows.box_plot(row, &s.plot, beside, Paint::Series(s.index));
@@ -155,21 +163,34 @@ fn figure(samples: &[Sample], words: Words) -> Figure {
         title: words.title,
         caption: format!(
             "n counts {}. Boxes are quartiles (linear between order statistics), whiskers reach the last value within 1.5 \
-             interquartile ranges, circles lie beyond.",
+             interquartile ranges, circles lie beyond.{beyond}",
             words.n_is
         ),
         description: describe(samples, &words.axis),
         svg: rows.svg,
-        size: Size::Medium,
+        size: Size::Column,
         numbers,
     }
 }
 
+/// The axis holds all boxes, whiskers and published medians; outliers widen it by no more than [`OUTLIERS_WIDEN`].
 fn axis(samples: &[Sample]) -> Axis {
-    let values = samples.iter().flat_map(|s| s.values.iter().map(|v| v.1).chain(s.published));
-    let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));
+    let ends = |values: &mut dyn Iterator<Item = f64>| {
+        values.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)))
+    };
+    let inner = |s: &Sample| [s.plot.whisker_low, s.plot.whisker_high, s.published.unwrap_or(s.plot.median)];
+    let (low, high) = ends(&mut samples.iter().flat_map(inner));
+    let (lowest, highest) = ends(&mut samples.iter().flat_map(|s| s.values.iter().map(|v| v.1)));
+    let room = (OUTLIERS_WIDEN * (high - low)).max(1e-3 * high.abs());
+    let (low, high) = (low.min(lowest.max(low - room)), high.max(highest.min(high + room)));
     let margin = 0.04 * (high - low);
     Axis::linear(low - margin, high + margin)
+}
+
+/// Outliers that the axis does not reach.
+fn beyond(samples: &[Sample], axis: &Axis) -> usize {
+    let (low, high) = axis.range();
+    samples.iter().flat_map(|s| &s.plot.outliers).filter(|v| **v < low || **v > high).count()
 }
 
 fn legend(samples: &[Sample]) -> Vec<Entry> {

@@ -15,7 +15,7 @@ use sastrugi_statistics::{Interval, cluster_median};
 use std::collections::BTreeMap;
 
 /// Registry entry.
-pub const QUESTION: Question = Question { id: "missions", title: "How did the missions go?", answer };
+pub const QUESTION: Question = Question { id: "missions", name: "Missions", title: "How did the missions go?", answer };
 
 /// Bootstrap samples behind an interval.
 const REPLICATES: usize = 1000;

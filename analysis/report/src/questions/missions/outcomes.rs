@@ -26,7 +26,7 @@ pub fn stacked(groups: &[Group<MissionRow>]) -> Figure {
         caption: "Figures in the bars are counts of missions.".into(),
         description: describe(groups, &counts),
         svg: rows.svg,
-        size: Size::Medium,
+        size: Size::Column,
         numbers: numbers(groups, &counts, &kinds),
     }
 }

@@ -12,6 +12,9 @@ use sastrugi_numeric::sums;
 use sastrugi_schemas::RoughnessClass;
 use sastrugi_schemas::tables::{MissionRow, SampleRow};
 
+/// A figure of a sample.
+type Angle = fn(&SampleRow) -> f64;
+
 const PITCH: Stroke = Stroke { paint: Paint::Series(0), width: 1.6, dash: "", opacity: 1.0 };
 const ROLL: Stroke = Stroke { paint: Paint::Series(1), width: 1.6, dash: "5 2.5", opacity: 1.0 };
 /// Height of the band of classes, in the units of the axis's length.
@@ -42,11 +45,11 @@ fn draw(mission: &MissionRow, samples: &[SampleRow]) -> Figure {
     let room = (high - low).max(1.0);
     let y = Axis::linear(low - 0.16 * room, high + 0.06 * room);
     let end = samples.last().map_or(0.0, |s| s.time_s);
-    let mut plot = Plot::new(300.0, (Axis::linear(0.0, end), "time, s"), (y, "angle, °"), &legend(samples));
+    let mut plot = Plot::new((900.0, 320.0), (Axis::linear(0.0, end), "time, s"), (y, "angle, °"), &legend(samples));
     plot.clip(&format!("{id}-clip"));
     draw_classes(&mut plot, samples);
     plot.line([(0.0, 0.0), (end, 0.0)], Stroke::new(Paint::Muted, 1.0));
-    let angles: [(fn(&SampleRow) -> f64, Stroke); 2] = [(|s| s.pitch_deg, PITCH), (|s| s.roll_deg, ROLL)];
+    let angles: [(Angle, Stroke); 2] = [(|s| s.pitch_deg, PITCH), (|s| s.roll_deg, ROLL)];
     for (angle, stroke) in angles {
         let placed = plot.place(samples.iter().map(|s| (s.time_s, angle(s))));
         plot.svg.polyline(&thin::line(&placed, 0.7), stroke);
@@ -106,5 +109,5 @@ fn finish(id: String, mission: &MissionRow, samples: &[SampleRow], plot: Plot) -
     let query =
         format!("tables/samples where terrain_id = '{}' and mission_id = '{}'", mission.terrain_id, mission.mission_id);
     let numbers = Numbers::select(query, samples, &["sample", "time_s", "pitch_deg", "roll_deg", "class"]);
-    Figure { id, title: "Pitch and roll.".into(), caption, description, svg: plot.svg, size: Size::Medium, numbers }
+    Figure { id, title: "Pitch and roll.".into(), caption, description, svg: plot.svg, size: Size::Wide, numbers }
 }

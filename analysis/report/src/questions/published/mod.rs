@@ -13,8 +13,12 @@ use sastrugi_schemas::tables::{MissionRow, TerrainRow};
 use std::collections::BTreeMap;
 
 /// Registry entry.
-pub const QUESTION: Question =
-    Question { id: "published", title: "How does this compare with published figures?", answer };
+pub const QUESTION: Question = Question {
+    id: "published",
+    name: "Published figures",
+    title: "How does this compare with published figures?",
+    answer,
+};
 
 fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     let Some(paper) = papers::applicable(data) else { return Ok(Vec::new()) };

@@ -7,9 +7,9 @@ use crate::data::{Data, Group};
 use crate::questions::outcome;
 use crate::questions::relief::{MAP_WIDTH, exaggeration, extent};
 use crate::render::axis::Axis;
-use crate::render::chart::{Entry, Mark, RowLabel, Rows};
+use crate::render::chart::{Entry, Mark, RowLabel, Rows, WIDTH};
 use crate::render::map::{Key, Map};
-use crate::render::svg::{Anchor, Paint, Stroke, Symbol};
+use crate::render::svg::{Anchor, Paint, Stroke, Symbol, text_width};
 use crate::render::{number as set, picture, thin};
 use sastrugi_schemas::RoughnessClass;
 use sastrugi_schemas::tables::{MissionRow, SampleRow, TerrainRow};
@@ -64,7 +64,7 @@ fn share_bar(rows: &mut Rows, row: usize, group: &Group<TerrainRow>, class: Roug
     terrains.iter().for_each(|&x| rows.svg.ring((x, y), 2.2, Stroke::new(Paint::Ink, 0.9).faint(0.6)));
     let last = terrains.iter().copied().fold(end, f64::max);
     let value = set::percent(middle, 1);
-    match last > 360.0 {
+    match last + 8.0 + text_width(&value, 11.5) > WIDTH {
         true => rows.svg.text_sized((zero + 6.0, y + 4.0), Anchor::Start, label_on(class), 11.5, &value),
         false => rows.svg.text_sized((last + 8.0, y + 4.0), Anchor::Start, Paint::Ink, 11.5, &value),
     }
@@ -90,7 +90,7 @@ fn shares_figure(rows: Rows, groups: &[&Group<TerrainRow>]) -> Figure {
             .into(),
         description: format!("Median shares. {}.", groups.iter().map(in_words).collect::<Vec<_>>().join("; ")),
         svg: rows.svg,
-        size: Size::Medium,
+        size: Size::Column,
         numbers: Numbers::select("tables/terrains where stage = 'terrain'", terrains, &names),
     }
 }
@@ -129,6 +129,8 @@ fn map_entries(missions: &[&MissionRow]) -> Vec<Entry> {
     }
     if !missions.is_empty() {
         entries.push((Mark::Symbol(Symbol::Ring, Paint::Ink), "start".into()));
+    }
+    if counts[0] < missions.len() {
         entries.push((Mark::Symbol(Symbol::Frame, Paint::Ink), "goal not reached".into()));
     }
     entries
@@ -178,7 +180,7 @@ fn map_figure(
         caption: format!("{}, closed class map over its relief; {outcomes}.", terrain.terrain_id),
         description: format!("Map of roughness classes, {extent}; {outcomes}."),
         svg: map.svg,
-        size: Size::Small,
+        size: Size::Column,
         numbers: map_numbers(terrain, missions),
     }
 }

@@ -13,9 +13,9 @@ use sastrugi_numeric::sums;
 use sastrugi_schemas::tables::TerrainRow;
 
 /// Registry entry.
-pub const QUESTION: Question = Question { id: "terrain", title: "What is the terrain like?", answer };
+pub const QUESTION: Question = Question { id: "terrain", name: "Terrain", title: "What is the terrain like?", answer };
 
-/// Groups for which three terrains are drawn; with more groups, one each.
+/// Groups of one family for which three terrains are drawn; with more, one each.
 const GROUPS_WITH_THREE: usize = 3;
 /// Groups that are drawn at all; every group is in the tables.
 const GROUPS_MAX: usize = 12;
@@ -33,11 +33,27 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
             groups.len()
         )));
     }
-    push(&mut blocks, "Relief", reliefs::figures(data, drawn)?);
+    let families = families(drawn);
+    push(&mut blocks, "Relief", reliefs::figures(data, &families)?);
     push(&mut blocks, "Roughness classes", classes::figures(data, drawn)?);
-    push(&mut blocks, "Spectra and heights", spectra::figures(data, drawn));
+    push(&mut blocks, "Spectra", families.iter().flat_map(|f| spectra::spectra(data, f)).collect());
+    push(&mut blocks, "Heights", families.iter().flat_map(|f| spectra::distributions(data, f)).collect());
     blocks.push(Block::FoldedTable(all(data)));
     Ok(blocks)
+}
+
+/// Groups of one raster size and cell: what can be drawn in one range of heights and on common axes.
+fn families<'a>(groups: &[Group<'a, TerrainRow>]) -> Vec<Vec<Group<'a, TerrainRow>>> {
+    let shape =
+        |g: &Group<TerrainRow>| g.rows.first().map(|t| (t.rows, t.cols, t.cell_x_m.to_bits(), t.cell_y_m.to_bits()));
+    let mut families: Vec<Vec<Group<TerrainRow>>> = Vec::new();
+    for group in groups {
+        match families.iter_mut().find(|f| shape(&f[0]) == shape(group)) {
+            Some(family) => family.push(group.clone()),
+            None => families.push(vec![group.clone()]),
+        }
+    }
+    families
 }
 
 fn push(blocks: &mut Vec<Block>, heading: &str, figures: Vec<Figure>) {
@@ -48,14 +64,13 @@ fn push(blocks: &mut Vec<Block>, heading: &str, figures: Vec<Figure>) {
 
 fn introduction(groups: &[Group<TerrainRow>]) -> String {
     let n: usize = groups.iter().map(|g| g.rows.len()).sum();
-    let plural = |n: usize, word: &str| format!("{} {word}{}", set::count(n), if n == 1 { "" } else { "s" });
     let names: Vec<String> = groups.iter().map(|g| format!("{} ({})", g.name, g.rows.len())).take(GROUPS_MAX).collect();
     let more = if groups.len() > GROUPS_MAX { " …" } else { "" };
     format!(
         "{} in {}: {}{more}. Roughness classes follow the largest gradient to the eight neighbours of a cell; \
          shares leave out the border and are taken before the class map is closed.",
-        plural(n, "terrain"),
-        plural(groups.len(), "group"),
+        set::counted(n, "terrain"),
+        set::counted(groups.len(), "group"),
         names.join(", ")
     )
 }

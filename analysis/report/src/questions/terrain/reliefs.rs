@@ -1,10 +1,11 @@
-//! Shaded relief: the middle, the smoothest and the roughest terrain of each group, in one light and one colour range.
+//! Shaded relief: the smoothest, the middle and the roughest terrain of each group, in one light and, for groups of one
+//! raster size, in one range of colours.
 
 use super::{GROUPS_WITH_THREE, by_slope, median};
 use crate::ReportError;
 use crate::content::{Figure, slug};
 use crate::data::{Data, Group};
-use crate::questions::relief::{Style, Words, exaggeration, exaggeration_words, relief};
+use crate::questions::relief::{Style, Words, exaggeration, exaggeration_words, middle_range, relief};
 use crate::render::number as set;
 use sastrugi_schemas::tables::TerrainRow;
 
@@ -12,11 +13,16 @@ use sastrugi_schemas::tables::TerrainRow;
 type Choice<'a> = (&'a TerrainRow, String, &'static str);
 
 /// One figure per terrain drawn.
-pub fn figures(data: &Data, groups: &[Group<TerrainRow>]) -> Result<Vec<Figure>, ReportError> {
-    let choices: Vec<Choice> = groups.iter().flat_map(|g| choices(g, groups.len())).collect();
-    let style = style(&choices);
-    let drawn = choices.iter().map(|choice| relief(data, &choice.0.path, Some(style), words(choice, style)));
-    drawn.filter_map(Result::transpose).collect()
+pub fn figures(data: &Data, families: &[Vec<Group<TerrainRow>>]) -> Result<Vec<Figure>, ReportError> {
+    let mut figures = Vec::new();
+    for family in families {
+        let choices: Vec<Choice> = family.iter().flat_map(|g| choices(g, family.len())).collect();
+        let Some(style) = style(data, &choices)? else { continue };
+        for choice in &choices {
+            figures.extend(relief(data, &choice.0.path, Some(style), words(choice, style))?);
+        }
+    }
+    Ok(figures)
 }
 
 fn choices<'a>(group: &Group<'a, TerrainRow>, groups: usize) -> Vec<Choice<'a>> {
@@ -31,21 +37,23 @@ fn choices<'a>(group: &Group<'a, TerrainRow>, groups: usize) -> Vec<Choice<'a>> 
     places.iter().map(|&(i, why)| (rows[i], group.name.clone(), why)).collect()
 }
 
-fn style(choices: &[Choice]) -> Style {
+/// One style for all; `None` when no terrain has its heightfield in the release.
+fn style(data: &Data, choices: &[Choice]) -> Result<Option<Style>, ReportError> {
     let rows: Vec<&TerrainRow> = choices.iter().map(|c| c.0).collect();
-    let low = rows.iter().map(|t| t.height_min_m).fold(f64::INFINITY, f64::min);
-    let high = rows.iter().map(|t| t.height_max_m).fold(f64::NEG_INFINITY, f64::max);
-    let pixels = if rows.len() > 4 { 300 } else { 420 };
-    Style { range_m: (low, high), exaggeration: exaggeration(median(&rows, |t| t.rms_slope)), pixels }
+    let paths: Vec<&str> = rows.iter().map(|t| t.path.as_str()).collect();
+    let exaggeration = exaggeration(median(&rows, |t| t.rms_slope));
+    let pixels = if rows.len() > 4 { 340 } else { 440 };
+    Ok(middle_range(data, &paths)?.map(|range_m| Style { range_m, exaggeration, pixels }))
 }
 
 fn words((terrain, group, why): &Choice, style: Style) -> Words {
     let caption = format!(
-        "{}, {why}: rms slope {}, relief {}. Light from the north-west.{}",
+        "{}, {why}: rms slope {}, relief {}.{}",
         terrain.terrain_id,
         set::significant(terrain.rms_slope, 3),
         set::with_unit(terrain.relief_m, 3, "m"),
         exaggeration_words(style.exaggeration)
     );
-    Words { id: slug(&format!("relief-{}", terrain.terrain_id)), title: format!("Group {group}."), caption }
+    let id = slug(&format!("relief-{}", terrain.terrain_id));
+    Words { id, title: format!("Group {group}."), caption }
 }

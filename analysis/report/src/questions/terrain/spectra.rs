@@ -9,13 +9,6 @@ use crate::render::number as set;
 use crate::render::svg::{Paint, Stroke};
 use sastrugi_schemas::tables::{HeightDistributionRow, PsdRow, TerrainRow};
 
-/// Spectra of all groups, then distributions of all groups.
-pub fn figures(data: &Data, groups: &[Group<TerrainRow>]) -> Vec<Figure> {
-    let mut figures = spectra(data, groups);
-    figures.extend(distributions(data, groups));
-    figures
-}
-
 /// A group that has curves.
 type Drawn<'a, 'b> = (&'b Group<'a, TerrainRow>, Vec<Curve>);
 
@@ -30,7 +23,8 @@ fn drawn<'a, 'b>(groups: &'b [Group<'a, TerrainRow>], points: impl Fn(&str) -> V
     groups.iter().map(|g| (g, curves(g))).filter(|(_, c)| !c.is_empty()).collect()
 }
 
-fn spectra(data: &Data, groups: &[Group<TerrainRow>]) -> Vec<Figure> {
+/// One frame per group.
+pub fn spectra(data: &Data, groups: &[Group<TerrainRow>]) -> Vec<Figure> {
     let drawn = drawn(groups, |id| curves::spectrum(&data.spectrum(id)));
     let ranges = curves::ranges(drawn.iter().flat_map(|(_, c)| c));
     let figure = |(group, curves): &Drawn| {
@@ -43,8 +37,11 @@ fn spectra(data: &Data, groups: &[Group<TerrainRow>]) -> Vec<Figure> {
         }
         let caption = "Radially averaged two-dimensional power spectral density, one line per terrain; dashed, the median \
                        of the slopes fitted to each, laid through the middle of the lines.";
-        let description =
-            format!("Log-log spectra of {} terrains; median slope {}.", curves.len(), set::fixed(middle, 2));
+        let description = format!(
+            "Log-log spectra of {}; median slope {}.",
+            set::counted(curves.len(), "terrain"),
+            set::fixed(middle, 2)
+        );
         let rows: Vec<&PsdRow> = group.rows.iter().flat_map(|t| data.spectrum(&t.terrain_id)).collect();
         let names = ["terrain_id", "bin", "frequency_cycles_m", "psd_m4", "modes"];
         let numbers = Numbers::select(query("psd", group), rows, &names);
@@ -53,7 +50,8 @@ fn spectra(data: &Data, groups: &[Group<TerrainRow>]) -> Vec<Figure> {
     drawn.iter().map(figure).collect()
 }
 
-fn distributions(data: &Data, groups: &[Group<TerrainRow>]) -> Vec<Figure> {
+/// One frame per group.
+pub fn distributions(data: &Data, groups: &[Group<TerrainRow>]) -> Vec<Figure> {
     let drawn = drawn(groups, |id| curves::histogram(&data.histogram(id)));
     let ranges = curves::ranges(drawn.iter().flat_map(|(_, c)| c));
     let figure = |(group, curves): &Drawn| {
@@ -61,8 +59,8 @@ fn distributions(data: &Data, groups: &[Group<TerrainRow>]) -> Vec<Figure> {
         let plot = curves::distributions(&id, curves, ranges);
         let [skewness, kurtosis] = [median(&group.rows, |t| t.skewness), median(&group.rows, |t| t.kurtosis)];
         let description = format!(
-            "Height distributions of {} terrains; median skewness {}, median kurtosis {} (3 for a normal distribution).",
-            curves.len(),
+            "Height distributions of {}; median skewness {}, median kurtosis {} (3 for a normal distribution).",
+            set::counted(curves.len(), "terrain"),
             set::fixed(skewness, 2),
             set::fixed(kurtosis, 2)
         );
@@ -83,5 +81,5 @@ fn query(table: &str, group: &Group<TerrainRow>) -> String {
 }
 
 fn finish(id: String, title: String, caption: &str, description: String, plot: Plot, numbers: Numbers) -> Figure {
-    Figure { id, title, caption: caption.into(), description, svg: plot.svg, size: Size::Medium, numbers }
+    Figure { id, title, caption: caption.into(), description, svg: plot.svg, size: Size::Column, numbers }
 }

@@ -3,7 +3,7 @@
 
 use super::Question;
 use super::curves::{self, Curve};
-use super::relief::{Words, deviations, limit_m, relief};
+use super::relief::{Style, Words, deviations, exaggeration, limit_m, middle_range, relief};
 use crate::ReportError;
 use crate::content::{Block, Figure, Numbers, Size, TableBlock, slug};
 use crate::data::{self, Data};
@@ -13,14 +13,20 @@ use sastrugi_numeric::Grid;
 use sastrugi_schemas::tables::{HeightDistributionRow, PsdRow, TerrainRow};
 
 /// Registry entry.
-pub const QUESTION: Question =
-    Question { id: "texture", title: "Does the synthetic texture look like the measured one?", answer };
+pub const QUESTION: Question = Question {
+    id: "texture",
+    name: "Texture",
+    title: "Does the synthetic texture look like the measured one?",
+    answer,
+};
 
 /// Textures that are drawn; all are in the table.
 const TEXTURES_MAX: usize = 4;
 
 fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
-    let textures: Vec<&TerrainRow> = data.of_stage("texture").collect();
+    let on_base = |t: &&TerrainRow| data::parameter(t, "onto").is_some();
+    let (based, mut textures): (Vec<&TerrainRow>, Vec<_>) = data.of_stage("texture").partition(on_base);
+    textures.extend(based);
     let mut blocks = Vec::new();
     for texture in textures.iter().take(TEXTURES_MAX) {
         let figures = figures(data, texture)?;
@@ -45,8 +51,8 @@ fn heading(texture: &TerrainRow) -> String {
 /// A texture on a base is shown as relief; one that stands alone beside the residual of its fit.
 fn figures(data: &Data, texture: &TerrainRow) -> Result<Vec<Figure>, ReportError> {
     let fit = data::parameter(texture, "fit").unwrap_or_default();
-    if data::parameter(texture, "onto").is_some() {
-        return Ok(on_base(data, texture, &fit)?.into_iter().collect());
+    if let Some(base) = data::parameter(texture, "onto") {
+        return on_base(data, texture, &base, &fit);
     }
     let mut figures = patches(data, texture, &fit)?;
     figures.extend(spectra(data, texture, &fit));
@@ -54,10 +60,21 @@ fn figures(data: &Data, texture: &TerrainRow) -> Result<Vec<Figure>, ReportError
     Ok(figures)
 }
 
-fn on_base(data: &Data, texture: &TerrainRow, fit: &str) -> Result<Option<Figure>, ReportError> {
-    let caption = format!("Base terrain with the texture of fit {fit} added. Light from the north-west.");
-    let id = slug(&format!("texture-{}", texture.terrain_id));
-    relief(data, &texture.path, None, Words { id, title: format!("{}.", texture.terrain_id), caption })
+/// The base and the base with its texture, in one range of heights.
+fn on_base(data: &Data, texture: &TerrainRow, base: &str, fit: &str) -> Result<Vec<Figure>, ReportError> {
+    let base_path = data.terrain(base).map_or("", |t| t.path.as_str());
+    let Some(range_m) = middle_range(data, &[base_path, &texture.path])? else { return Ok(Vec::new()) };
+    let style = Some(Style { range_m, exaggeration: exaggeration(texture.rms_slope), pixels: 400 });
+    let words = |what: &str, title: &str, caption: String| Words {
+        id: slug(&format!("{what}-{}", texture.terrain_id)),
+        title: title.into(),
+        caption,
+    };
+    let mut figures = Vec::new();
+    figures.extend(relief(data, base_path, style, words("base", "Base.", format!("{base}, as it was generated.")))?);
+    let caption = format!("{}: {base} with the texture of fit {fit}; same colours and light.", texture.terrain_id);
+    figures.extend(relief(data, &texture.path, style, words("textured", "Base with texture.", caption))?);
+    Ok(figures)
 }
 
 /// Measured residual and synthetic texture: the middle of each, of one size in metres, in one colour range.
@@ -116,12 +133,14 @@ fn spectra(data: &Data, texture: &TerrainRow, fit: &str) -> Option<Figure> {
     Some(Figure {
         id,
         title: "Spectra.".into(),
-        caption: "Radially averaged two-dimensional power spectral density. The moving average has taken the lowest \
-                  frequencies out of the measured residual, not out of the texture."
-            .into(),
+        caption: with_measured(
+            "Radially averaged two-dimensional power spectral density.",
+            "The moving average has taken the lowest frequencies out of the measured residual, not out of the texture.",
+            &curves,
+        ),
         description: format!("Log-log spectra of {}.", names_of(&curves)),
         svg: plot.svg,
-        size: Size::Medium,
+        size: Size::Column,
         numbers: Numbers::select(query, rows, &names),
     })
 }
@@ -137,12 +156,17 @@ fn distributions(data: &Data, texture: &TerrainRow, fit: &str) -> Option<Figure>
     Some(Figure {
         id,
         title: "Heights.".into(),
-        caption: "Height distributions. Trimmed outliers are missing from the measured one.".into(),
+        caption: with_measured("Height distributions.", "Trimmed outliers are missing from the measured one.", &curves),
         description: format!("Height distributions of {}.", names_of(&curves)),
         svg: plot.svg,
-        size: Size::Medium,
+        size: Size::Column,
         numbers: Numbers::select(query, rows, &names),
     })
+}
+
+/// The words, and what to mind about the measured curve where there is one.
+fn with_measured(words: &str, measured: &str, curves: &[Curve]) -> String {
+    if curves.len() > 1 { format!("{words} {measured}") } else { words.to_owned() }
 }
 
 fn names_of(curves: &[Curve]) -> String {
