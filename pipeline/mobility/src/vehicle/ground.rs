@@ -148,11 +148,8 @@ impl Ground {
     fn locate(&self, x: f64, y: f64) -> (usize, f64, f64) {
         let u = (x - self.origin[0]) * self.inverse_cell[0];
         let v = (y - self.origin[1]) * self.inverse_cell[1];
-        // The rim keeps both positive and below 2^31 near the terrain; elsewhere the index is out of range or the
-        // height NaN.
-        let (i, j) = (u as i32, v as i32);
-        let k = (j as usize).wrapping_mul(self.cols).wrapping_add(i as usize);
-        (k, u - f64::from(i), v - f64::from(j))
+        let ((i, west), (j, south)) = (floor(u), floor(v));
+        (j.wrapping_mul(self.cols).wrapping_add(i), u - west, v - south)
     }
 
     /// Heights south-west, south-east, north-west, north-east of a bilinear cell; NaN beyond the rim.
@@ -164,6 +161,16 @@ impl Ground {
             _ => [f64::NAN; 4],
         }
     }
+}
+
+/// The whole cells below a position, as index and as number. Adding 3 x 2^51 leaves a whole number in the low bits of the
+/// sum, for positions up to 2^31 (the rim keeps them positive near the terrain); a position half a rounding error below a
+/// cell counts to it or to its neighbour, where the bilinear surface is the same.
+#[inline(always)]
+fn floor(position: f64) -> (usize, f64) {
+    const SHIFT: f64 = 6_755_399_441_055_744.0;
+    let shifted = (position - 0.5) + SHIFT;
+    (shifted.to_bits() as u32 as usize, shifted - SHIFT)
 }
 
 fn cell_warning(cell_m: f64, vehicle: &Vehicle) -> Option<String> {

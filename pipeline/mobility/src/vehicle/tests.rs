@@ -2,9 +2,9 @@ use super::drive::Servo;
 use super::simulation::Simulation;
 use super::traverse::settled;
 use super::*;
-use crate::metrics::EulerAngles;
+use crate::metrics::{Differentiator, EulerAngles, Metrics};
 use crate::missions::Mission;
-use sastrugi_numeric::{Geometry, Grid, Streams};
+use sastrugi_numeric::{Geometry, Grid, Streams, sums};
 use sastrugi_schemas::topics::{Event, EventKind, Recording};
 use serde_json::{Value, json};
 use std::f64::consts::TAU;
@@ -24,7 +24,7 @@ fn slope(deg: f64) -> f64 {
 
 /// 42 m square of rough ground: 160 plane waves of random direction and phase, wavelengths 0.35 to 20 m evenly in their
 /// logarithm, amplitudes growing as the wavelength to 0.8.
-static ROUGH: LazyLock<Grid> = LazyLock::new(|| rough(0.0045, 1));
+static ROUGH: LazyLock<Grid> = LazyLock::new(|| rough(0.015, 1));
 
 fn rough(amplitude_m: f64, seed: u64) -> Grid {
     let mut stream = Streams::for_seed(seed, "test").stream("waves");
@@ -351,11 +351,7 @@ fn val_turns_round_to_a_goal_behind() {
     let dem = terrain([20.0, 20.0], |_, _| 0.0);
     let backwards = Mission { heading_rad: 0.0, ..Mission::between(0, [10.0, 10.0], [4.0, 10.0]) };
     let recording = run(&dem, &backwards, |_| ());
-    assert!(
-        matches!(outcome(&recording).kind, EventKind::Success | EventKind::OutOfBounds),
-        "{:?}",
-        outcome(&recording)
-    );
+    assert_eq!(outcome(&recording).kind, EventKind::Success, "{:?}", outcome(&recording));
 }
 
 /// What a recording promises: rates, lengths, order, unit quaternions, specific force of a vehicle at rest.
@@ -466,4 +462,38 @@ fn val_ground_is_the_stored_bilinear_surface() {
     }
     assert!(ground.height(99.9, -18.0).is_nan());
     assert!(!ground.contains(100.0, -18.0) && ground.contains(100.03, -18.0));
+}
+
+/// Acceptance 6: outcomes at 500 and 1000 Hz agree on at least 90 % of 400 missions, and the medians of the figures over
+/// missions that succeed at either rate within 3 %. The amplitudes make success as frequent as on the study's terrains
+/// and rarer (100 to 41 %). Found: 386 of 400. With a true agreement of 94 % the count falls below 90 % once in 1000 draws
+/// of missions; seeds are fixed.
+#[test]
+#[ignore = "slow: ./test --full"]
+fn conv_outcomes_do_not_hang_on_the_step() {
+    let [coarse, fine] = [500, 1000].map(|rate| prepared(|p| p.step_rate_hz = rate));
+    let mut pairs = Vec::new();
+    for (seed, amplitude_m) in [0.009, 0.010, 0.011, 0.012].into_iter().enumerate() {
+        let dem = rough(amplitude_m, 10 + seed as u64);
+        let ground = Ground::new(&dem, &coarse.0).unwrap();
+        for index in 0..100 {
+            pairs.push([&coarse, &fine].map(|(v, s)| drive(&ground, v, s, &crossing(index)).unwrap()));
+        }
+    }
+    let same = pairs.iter().filter(|[a, b]| outcome(a).kind == outcome(b).kind).count();
+    let medians = [0, 1].map(|rate| {
+        let succeeded = pairs.iter().map(|pair| &pair[rate]).filter(|r| outcome(r).kind == EventKind::Success);
+        let all: Vec<Metrics> = succeeded.map(|r| Metrics::of(&r.states, 20.0, Differentiator::default())).collect();
+        let median = |figure: fn(&Metrics) -> f64| sums::median(&all.iter().map(figure).collect::<Vec<_>>());
+        [
+            median(|m| m.rms_vertical_acceleration_m_s2),
+            median(|m| m.rms_pitch_rate_rad_s),
+            median(|m| m.rms_roll_rate_rad_s),
+        ]
+    });
+    println!("same outcome in {same} of 400; medians {medians:?}");
+    assert!(same >= 360, "{same}");
+    for (a, b) in medians[0].into_iter().zip(medians[1]) {
+        assert!((a / b - 1.0).abs() < 0.03, "{medians:?}");
+    }
 }
