@@ -1,1 +1,6 @@
-//! x
+//! The command line: every verb on files, and every kind of bad input with its message and exit code.
+
+#![allow(clippy::unwrap_used, reason = "a test may end where it stands")]
+
+mod bad_input;
+mod verbs;

@@ -1,1 +1,200 @@
-//! x
+//! A study to a sealed release, and what verification says of it.
+
+#![allow(clippy::unwrap_used, reason = "a test may end where it stands")]
+
+use sastrugi_tests::{area, sastrugi_in, small_study, sums, write};
+use serde_json::Value;
+use std::fs;
+use std::path::Path;
+
+fn release_in(folder: &Path) {
+    write(folder, "study.toml", &small_study());
+    let call = sastrugi_in(folder, &["run", "study.toml", "-o", "release", "--quiet"]);
+    assert_eq!(call.code, 0, "{}", call.stderr);
+}
+
+#[test]
+fn val_a_release_has_its_layout() {
+    let folder = area();
+    release_in(folder.path());
+    let sums = sums(&folder.path().join("release"));
+    for path in [
+        "README.md",
+        "CITATION.cff",
+        "LICENSE",
+        "study.toml",
+        "manifest.json",
+        "dem/site.tif",
+        "dem/site.metric.tif",
+        "terrain/rough-0001.tif",
+        "terrain/smooth.tif",
+        "texture/tile.tif",
+        "classes/rough-0001.tif",
+        "fit/fit.json",
+        "fit/fit.residual.tif",
+        "mcap/rough-0001/husky-0001.mcap",
+        "tables/terrains/part-0000.parquet",
+        "tables/fits/part-0000.parquet",
+        "tables/covariance/part-0000.parquet",
+        "tables/missions/part-0000.parquet",
+        "tables/samples/part-rough-0001.parquet",
+        "report/index.html",
+    ] {
+        assert!(sums.contains_key(path), "{path} is missing from {:?}", sums.keys());
+    }
+    let study = fs::read_to_string(folder.path().join("release/study.toml")).unwrap();
+    assert!(study.contains("file = \"dem/site.tif\""), "the study points into the release");
+    let original = fs::read(sastrugi_fixtures::jacksboro()).unwrap();
+    assert_eq!(fs::read(folder.path().join("release/dem/site.tif")).unwrap(), original);
+}
+
+#[test]
+fn val_the_report_is_self_contained() {
+    let folder = area();
+    release_in(folder.path());
+    let page = fs::read_to_string(folder.path().join("release/report/index.html")).unwrap();
+    for fetch in ["src=\"http", "href=\"http", "url(http", "@import", "<script src", "<link rel=\"stylesheet\""] {
+        assert!(!page.contains(fetch), "the page fetches: {fetch}");
+    }
+    assert!(page.contains("<svg") && page.contains("data:image/png;base64,"));
+    let readable: String =
+        page.split("data:image/png;base64,").map(|part| part.split_once('"').map_or("", |p| p.1)).collect();
+    assert!(!readable.contains("NaN"), "a figure shows NaN");
+    let call = sastrugi_in(folder.path(), &["report", "release", "-o", "again", "--quiet"]);
+    assert_eq!(call.code, 0, "{}", call.stderr);
+    assert!(folder.path().join("again/index.html").exists());
+    let inside = sastrugi_in(folder.path(), &["report", "release", "-o", "release/report2", "--quiet"]);
+    assert_eq!(inside.code, 2, "{}", inside.stderr);
+}
+
+/// Any flipped, missing, extra or truncated file gives exit 4 and is named.
+#[test]
+fn val_verify_names_every_damage() {
+    let folder = area();
+    release_in(folder.path());
+    let release = folder.path().join("release");
+    let verify = || {
+        let call = sastrugi_in(folder.path(), &["verify", "release", "--quiet"]);
+        (call.code, format!("{}{}", call.stdout, call.stderr))
+    };
+    assert_eq!(verify().0, 0, "{}", verify().1);
+    let paths: Vec<String> = sums(&release).keys().cloned().collect();
+    let (mut flips, mut cuts) = (0, 0);
+    for path in paths.iter().filter(|p| !p.starts_with("report/figures") && !p.starts_with("report/data")) {
+        let file = release.join(path);
+        let bytes = fs::read(&file).unwrap();
+        let mut flipped = bytes.clone();
+        let middle = flipped.len() / 2;
+        flipped[middle] ^= 0x10;
+        fs::write(&file, &flipped).unwrap();
+        let (code, said) = verify();
+        assert!(code == 4 && said.contains(path.as_str()), "{path} flipped: {code} {said}");
+        flips += 1;
+        fs::write(&file, &bytes[..bytes.len() - 1]).unwrap();
+        let (code, said) = verify();
+        assert!(code == 4 && said.contains(path.as_str()), "{path} truncated: {code} {said}");
+        cuts += 1;
+        fs::write(&file, &bytes).unwrap();
+    }
+    assert!(flips > 30 && cuts == flips);
+    fs::rename(release.join("terrain/smooth.tif"), folder.path().join("aside")).unwrap();
+    let (code, said) = verify();
+    assert!(code == 4 && said.contains("terrain/smooth.tif"), "missing: {code} {said}");
+    fs::rename(folder.path().join("aside"), release.join("terrain/smooth.tif")).unwrap();
+    fs::write(release.join("terrain/extra.tif"), b"x").unwrap();
+    let (code, said) = verify();
+    assert!(code == 4 && said.contains("terrain/extra.tif"), "extra: {code} {said}");
+    fs::remove_file(release.join("terrain/extra.tif")).unwrap();
+    let sums_file = release.join("SHA256SUMS");
+    let text = fs::read_to_string(&sums_file).unwrap();
+    fs::write(&sums_file, text.lines().skip(1).collect::<Vec<_>>().join("\n")).unwrap();
+    assert_eq!(verify().0, 4, "a shortened SHA256SUMS");
+    fs::write(&sums_file, text).unwrap();
+    assert_eq!(verify().0, 0);
+}
+
+#[test]
+fn val_verify_recomputes_and_compares() {
+    let folder = area();
+    release_in(folder.path());
+    for (arguments, count) in [(["--recompute", "4"], 4), (["--recompute", "all"], 18)] {
+        let mut call = vec!["verify", "release", "--json", "--quiet"];
+        call.extend(arguments);
+        let call = sastrugi_in(folder.path(), &call);
+        assert_eq!(call.code, 0, "{}{}", call.stdout, call.stderr);
+        let verification: Value = serde_json::from_str(&call.stdout).unwrap();
+        assert_eq!(verification["recomputed"].as_array().unwrap().len(), count);
+    }
+    let left: Vec<_> = fs::read_dir(folder.path()).unwrap().map(|e| e.unwrap().file_name()).collect();
+    assert_eq!(left.len(), 3, "{left:?}");
+    // A release whose heights do not follow from its study, with sums that agree with themselves.
+    let release = folder.path().join("release");
+    let study = fs::read_to_string(release.join("study.toml")).unwrap();
+    forge(&release, "study.toml", &study.replace("seed = 7", "seed = 8"));
+    assert_eq!(sastrugi_in(folder.path(), &["verify", "release", "--quiet"]).code, 0, "the forgery agrees with itself");
+    let call = sastrugi_in(folder.path(), &["verify", "release", "--recompute", "all", "--quiet"]);
+    assert_eq!(call.code, 4, "{}{}", call.stdout, call.stderr);
+    assert!(call.stdout.contains("terrain/smooth.tif"), "{}", call.stdout);
+}
+
+/// Replaces a document and mends manifest and sums.
+fn forge(release: &Path, path: &str, text: &str) {
+    let old = sums(release)[path].clone();
+    fs::write(release.join(path), text).unwrap();
+    let new = sha256(text.as_bytes());
+    let manifest_path = release.join("manifest.json");
+    let manifest = fs::read_to_string(&manifest_path).unwrap();
+    let old_manifest = sha256(manifest.as_bytes());
+    let manifest = manifest.replace(&old, &new);
+    fs::write(&manifest_path, &manifest).unwrap();
+    let sums_path = release.join("SHA256SUMS");
+    let list = fs::read_to_string(&sums_path).unwrap();
+    fs::write(&sums_path, list.replace(&old, &new).replace(&old_manifest, &sha256(manifest.as_bytes()))).unwrap();
+}
+
+fn sha256(bytes: &[u8]) -> String {
+    use sha2::Digest;
+    sha2::Sha256::digest(bytes).iter().map(|b| format!("{b:02x}")).collect()
+}
+
+/// `sha256sum -c` agrees.
+#[test]
+fn val_sha256sum_reads_the_sums() {
+    let folder = area();
+    release_in(folder.path());
+    let mut command = std::process::Command::new("sha256sum");
+    let call = sastrugi_tests::called(
+        command.args(["--check", "--strict", "--quiet", "SHA256SUMS"]).current_dir(folder.path().join("release")),
+    );
+    assert_eq!(call.code, 0, "{}{}", call.stdout, call.stderr);
+}
+
+/// Shards that do not fit together are refused with the reason.
+#[test]
+fn val_merge_refuses_what_does_not_fit() {
+    let folder = area();
+    let path = folder.path();
+    write(path, "study.toml", &small_study());
+    write(path, "other.toml", &small_study().replace("seed = 7", "seed = 8"));
+    let shard = |study: &str, part: &str, output: &str| {
+        let call = sastrugi_in(path, &["run", study, "--shard", part, "-o", output, "--quiet"]);
+        assert_eq!(call.code, 0, "{}", call.stderr);
+    };
+    shard("study.toml", "1/2", "a");
+    shard("study.toml", "2/2", "b");
+    shard("other.toml", "2/2", "c");
+    let refused = |shards: &[&str], words: &str| {
+        let mut all = vec!["merge"];
+        all.extend(shards);
+        all.extend(["-o", "merged", "--quiet"]);
+        let call = sastrugi_in(path, &all);
+        assert!(call.code == 65 && call.stderr.contains(words), "{shards:?}: {} {}", call.code, call.stderr);
+        assert!(!path.join("merged").exists());
+    };
+    refused(&["a"], "shard 2 of 2 is missing");
+    refused(&["a", "a"], "both shard 1");
+    refused(&["a", "c"], "another study");
+    let record = fs::read_dir(path.join("b/items/terrain")).unwrap().next().unwrap().unwrap().path();
+    fs::remove_file(record.join("heights.tif")).unwrap();
+    refused(&["a", "b"], "missing or damaged");
+}

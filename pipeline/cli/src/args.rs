@@ -115,7 +115,7 @@ pub struct Run {
     #[arg(long, value_name = "I/N")]
     pub shard: Option<String>,
     /// Working memory of the items at once, GiB.
-    #[arg(long, value_name = "GIB", default_value_t = 4.0)]
+    #[arg(long, value_name = "GIB", default_value_t = 4.0, allow_negative_numbers = true)]
     pub memory: f64,
 }
 
@@ -189,13 +189,13 @@ pub struct Fit {
     #[arg(short, long, value_name = "FIT.json")]
     pub output: PathBuf,
     /// Window of the moving average that separates background from texture, m.
-    #[arg(long, value_name = "M")]
+    #[arg(long, value_name = "M", allow_negative_numbers = true)]
     pub outer_scale: Option<f64>,
     /// `corrected` for detrending and trimming, or as in the `paper`.
     #[arg(long, value_name = "corrected|paper")]
     pub mode: Option<String>,
     /// Share of residuals trimmed as outliers.
-    #[arg(long, value_name = "SHARE")]
+    #[arg(long, value_name = "SHARE", allow_negative_numbers = true)]
     pub trim: Option<f64>,
     /// Covariance model.
     #[arg(long, value_name = "MODEL")]
@@ -204,7 +204,7 @@ pub struct Fit {
     #[arg(long, value_name = "X0,Y0,X1,Y1", allow_hyphen_values = true)]
     pub window: Option<String>,
     /// Cell size for files that carry none, m: one number, or east-west,north-south.
-    #[arg(long, value_name = "M")]
+    #[arg(long, value_name = "M", allow_hyphen_values = true)]
     pub cell: Option<String>,
     /// Any other parameter of the fit (see `kinds fit`), `name=value`.
     #[arg(long = "set", value_name = "K=V")]
@@ -220,7 +220,7 @@ pub struct Texture {
     #[arg(long, value_name = "WxH")]
     pub size: Option<String>,
     /// Cell size, m.
-    #[arg(long, value_name = "M")]
+    #[arg(long, value_name = "M", allow_negative_numbers = true)]
     pub cell: Option<f64>,
     /// Seed of the random streams.
     #[arg(long, value_name = "N")]
@@ -257,7 +257,7 @@ pub struct Roughness {
     #[arg(long = "set", value_name = "K=V")]
     pub set: Vec<String>,
     /// Cell size for files that carry none, m: one number, or east-west,north-south.
-    #[arg(long, value_name = "M")]
+    #[arg(long, value_name = "M", allow_hyphen_values = true)]
     pub cell: Option<String>,
 }
 
@@ -307,7 +307,7 @@ pub struct Convert {
     /// DEM to write.
     pub output: PathBuf,
     /// Cell size for files that carry none, m: one number, or east-west,north-south.
-    #[arg(long, value_name = "M")]
+    #[arg(long, value_name = "M", allow_hyphen_values = true)]
     pub cell: Option<String>,
     /// Compression of a GeoTIFF.
     #[arg(long, value_enum, default_value_t)]
@@ -320,7 +320,7 @@ pub struct Info {
     /// DEM, fit file, MCAP recording, table, or release folder.
     pub path: PathBuf,
     /// Cell size for files that carry none, m: one number, or east-west,north-south.
-    #[arg(long, value_name = "M")]
+    #[arg(long, value_name = "M", allow_hyphen_values = true)]
     pub cell: Option<String>,
 }
 

@@ -91,7 +91,7 @@ fn print_study_error(name: &str, text: &str, error: &sastrugi_stages::study::Stu
     let mut rendered = String::new();
     let handler = GraphicalReportHandler::new_themed(theme).with_width(100);
     match handler.render_report(&mut rendered, report.as_ref()) {
-        Ok(()) => eprint!("sastrugi: study refused{rendered}"),
+        Ok(()) => eprint!("sastrugi: the study is refused\n{rendered}"),
         Err(_) => eprintln!("sastrugi: {name}: {}", error.message),
     }
 }

@@ -69,6 +69,7 @@ fn raster(path: &Path, cell_m: Option<[f64; 2]>) -> Result<Value, Failure> {
     });
     if let (Some(all), Some(grid)) = (result.as_object_mut(), describe_grid(&read.grid).as_object()) {
         all.extend(grid.clone());
+        all.insert("heights_sha256".to_owned(), json!(sastrugi_store::digest::heights(&read.grid)));
         all.insert("notes".to_owned(), json!(info.notes));
     }
     Ok(result)

@@ -52,8 +52,8 @@ fn made(common: &Common, result: &Value) -> Verdict {
         grid["cols"],
         grid["cell"][0],
         grid["cell"][1],
-        number(&grid["height_min"]),
-        number(&grid["height_max"]),
+        number(&grid["height_min_m"]),
+        number(&grid["height_max_m"]),
         notes(&result["notes"]),
     );
     print(common.json, result, &text)?;

@@ -9,7 +9,7 @@ pub mod traverse;
 
 use crate::error::Error;
 use sastrugi_numeric::Grid;
-use sastrugi_store::dem::Format;
+use sastrugi_store::dem::{DemError, Format};
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -23,6 +23,14 @@ fn check_output(path: &Path) -> Result<(), Error> {
     Err(Error::Usage(message))
 }
 
+/// A grid that does not fit the format is the caller's choice; anything else is this machine's.
+fn write_error(error: DemError) -> Error {
+    match error {
+        DemError::Unfit { .. } => Error::Usage(error.to_string()),
+        other => Error::failed(other),
+    }
+}
+
 /// Shape and height range for people.
 pub fn describe_grid(grid: &Grid) -> Value {
     let g = &grid.geometry;
@@ -33,9 +41,9 @@ pub fn describe_grid(grid: &Grid) -> Value {
         "cell": g.cell,
         "origin": g.origin,
         "size": g.size(),
-        "valid_cells": grid.finite_count(),
-        "height_min": low,
-        "height_max": high,
+        "valid": grid.finite_count(),
+        "height_min_m": low,
+        "height_max_m": high,
     })
 }
 

@@ -42,7 +42,8 @@ pub fn terrain(request: &Request<'_>) -> Result<Value, Error> {
     if Format::of_name(request.output) == Some(Format::Png) {
         notes.push(write_png16(generator.as_ref(), &heights, request.output)?);
     } else {
-        let lost = dem::write(request.output, &heights, &Crs::default(), &request.options).map_err(Error::failed)?;
+        let lost =
+            dem::write(request.output, &heights, &Crs::default(), &request.options).map_err(super::write_error)?;
         notes.extend(lost);
     }
     Ok(json!({

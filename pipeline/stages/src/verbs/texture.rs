@@ -51,7 +51,7 @@ pub fn texture(request: &Request<'_>) -> Result<Value, Error> {
         }
     };
     let mut notes = synthesis.notes();
-    notes.extend(dem::write(request.output, &heights, &crs, &request.options).map_err(Error::failed)?);
+    notes.extend(dem::write(request.output, &heights, &crs, &request.options).map_err(super::write_error)?);
     Ok(json!({
         "file": request.output.display().to_string(),
         "method": request.method,

@@ -1,0 +1,188 @@
+//! Every verb on files, as a user calls it.
+
+use sastrugi_tests::{area, sastrugi_in, small_study, sums, write};
+use serde_json::Value;
+use std::path::Path;
+
+fn ok(folder: &Path, arguments: &[&str]) -> String {
+    let call = sastrugi_in(folder, arguments);
+    assert_eq!(call.code, 0, "{arguments:?}: {}{}", call.stdout, call.stderr);
+    call.stdout
+}
+
+fn ok_json(folder: &Path, arguments: &[&str]) -> Value {
+    let mut all = arguments.to_vec();
+    all.extend(["--json", "--quiet"]);
+    serde_json::from_str(&ok(folder, &all)).unwrap()
+}
+
+#[test]
+fn val_help_has_an_example_for_every_verb() {
+    let folder = area();
+    let help = ok(folder.path(), &["--help"]);
+    let verbs: Vec<&str> = help
+        .lines()
+        .skip_while(|l| !l.starts_with("Commands:"))
+        .skip(1)
+        .take_while(|l| !l.is_empty())
+        .filter(|l| l.starts_with("  ") && !l.starts_with("   "))
+        .filter_map(|l| l.split_whitespace().next())
+        .filter(|v| *v != "help")
+        .collect();
+    assert!(verbs.len() >= 15, "{verbs:?}");
+    for verb in verbs {
+        assert!(ok(folder.path(), &[verb, "--help"]).contains(&format!("sastrugi {verb}")), "{verb} has no example");
+    }
+}
+
+#[test]
+fn val_kinds_and_schemas_are_complete() {
+    let folder = area();
+    let kinds = ok_json(folder.path(), &["kinds"]);
+    let names: Vec<&str> = kinds.as_array().unwrap().iter().filter_map(|k| k["kind"].as_str()).collect();
+    for kind in ["multifractal", "weierstrass_mandelbrot", "fft_ma", "exponential", "husky_a200", "straight"] {
+        assert!(names.contains(&kind), "{kind} is not in {names:?}");
+    }
+    for kind in kinds.as_array().unwrap() {
+        let text = |key: &str| kind[key].as_str().unwrap_or_default().len();
+        assert!(text("summary") > 10 && text("source") > 3, "{kind}");
+        for (name, parameter) in kind["parameters"]["properties"].as_object().into_iter().flatten() {
+            let described = parameter.get("description").is_some() || parameter.get("$ref").is_some();
+            assert!(described, "{}: {name} has no description", kind["kind"]);
+        }
+    }
+    let schema = ok_json(folder.path(), &["schema"]);
+    for section in ["study", "roughness", "dem", "terrain", "fit", "texture", "missions", "traverse"] {
+        assert!(schema["properties"].get(section).is_some(), "{section}");
+    }
+    let table = ok_json(folder.path(), &["schema", "missions"]);
+    assert!(table["columns"].as_array().unwrap().iter().any(|c| c["unit"] == "m/s2"));
+    assert!(ok(folder.path(), &["completions", "bash"]).contains("sastrugi"));
+}
+
+/// A verb with `--seed` gives the bytes of a study's item with that explicit seed.
+#[test]
+fn gold_a_verb_equals_an_item_with_the_same_seed() {
+    let folder = area();
+    let path = folder.path();
+    let study = small_study()
+        .replace("kind = \"weierstrass_mandelbrot\"\n", "kind = \"weierstrass_mandelbrot\"\nseed = 99\n")
+        .replace("id = \"tile\"\n", "id = \"tile\"\nseed = 5\n");
+    write(path, "study.toml", &study);
+    ok(path, &["run", "study.toml", "-o", "release", "--quiet"]);
+    ok(path, &["terrain", "weierstrass_mandelbrot", "--seed", "99", "--set", "size_px=[280,300]", "-o", "verb.tif"]);
+    assert_eq!(
+        std::fs::read(path.join("verb.tif")).unwrap(),
+        std::fs::read(path.join("release/terrain/smooth.tif")).unwrap()
+    );
+    write(path, "spec.toml", "kind = \"weierstrass_mandelbrot\"\nseed = 99\nsize_px = [280, 300]\n");
+    ok(path, &["terrain", "spec.toml", "-o", "spec.tif"]);
+    assert_eq!(std::fs::read(path.join("verb.tif")).unwrap(), std::fs::read(path.join("spec.tif")).unwrap());
+    let arguments = [
+        "texture",
+        "release/fit/naive.json",
+        "--size",
+        "4500x4500",
+        "--cell",
+        "90",
+        "--seed",
+        "5",
+        "--phase",
+        "gaussian",
+        "--set",
+        "periodic=false",
+        "-o",
+        "tile.tif",
+    ];
+    ok(path, &arguments);
+    assert_eq!(
+        std::fs::read(path.join("tile.tif")).unwrap(),
+        std::fs::read(path.join("release/texture/tile.tif")).unwrap()
+    );
+}
+
+#[test]
+fn val_fit_texture_roughness_and_info_work_on_files() {
+    let folder = area();
+    let path = folder.path();
+    let dem = sastrugi_fixtures::jacksboro();
+    let dem = dem.to_str().unwrap();
+    let fit = ok_json(path, &["fit", dem, "--outer-scale", "5000", "--mode", "paper", "-o", "fit.json"]);
+    assert!(fit["parameters"]["sigma_m"].as_f64().unwrap() > 10.0);
+    assert_eq!(ok_json(path, &["info", "fit.json"])["what"], "covariance fit");
+    let made = ok_json(path, &["texture", "fit.json", "--size", "9000x9000", "--cell", "90", "-o", "t.tif"]);
+    assert_eq!(made["grid"]["rows"], 100);
+    let info = ok_json(path, &["info", "t.tif"]);
+    assert_eq!((info["format"].as_str(), info["cols"].as_u64()), (Some("geotiff"), Some(100)));
+    let roughness = ok_json(path, &["roughness", dem]);
+    assert!(roughness["heights"]["relief_m"].as_f64().unwrap() == 840.0);
+    ok(path, &["terrain", "multifractal", "--set", "size_px=[128,128]", "-o", "base.tif"]);
+    write(path, "own.json", "{\"model\": \"exponential\", \"parameters\": {\"sigma_m\": 0.01, \"range_m\": 0.2}}");
+    ok(path, &["texture", "own.json", "--size", "6.4x6.4", "--cell", "0.05", "--onto", "base.tif", "-o", "sum.tif"]);
+    assert_eq!(ok_json(path, &["info", "sum.tif"])["rows"], 128);
+}
+
+#[test]
+fn val_conversions_keep_the_heights() {
+    let folder = area();
+    let path = folder.path();
+    ok(path, &["terrain", "multifractal", "--set", "size_px=[90,70]", "--seed", "3", "-o", "a.tif"]);
+    for (to, back) in [("b.asc", "b.tif"), ("c.npy", "c.tif"), ("d.tif", "d2.tif")] {
+        ok(path, &["convert", "a.tif", to]);
+        ok(path, &["convert", to, back, "--cell", "0.05"]);
+        let (a, b) = (ok_json(path, &["info", "a.tif"]), ok_json(path, &["info", back]));
+        for key in ["rows", "cols", "height_min_m", "height_max_m"] {
+            assert_eq!(a[key], b[key], "{to}: {key}");
+        }
+    }
+    ok(path, &["convert", "a.tif", "e.obj"]);
+    ok(path, &["convert", "a.tif", "f.png"]);
+    assert!(path.join("e.obj").exists() && path.join("f.png").exists());
+}
+
+#[test]
+fn val_traverse_makes_a_release_of_its_own() {
+    let folder = area();
+    let path = folder.path();
+    ok(path, &["terrain", "weierstrass_mandelbrot", "--set", "size_px=[300,300]", "-o", "t.tif"]);
+    let arguments = [
+        "traverse",
+        "t.tif",
+        "--missions",
+        "2",
+        "--set-missions",
+        "length_m=5.0",
+        "--set-missions",
+        "border_m=1.5",
+        "-o",
+        "drive",
+    ];
+    ok_json(path, &arguments);
+    ok(path, &["verify", "drive"]);
+    assert_eq!(sums(&path.join("drive")).keys().filter(|p| p.ends_with(".mcap")).count(), 2);
+    let coarse = sastrugi_fixtures::jacksboro();
+    let refused = sastrugi_in(path, &["traverse", coarse.to_str().unwrap(), "-o", "no", "--quiet"]);
+    assert_ne!(refused.code, 0);
+    assert!(refused.stderr.contains("elaborate") || refused.stderr.contains("cell"), "{}", refused.stderr);
+}
+
+#[test]
+fn val_plan_says_what_is_stale_and_why() {
+    let folder = area();
+    let path = folder.path();
+    write(path, "study.toml", &small_study());
+    let plan = ok_json(path, &["plan", "study.toml", "-o", "release"]);
+    assert_eq!(plan["ready"], 0);
+    assert!(plan["stale"].as_array().unwrap().iter().all(|s| s["reason"] == "new"));
+    ok(path, &["run", "study.toml", "-o", "release", "--quiet"]);
+    assert!(ok(path, &["plan", "study.toml", "-o", "release"]).contains("0 to compute"));
+    write(path, "study.toml", &small_study().replace("length_m = 5.0", "length_m = 4.5"));
+    let plan = ok_json(path, &["plan", "study.toml", "-o", "release"]);
+    let reason = |item: &str| {
+        let stale = plan["stale"].as_array().unwrap().iter().find(|s| s["item"] == item).unwrap().clone();
+        stale["reason"].as_str().unwrap().to_owned()
+    };
+    assert!(reason("missions/short@smooth").contains("length_m 5.0 -> 4.5"));
+    assert!(reason("traverse/husky@smooth").contains("missions/short@smooth, which changed"));
+    assert_eq!(plan["stale"].as_array().unwrap().len(), 6);
+}
