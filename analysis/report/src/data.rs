@@ -52,7 +52,7 @@ pub struct Study {
     pub creators: Vec<String>,
 }
 
-/// Rows of a release.
+/// Rows of a release; every table is sorted by its keys.
 pub struct Data {
     /// The study.
     pub study: Study,
@@ -124,21 +124,27 @@ impl Data {
         self.terrains.iter().find(|t| t.terrain_id == id)
     }
 
-    /// The fit of that id.
-    pub fn fit(&self, id: &str) -> Option<&FitRow> {
-        self.fits.iter().find(|f| f.fit_id == id)
+    /// Missions on a terrain.
+    pub fn missions_on(&self, terrain_id: &str) -> &[MissionRow] {
+        of_key(&self.missions, |m| &m.terrain_id, terrain_id)
     }
 
     /// Spectrum of a heightfield: bins with a positive frequency and density.
     pub fn spectrum(&self, id: &str) -> Vec<&PsdRow> {
-        let usable = |r: &&PsdRow| r.terrain_id == id && r.frequency_cycles_m > 0.0 && r.psd_m4 > 0.0;
-        self.psd.iter().filter(usable).collect()
+        let usable = |r: &&PsdRow| r.frequency_cycles_m > 0.0 && r.psd_m4 > 0.0;
+        of_key(&self.psd, |r| &r.terrain_id, id).iter().filter(usable).collect()
     }
 
     /// Histogram of a heightfield.
     pub fn histogram(&self, id: &str) -> Vec<&HeightDistributionRow> {
-        self.heights.iter().filter(|r| r.terrain_id == id && r.density_per_m.is_finite()).collect()
+        of_key(&self.heights, |r| &r.terrain_id, id).iter().filter(|r| r.density_per_m.is_finite()).collect()
     }
+}
+
+/// The rows of one key in a table that is sorted by it.
+fn of_key<'a, R>(rows: &'a [R], key: impl Fn(&R) -> &str, id: &str) -> &'a [R] {
+    let from = rows.partition_point(|r| key(r) < id);
+    &rows[from..][..rows[from..].partition_point(|r| key(r) <= id)]
 }
 
 /// The group a heightfield belongs to: its label, or its generator where it has none.

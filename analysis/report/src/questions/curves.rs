@@ -5,7 +5,7 @@ use crate::render::chart::{Entry, Mark, Plot, WIDTH};
 use crate::render::svg::{Paint, Stroke};
 use crate::render::thin;
 use sastrugi_numeric::sums;
-use sastrugi_schemas::tables::{HeightDistributionRow, PsdRow};
+use sastrugi_schemas::tables::{HeightDistributionRow, PsdRow, TerrainRow};
 
 /// Height of a chart, px.
 pub const HEIGHT: f64 = 280.0;
@@ -28,13 +28,14 @@ pub struct Ranges {
     y: (f64, f64),
 }
 
-/// A straight line in log-log axes, through the mean of the points in those axes.
+/// A straight line in log-log axes over a band of frequencies, through the mean of the points in that band.
 #[derive(Clone, Copy, Debug)]
 pub struct Slope {
-    /// Slope.
-    pub slope: f64,
-    /// A point of the line.
+    slope: f64,
+    /// A point of the line, in logarithms.
     centre: (f64, f64),
+    /// Ends of the band, cycles/m.
+    band: [f64; 2],
 }
 
 /// Points of a spectrum.
@@ -42,9 +43,10 @@ pub fn spectrum(rows: &[&PsdRow]) -> Vec<(f64, f64)> {
     rows.iter().map(|r| (r.frequency_cycles_m, r.psd_m4)).collect()
 }
 
-/// Points of a histogram: the middle of each bin.
+/// Points of a histogram: the middle of each bin that holds cells.
 pub fn histogram(rows: &[&HeightDistributionRow]) -> Vec<(f64, f64)> {
-    rows.iter().map(|r| (0.5 * (r.low_m + r.high_m), r.density_per_m)).collect()
+    let middle = |r: &&HeightDistributionRow| (0.5 * (r.low_m + r.high_m), r.density_per_m);
+    rows.iter().map(middle).filter(|p| p.1 > 0.0).collect()
 }
 
 /// Ranges that hold all curves.
@@ -55,13 +57,20 @@ pub fn ranges<'a>(curves: impl IntoIterator<Item = &'a Curve>) -> Ranges {
     points.fold(Ranges { x: none, y: none }, |r, p| Ranges { x: widen(r.x, p.0), y: widen(r.y, p.1) })
 }
 
-/// The fitted slope laid through the middle of the curves; `None` when either is unknown.
-pub fn slope(slope: f64, curves: &[Curve]) -> Option<Slope> {
-    let points = curves.iter().flat_map(|c| c.points.iter());
+/// The band in which the stage `roughness` fits the slope of a spectrum: from 4 cycles per shortest side to half the
+/// Nyquist frequency, cycles/m.
+pub fn slope_band(terrain: &TerrainRow) -> [f64; 2] {
+    let side_m = (terrain.cols as f64 * terrain.cell_x_m).min(terrain.rows as f64 * terrain.cell_y_m);
+    [4.0 / side_m, 0.25 / terrain.cell_x_m.max(terrain.cell_y_m)]
+}
+
+/// A fitted slope laid through the middle of the curves in its band; `None` when either is unknown.
+pub fn slope(slope: f64, band: [f64; 2], curves: &[Curve]) -> Option<Slope> {
+    let points = curves.iter().flat_map(|c| c.points.iter()).filter(|p| p.0 >= band[0] && p.0 <= band[1]);
     let logs: Vec<(f64, f64)> = points.map(|p| (libm::log(p.0), libm::log(p.1))).collect();
     let [x, y] =
         [logs.iter().map(|l| l.0).collect::<Vec<_>>(), logs.iter().map(|l| l.1).collect()].map(|v| sums::mean(&v));
-    (slope.is_finite() && x.is_finite() && y.is_finite()).then_some(Slope { slope, centre: (x, y) })
+    (slope.is_finite() && x.is_finite() && y.is_finite()).then_some(Slope { slope, centre: (x, y), band })
 }
 
 /// Power spectral densities in log-log axes, with a fitted slope.
@@ -77,10 +86,9 @@ pub fn spectra(id: &str, curves: &[Curve], ranges: Ranges, slope: Option<Slope>)
     let x = (Axis::log(ranges.x.0 / 1.1, ranges.x.1 * 1.1), "spatial frequency, cycles/m");
     let mut plot = Plot::new((WIDTH, HEIGHT), x, (y, "power spectral density, m⁴"), &legend);
     draw(&mut plot, id, curves);
-    if let Some(Slope { slope, centre }) = slope {
+    if let Some(Slope { slope, centre, band }) = slope {
         let on_line = |x: f64| (x, libm::exp(centre.1 + slope * (libm::log(x) - centre.0)));
-        let (from, to) = plot.x.range();
-        plot.line([on_line(from), on_line(to)], dashed);
+        plot.line(band.map(on_line), dashed);
     }
     plot.svg.close();
     plot
@@ -89,7 +97,8 @@ pub fn spectra(id: &str, curves: &[Curve], ranges: Ranges, slope: Option<Slope>)
 /// Height distributions.
 pub fn distributions(id: &str, curves: &[Curve], ranges: Ranges) -> Plot {
     let x = (Axis::linear(ranges.x.0, ranges.x.1), "height, m");
-    let y = (Axis::linear(0.0, 1.06 * ranges.y.1), "density, 1/m");
+    // A logarithmic axis shows the tails: a normal distribution is a parabola.
+    let y = (Axis::log(ranges.y.0.max(1e-4 * ranges.y.1) / 1.5, 1.5 * ranges.y.1), "density, 1/m");
     let mut plot = Plot::new((WIDTH, HEIGHT), x, y, &entries(curves));
     draw(&mut plot, id, curves);
     plot.svg.close();

@@ -12,6 +12,9 @@ const FIGURE_ROWS_MAX: usize = 60;
 /// Rows of a table that are printed in the page.
 const TABLE_ROWS_MAX: usize = 1500;
 
+/// Bytes of text beyond which a cell may break its line.
+const LONG_TEXT: usize = 48;
+
 /// What stands above the sections.
 #[derive(Clone, Debug)]
 pub struct Head {
@@ -131,7 +134,7 @@ fn table(numbers: &Numbers, caption: &str) -> String {
         _ => format!("{} (first {TABLE_ROWS_MAX} of {} rows)", escape(caption), number::count(numbers.rows.len())),
     };
     format!(
-        "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"Table\"><table><caption>{caption}</caption>\n\
+        "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"{caption}\"><table><caption>{caption}</caption>\n\
          <thead><tr>{head}</tr></thead>\n<tbody>\n{rows}</tbody></table></div>\n"
     )
 }
@@ -142,7 +145,8 @@ fn numeric(numbers: &Numbers, column: usize) -> bool {
     cells.find(|c| **c != Cell::Null).is_some_and(|c| matches!(c, Cell::F64(_) | Cell::I64(_)))
 }
 
-/// Decimals that give the largest figure of a column four digits; `None` when that would leave nothing of the smallest.
+/// Decimals that give the largest figure of a column four digits; `None` when that would leave less than two of the
+/// smallest.
 fn decimals(numbers: &Numbers, column: usize) -> Option<usize> {
     let magnitude = |row: &Vec<Cell>| match row.get(column) {
         Some(Cell::F64(v)) if *v != 0.0 => Some(v.abs()),
@@ -155,7 +159,7 @@ fn decimals(numbers: &Numbers, column: usize) -> Option<usize> {
     let (low, high) = (magnitudes().fold(f64::INFINITY, f64::min), magnitudes().fold(0.0, f64::max));
     let places =
         (1..=7).find(|places| high >= libm::pow(10.0, 4.0 - f64::from(*places))).map(|p: u8| usize::from(p) - 1);
-    places.filter(|_| high < 1e6 && low > 1e-4 * high)
+    places.filter(|&places| high < 1e6 && low >= 10.0 / libm::pow(10.0, places as f64))
 }
 
 fn heading(heading: &Heading, numeric: bool) -> String {
@@ -176,6 +180,7 @@ fn row(cells: &[Cell], decimals: &[Option<usize>]) -> String {
 fn cell((cell, decimals): (&Cell, &Option<usize>)) -> String {
     match cell {
         Cell::Null => format!("<td class=\"n\">{}</td>", number::ABSENT),
+        Cell::Text(v) if v.len() > LONG_TEXT => format!("<td class=\"w\">{}</td>", escape(v)),
         Cell::Text(v) => format!("<td>{}</td>", escape(v)),
         Cell::F64(v) => {
             format!("<td class=\"n\">{}</td>", decimals.map_or_else(|| number::plain(*v, 4), |d| number::fixed(*v, d)))

@@ -17,7 +17,7 @@ use std::collections::{BTreeMap, BTreeSet};
 const OUTLIERS_WIDEN: f64 = 0.5;
 
 /// A group as it is drawn.
-struct Sample<'a> {
+pub struct Sample<'a> {
     group: String,
     index: usize,
     /// Terrain and value.
@@ -48,9 +48,13 @@ pub fn success(data: &Data, groups: &[Group<MissionRow>]) -> Option<Figure> {
     several.then(|| figure(&samples, words))
 }
 
+/// Samples of every figure that is compared between groups.
+pub fn measured<'a>(data: &Data, groups: &[Group<'a, MissionRow>]) -> Vec<(&'static Metric, Vec<Sample<'a>>)> {
+    METRICS.iter().map(|m| (m, samples(data, groups, m.column, |g| successful(g, m)))).collect()
+}
+
 /// One figure of the successful missions; `None` when no mission has it.
-pub fn metric(data: &Data, groups: &[Group<MissionRow>], metric: &Metric) -> Option<Figure> {
-    let samples = samples(data, groups, metric.column, |g| successful(g, metric));
+pub fn metric((metric, samples): &(&Metric, Vec<Sample>)) -> Option<Figure> {
     let words = Words {
         id: slug(metric.column),
         title: format!("{}.", capital(metric.name)),
@@ -59,11 +63,11 @@ pub fn metric(data: &Data, groups: &[Group<MissionRow>], metric: &Metric) -> Opt
         query: format!("tables/missions where outcome = 'success', column {}", metric.column),
         value: (metric.column, metric.unit),
     };
-    (!samples.is_empty()).then(|| figure(&samples, words))
+    (!samples.is_empty()).then(|| figure(samples, words))
 }
 
 /// Medians, quartiles and intervals of every figure and group.
-pub fn medians(data: &Data, groups: &[Group<MissionRow>]) -> TableBlock {
+pub fn medians(measured: &[(&Metric, Vec<Sample>)]) -> TableBlock {
     let columns = [
         ("figure", ""),
         ("unit", ""),
@@ -73,13 +77,13 @@ pub fn medians(data: &Data, groups: &[Group<MissionRow>]) -> TableBlock {
         ("first quartile", ""),
         ("median", ""),
         ("third quartile", ""),
-        ("median, low", ""),
-        ("median, high", ""),
+        ("interval, low", ""),
+        ("interval, high", ""),
         ("outliers", ""),
     ];
     let mut numbers = Numbers::new("tables/missions where outcome = 'success', by group", &columns);
-    for metric in &METRICS {
-        for s in samples(data, groups, metric.column, |g| successful(g, metric)) {
+    for (metric, samples) in measured {
+        for s in samples {
             let end = |f: fn(&Interval) -> f64| s.interval.as_ref().map_or(f64::NAN, f);
             numbers.row([
                 text(metric.name),
@@ -161,11 +165,7 @@ fn figure(samples: &[Sample], words: Words) -> Figure {
     Figure {
         id: words.id,
         title: words.title,
-        caption: format!(
-            "n counts {}. Boxes are quartiles (linear between order statistics), whiskers reach the last value within 1.5 \
-             interquartile ranges, circles lie beyond.{beyond}",
-            words.n_is
-        ),
+        caption: format!("n counts {}.{beyond}", words.n_is),
         description: describe(samples, &words.axis),
         svg: rows.svg,
         size: Size::Column,

@@ -55,9 +55,10 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     }
     let mut figures = vec![outcomes::stacked(&groups)];
     figures.extend(boxes::success(data, &groups));
-    figures.extend(METRICS.iter().filter_map(|metric| boxes::metric(data, &groups, metric)));
+    let measured = boxes::measured(data, &groups);
+    figures.extend(measured.iter().filter_map(boxes::metric));
     let mut blocks =
-        vec![Block::Text(introduction(&groups)), Block::Figures(figures), Block::Table(boxes::medians(data, &groups))];
+        vec![Block::Text(introduction(&groups)), Block::Figures(figures), Block::Table(boxes::medians(&measured))];
     let strip: Vec<Figure> = strip::figure(data)?.into_iter().collect();
     if !strip.is_empty() {
         blocks.extend([Block::Heading("One mission in detail".into()), Block::Figures(strip)]);
@@ -74,7 +75,8 @@ fn introduction(groups: &[Group<MissionRow>]) -> String {
     format!(
         "{} missions driven by {}; {} reached their goal. Missions on one terrain resemble each other, so intervals of \
          medians draw whole terrains anew (percentile bootstrap, {} %, {REPLICATES} samples); with fewer than about ten \
-         terrains in a group they are too short. Everything here is exploratory.",
+         terrains in a group they are too short. Boxes are quartiles (linear between order statistics), whiskers reach the \
+         last value within 1.5 interquartile ranges, circles lie beyond. Everything here is exploratory.",
         set::count(missions),
         vehicles.into_iter().collect::<Vec<_>>().join(", "),
         set::count(goals),

@@ -10,7 +10,6 @@ use crate::papers::{self, Paper, Published};
 use crate::render::number as set;
 use sastrugi_numeric::sums;
 use sastrugi_schemas::tables::{MissionRow, TerrainRow};
-use std::collections::BTreeMap;
 
 /// Registry entry.
 pub const QUESTION: Question = Question {
@@ -37,12 +36,8 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
 fn difference(data: &Data, paper: &Paper) -> Option<String> {
     let groups = shared(data.terrain_groups(), paper);
     let terrains: Vec<usize> = groups.iter().map(|g| g.rows.len()).collect();
-    let mut missions: BTreeMap<&str, usize> =
-        groups.iter().flat_map(|g| &g.rows).map(|t| (t.terrain_id.as_str(), 0)).collect();
-    for mission in &data.missions {
-        missions.entry(&mission.terrain_id).and_modify(|n| *n += 1);
-    }
-    let per_terrain: Vec<usize> = missions.into_values().collect();
+    let on = |t: &&TerrainRow| data.missions_on(&t.terrain_id).len();
+    let per_terrain: Vec<usize> = groups.iter().flat_map(|g| g.rows.iter().map(on)).collect();
     let same = terrains.iter().all(|n| *n == paper.terrains_per_group)
         && per_terrain.iter().all(|n| *n == paper.missions_per_terrain);
     (!same).then(|| {
@@ -161,6 +156,6 @@ fn middle(data: &Data, group: &Group<TerrainRow>, published: &Published) -> f64 
 
 /// Share of successful missions on a terrain, per cent; NaN without missions.
 fn success(data: &Data, terrain_id: &str) -> f64 {
-    let missions = || data.missions.iter().filter(|m| m.terrain_id == terrain_id);
-    100.0 * missions().filter(|m| successful(m)).count() as f64 / missions().count() as f64
+    let missions = data.missions_on(terrain_id);
+    100.0 * missions.iter().filter(|m| successful(m)).count() as f64 / missions.len() as f64
 }

@@ -101,27 +101,27 @@ fn class_entries() -> Vec<Entry> {
 
 /// The class map of the group's representative among the terrains with missions (among all where none was driven).
 fn map(data: &Data, group: &Group<TerrainRow>) -> Result<Option<Figure>, ReportError> {
-    let driven = |t: &&TerrainRow| data.missions.iter().any(|m| m.terrain_id == t.terrain_id);
+    let driven = |t: &&TerrainRow| !data.missions_on(&t.terrain_id).is_empty();
     let with_missions = Group { rows: group.rows.iter().copied().filter(driven).collect(), ..group.clone() };
     let Some(terrain) = representative(&with_missions).or_else(|| representative(group)) else { return Ok(None) };
     let path = format!("classes/{}.tif", terrain.terrain_id);
     let Some(codes) = data.files.classes(&path)? else { return Ok(None) };
     let heights = data.files.grid(&terrain.path)?;
     let picture = picture::classes(&codes, heights.as_ref(), exaggeration(terrain.rms_slope), PIXELS)?;
-    let missions: Vec<&MissionRow> = data.missions.iter().filter(|m| m.terrain_id == terrain.terrain_id).collect();
+    let missions = data.missions_on(&terrain.terrain_id);
     let samples = if missions.is_empty() { Vec::new() } else { data.files.samples(&terrain.terrain_id)? };
-    let mut map = Map::new(&picture, MAP_WIDTH, &Key::Entries(&map_entries(&missions)));
+    let mut map = Map::new(&picture, MAP_WIDTH, &Key::Entries(&map_entries(missions)));
     map.clip(&format!("{}-clip", map_id(terrain)));
     missions.iter().for_each(|m| draw_mission(&mut map, m, &track_of(&samples, m)));
     map.svg.close();
-    Ok(Some(map_figure(map, group, terrain, &missions, &extent(&codes))))
+    Ok(Some(map_figure(map, group, terrain, missions, &extent(&codes))))
 }
 
 /// Classes, then the outcomes that occur, then start and goal.
-fn map_entries(missions: &[&MissionRow]) -> Vec<Entry> {
+fn map_entries(missions: &[MissionRow]) -> Vec<Entry> {
     let class = |c| (Mark::Fill(Paint::Fixed(picture::class_colour(c))), RoughnessClass::name(c).to_owned());
     let mut entries: Vec<Entry> = RoughnessClass::ALL.map(class).into();
-    let counts = outcome::counts(missions.iter().copied());
+    let counts = outcome::counts(missions);
     for (i, n) in counts.into_iter().enumerate().filter(|(_, n)| *n > 0) {
         // The ink of a legend must show on the page in either theme.
         let stroke = Stroke { paint: Paint::Outcome(i), ..outcome::track(i) };
@@ -167,13 +167,14 @@ fn map_figure(
     map: Map,
     group: &Group<TerrainRow>,
     terrain: &TerrainRow,
-    missions: &[&MissionRow],
+    missions: &[MissionRow],
     extent: &str,
 ) -> Figure {
-    let counts = outcome::counts(missions.iter().copied());
+    let counts = outcome::counts(missions);
     let occurred = outcome::ALL.iter().zip(counts).filter(|(_, n)| *n > 0);
-    let words: Vec<String> = occurred.map(|(o, n)| format!("{n} {}", o.name)).collect();
-    let outcomes = if words.is_empty() { "no missions".into() } else { format!("missions: {}", words.join(", ")) };
+    let words: Vec<String> = occurred.map(|(o, n)| format!("{} {n}", o.name)).collect();
+    let outcomes =
+        if words.is_empty() { "no missions".into() } else { format!("missions by outcome: {}", words.join(", ")) };
     Figure {
         id: map_id(terrain),
         title: format!("Classes, group {}.", group.name),
@@ -189,7 +190,7 @@ fn map_id(terrain: &TerrainRow) -> String {
     slug(&format!("classes-{}", terrain.terrain_id))
 }
 
-fn map_numbers(terrain: &TerrainRow, missions: &[&MissionRow]) -> Numbers {
+fn map_numbers(terrain: &TerrainRow, missions: &[MissionRow]) -> Numbers {
     let names = ["mission_id", "outcome", "start_x_m", "start_y_m", "goal_x_m", "goal_y_m", "time_s", "path"];
     if missions.is_empty() {
         let columns = [("file", ""), ("rows", "1"), ("cols", "1"), ("cell_x_m", "m")];
@@ -199,9 +200,5 @@ fn map_numbers(terrain: &TerrainRow, missions: &[&MissionRow]) -> Numbers {
         numbers.row([file, side(terrain.rows), side(terrain.cols), number(terrain.cell_x_m)]);
         return numbers;
     }
-    Numbers::select(
-        format!("tables/missions where terrain_id = '{}'", terrain.terrain_id),
-        missions.iter().copied(),
-        &names,
-    )
+    Numbers::select(format!("tables/missions where terrain_id = '{}'", terrain.terrain_id), missions, &names)
 }

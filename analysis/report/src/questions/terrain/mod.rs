@@ -68,7 +68,8 @@ fn introduction(groups: &[Group<TerrainRow>]) -> String {
     let more = if groups.len() > GROUPS_MAX { " …" } else { "" };
     format!(
         "{} in {}: {}{more}. Roughness classes follow the largest gradient to the eight neighbours of a cell; \
-         shares leave out the border and are taken before the class map is closed.",
+         shares leave out the border and are taken before the class map is closed. Reliefs are lit from the north-west; \
+         their colours end at the 1st and 99th percentile of the heights.",
         set::counted(n, "terrain"),
         set::counted(groups.len(), "group"),
         names.join(", ")

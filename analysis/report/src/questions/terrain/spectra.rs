@@ -30,13 +30,13 @@ pub fn spectra(data: &Data, groups: &[Group<TerrainRow>]) -> Vec<Figure> {
     let figure = |(group, curves): &Drawn| {
         let id = file_id("psd", group);
         let middle = median(&group.rows, |t| t.psd_slope);
-        let slope = curves::slope(middle, curves);
+        let slope = curves::slope(middle, curves::slope_band(group.rows[0]), curves);
         let mut plot = curves::spectra(&id, curves, ranges, slope);
         if slope.is_some() {
             plot.note(0, &format!("slope {}", set::fixed(middle, 2)));
         }
         let caption = "Radially averaged two-dimensional power spectral density, one line per terrain; dashed, the median \
-                       of the slopes fitted to each, laid through the middle of the lines.";
+                       of their fitted slopes, over the band of the fit.";
         let description = format!(
             "Log-log spectra of {}; median slope {}.",
             set::counted(curves.len(), "terrain"),

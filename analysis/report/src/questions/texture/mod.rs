@@ -29,9 +29,10 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     textures.extend(based);
     let mut blocks = Vec::new();
     for texture in textures.iter().take(TEXTURES_MAX) {
-        let figures = figures(data, texture)?;
-        if !figures.is_empty() {
-            blocks.extend([Block::Heading(heading(texture)), Block::Figures(figures)]);
+        let rows = figures(data, texture)?;
+        if rows.iter().any(|row| !row.is_empty()) {
+            blocks.push(Block::Heading(heading(texture)));
+            blocks.extend(rows.into_iter().map(Block::Figures));
         }
     }
     if textures.len() > TEXTURES_MAX {
@@ -48,16 +49,14 @@ fn heading(texture: &TerrainRow) -> String {
     }
 }
 
-/// A texture on a base is shown as relief; one that stands alone beside the residual of its fit.
-fn figures(data: &Data, texture: &TerrainRow) -> Result<Vec<Figure>, ReportError> {
+/// Figures by row. A texture on a base is shown as relief; one that stands alone beside the residual of its fit.
+fn figures(data: &Data, texture: &TerrainRow) -> Result<Vec<Vec<Figure>>, ReportError> {
     let fit = data::parameter(texture, "fit").unwrap_or_default();
     if let Some(base) = data::parameter(texture, "onto") {
-        return on_base(data, texture, &base, &fit);
+        return Ok(vec![on_base(data, texture, &base, &fit)?]);
     }
-    let mut figures = patches(data, texture, &fit)?;
-    figures.extend(spectra(data, texture, &fit));
-    figures.extend(distributions(data, texture, &fit));
-    Ok(figures)
+    let curves = [spectra(data, texture, &fit), distributions(data, texture, &fit)];
+    Ok(vec![patches(data, texture, &fit)?, curves.into_iter().flatten().collect()])
 }
 
 /// The base and the base with its texture, in one range of heights.
