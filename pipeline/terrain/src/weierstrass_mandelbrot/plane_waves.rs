@@ -15,7 +15,9 @@
 //! the exponential-of-semicircle kernel).
 //!
 //! # Error and cost
-//! Errors are below 1e-12 of the summed amplitudes (tested against the direct sum). Time is that of the transform plus
+//! Errors are below 1e-12 of the summed amplitudes and, on the published layers, about 1e-11 of the standard deviation (tested
+//! against a matrix product and the direct sum); they are largest in the corners, where the division amplifies rounding
+//! most. A torus of twice the grid would be ten times more accurate and half as fast. Time is that of the transform plus
 //! `2 WIDTH^2` complex multiplications a wave; memory is [`memory_bytes`].
 
 use rayon::prelude::*;
@@ -35,8 +37,9 @@ const QUADRATURE_INTERVALS: usize = 64;
 /// One wave of the sum.
 #[derive(Clone, Copy, Debug)]
 pub struct PlaneWave {
-    frequency: [f64; 2],
-    coefficient: Complex64,
+    /// Cycles per cell east and north, each reduced to -1/2..=1/2.
+    pub(super) frequency: [f64; 2],
+    pub(super) coefficient: Complex64,
 }
 
 impl PlaneWave {
@@ -44,16 +47,6 @@ impl PlaneWave {
     /// them.
     pub fn new(frequency: [f64; 2], coefficient: Complex64) -> Self {
         Self { frequency: frequency.map(|f| f - f.round()), coefficient }
-    }
-
-    /// Cycles per cell east and north, each reduced to -1/2..=1/2.
-    pub fn frequency(&self) -> [f64; 2] {
-        self.frequency
-    }
-
-    /// Complex amplitude.
-    pub fn coefficient(&self) -> Complex64 {
-        self.coefficient
     }
 
     /// The complex conjugate wave: the same real part.
