@@ -4,12 +4,15 @@
 //! `.version`, `.license`, `.table`). Rows are sorted by their keys, which are never null; a float that is `NaN` is
 //! stored as null. Memory is bounded by one row group, whatever the number of rows.
 
+#[cfg(test)]
+mod tests;
+
 use crate::PROGRAM;
 use crate::atomic::AtomicFile;
 use crate::digest::ContentHash;
 use arrow_array::builder::{BooleanBuilder, Float64Builder, Int64Builder, StringBuilder};
 use arrow_array::{Array, ArrayRef, BooleanArray, Float64Array, Int64Array, RecordBatch, StringArray};
-use arrow_schema::{ArrowError, DataType, Field, Schema, SchemaRef};
+use arrow_schema::{DataType, Field, Schema, SchemaRef};
 use parquet::arrow::ArrowWriter;
 use parquet::arrow::arrow_reader::{ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder};
 use parquet::basic::{Compression, Encoding, ZstdLevel};
@@ -22,6 +25,7 @@ use std::cmp::Ordering;
 use std::fs::File;
 use std::io;
 use std::marker::PhantomData;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -338,6 +342,7 @@ pub struct TableReader<R: Record> {
     batch: Vec<ColumnValues>,
     row: usize,
     rows: usize,
+    broken: bool,
     record: PhantomData<R>,
 }
 
@@ -348,15 +353,15 @@ impl<R: Record> TableReader<R> {
     /// The file is missing, no Parquet file, or has other columns than the table.
     pub fn open(path: &Path) -> Result<Self, TableError> {
         let builder = open(path, &R::TABLE)?;
-        let batches = builder.with_batch_size(BATCH_ROWS).build().map_err(|e| TableError::unusable(path, e))?;
-        Ok(Self { path: path.to_owned(), batches, batch: vec![], row: 0, rows: 0, record: PhantomData })
+        let batches = decoding(path, || builder.with_batch_size(BATCH_ROWS).build())?;
+        Ok(Self { path: path.to_owned(), batches, batch: vec![], row: 0, rows: 0, broken: false, record: PhantomData })
     }
 
     /// Loads the next batch that has rows; false at the end.
     fn advance(&mut self) -> Result<bool, TableError> {
         while self.row == self.rows {
-            let Some(batch) = self.batches.next() else { return Ok(false) };
-            let batch = batch.map_err(|e: ArrowError| TableError::unusable(&self.path, e))?;
+            let batches = &mut self.batches;
+            let Some(batch) = decoding(&self.path, || batches.next().transpose())? else { return Ok(false) };
             let values = batch.columns().iter().map(ColumnValues::of).collect::<Option<Vec<_>>>();
             self.batch = values.ok_or_else(|| TableError::unusable(&self.path, "holds a column of an unknown type"))?;
             (self.row, self.rows) = (0, batch.num_rows());
@@ -375,10 +380,16 @@ impl<R: Record> Iterator for TableReader<R> {
     type Item = Result<R, TableError>;
 
     fn next(&mut self) -> Option<Self::Item> {
+        if self.broken {
+            return None;
+        }
         match self.advance() {
             Ok(true) => Some(self.read()),
             Ok(false) => None,
-            Err(error) => Some(Err(error)),
+            Err(error) => {
+                self.broken = true;
+                Some(Err(error))
+            }
         }
     }
 }
@@ -415,7 +426,7 @@ impl ColumnValues {
 
 fn open(path: &Path, table: &Table) -> Result<ParquetRecordBatchReaderBuilder<File>, TableError> {
     let file = File::open(path).map_err(|e| TableError::io(path, e))?;
-    let builder = ParquetRecordBatchReaderBuilder::try_new(file).map_err(|e| TableError::unusable(path, e))?;
+    let builder = decoding(path, || ParquetRecordBatchReaderBuilder::try_new(file))?;
     let found = builder.schema();
     for (column, expected) in schema(table).fields().iter().enumerate() {
         let Some(field) = found.fields().get(column) else {
@@ -438,6 +449,14 @@ fn open(path: &Path, table: &Table) -> Result<ParquetRecordBatchReaderBuilder<Fi
         return Err(TableError::unusable(path, reason));
     }
     Ok(builder)
+}
+
+/// Runs the decoder, which panics on some damaged files, and turns a panic into an error.
+fn decoding<T, E: ToString>(path: &Path, decode: impl FnOnce() -> Result<T, E>) -> Result<T, TableError> {
+    match catch_unwind(AssertUnwindSafe(decode)) {
+        Ok(decoded) => decoded.map_err(|e| TableError::unusable(path, e)),
+        Err(_) => Err(TableError::unusable(path, "the decoder gave up; the file is damaged")),
+    }
 }
 
 fn describe(field: &Field) -> String {

@@ -9,9 +9,10 @@ mod tests;
 pub use builder::{Head, ReleaseBuilder};
 pub use verify::{Problem, ProblemKind, VerifyReport, verify};
 
+use crate::digest;
 use crate::parquet::{TableError, TableReader};
 use sastrugi_schemas::Record;
-use sastrugi_schemas::manifest::{FORMAT, Manifest, PROGRAM};
+use sastrugi_schemas::manifest::{Artifact, FORMAT, Manifest, PROGRAM};
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -48,6 +49,12 @@ pub enum ReleaseError {
         /// Why.
         reason: &'static str,
     },
+    /// A file of the release is not the one that was sealed.
+    #[error("{}: the file is not the one that was sealed; `verify` lists what changed", path.display())]
+    Changed {
+        /// The file.
+        path: PathBuf,
+    },
     /// A table could not be read.
     #[error(transparent)]
     Table(#[from] TableError),
@@ -68,7 +75,7 @@ impl ReleaseError {
     /// True when the data that was given is the cause (missing or unusable), not the file system.
     pub fn unusable_input(&self) -> bool {
         match self {
-            Self::NotARelease { .. } => true,
+            Self::NotARelease { .. } | Self::Changed { .. } => true,
             Self::Table(error) => error.unusable_input(),
             Self::Io { source, .. } => source.kind() == io::ErrorKind::NotFound,
             Self::Occupied { .. } | Self::Path { .. } | Self::Json(_) => false,
@@ -126,14 +133,17 @@ impl Release {
 
     /// The files of a table, sorted; none when the table has no rows.
     pub fn table_files(&self, table: &str) -> Vec<PathBuf> {
-        let of_table = |path: &&str| table_of(path) == Some(table);
-        self.manifest.artifacts.iter().map(|a| a.path.as_str()).filter(of_table).map(|p| self.path(p)).collect()
+        self.parts(table).map(|artifact| self.path(&artifact.path)).collect()
+    }
+
+    fn parts(&self, table: &str) -> impl Iterator<Item = &Artifact> {
+        self.manifest.artifacts.iter().filter(move |artifact| table_of(&artifact.path) == Some(table))
     }
 
     /// All rows of a table.
     ///
     /// # Errors
-    /// A file cannot be read or has other columns.
+    /// A file cannot be read, is not the one that was sealed, or has other columns.
     pub fn rows<R: Record>(&self) -> Result<Vec<R>, ReleaseError> {
         let mut rows = vec![];
         self.for_each_row(|row| rows.push(row))?;
@@ -145,7 +155,12 @@ impl Release {
     /// # Errors
     /// As [`Release::rows`].
     pub fn for_each_row<R: Record>(&self, mut f: impl FnMut(R)) -> Result<(), ReleaseError> {
-        for file in self.table_files(R::TABLE.name) {
+        for part in self.parts(R::TABLE.name) {
+            let file = self.path(&part.path);
+            let (_, sha256) = digest::of_file(&file).map_err(ReleaseError::io(&file))?;
+            if sha256 != part.sha256 {
+                return Err(ReleaseError::Changed { path: file });
+            }
             TableReader::open(&file)?.try_for_each(|row| row.map(&mut f))?;
         }
         Ok(())

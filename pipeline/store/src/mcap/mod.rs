@@ -79,6 +79,8 @@ pub struct MissionMcap<'a> {
 pub struct McapSummary {
     /// Number of messages.
     pub messages: u64,
+    /// Bytes of all messages before compression.
+    pub data_bytes: u64,
     /// Hash of the decoded stream: topic, time and data of every message in order.
     pub content_sha256: String,
 }
@@ -131,7 +133,8 @@ pub fn encode_mission(mission: &MissionMcap) -> Result<(Vec<u8>, McapSummary), M
         writer.write_metadata(&Metadata { name: name.clone(), metadata: metadata.clone() })?;
     }
     writer.finish()?;
-    let summary = McapSummary { messages: messages.len() as u64, content_sha256: content.finish() };
+    let data_bytes = messages.iter().map(|m| m.data.len() as u64).sum();
+    let summary = McapSummary { messages: messages.len() as u64, data_bytes, content_sha256: content.finish() };
     Ok((writer.into_inner().into_inner(), summary))
 }
 

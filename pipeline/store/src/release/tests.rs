@@ -132,6 +132,15 @@ fn val_a_changed_table_description_is_found() {
 }
 
 #[test]
+fn val_rows_of_a_changed_table_are_not_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let dest = folder.path().join("release");
+    let release = sealed(&dest);
+    flip(&dest.join("tables/psd/part-0000.parquet"), 700);
+    assert!(matches!(release.rows::<PsdRow>(), Err(ReleaseError::Changed { .. })));
+}
+
+#[test]
 fn val_paths_stay_inside() {
     let folder = tempfile::tempdir().unwrap();
     let mut builder = ReleaseBuilder::create(&folder.path().join("s"), head()).unwrap();

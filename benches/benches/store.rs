@@ -1,0 +1,225 @@
+//! Writing of artifacts, each beside its floor: MCAP and Parquet beside a plain write of the bytes they put on disk,
+//! GeoTIFF beside bare deflate of the same samples on one thread. Throughput counts bytes before compression.
+
+use divan::Bencher;
+use divan::counter::BytesCount;
+use sastrugi_numeric::{Geometry, Grid, Stream, Streams, Surface};
+use sastrugi_schemas::tables::SampleRow;
+use sastrugi_schemas::topics::{
+    CommandSample, ImuSample, Recording, StateSample, VehicleOutline, WheelOutline, WheelSample, WheelState,
+};
+use sastrugi_store::dem::{self, Crs, WriteOptions};
+use sastrugi_store::mcap::{self, MissionMcap};
+use sastrugi_store::parquet::{TableMetadata, TableWriter};
+use std::collections::BTreeMap;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+const CELLS: usize = 1009;
+const SECONDS: usize = 37;
+const ROWS: i64 = 100_000;
+
+fn main() {
+    divan::main();
+}
+
+fn noise() -> Stream {
+    Streams::for_seed(1, "bench").stream("noise")
+}
+
+/// A rough terrain: a random walk along each row, smoothed by the row above.
+fn terrain() -> Grid {
+    let mut stream = noise();
+    let mut values = vec![0.0; CELLS * CELLS];
+    for at in CELLS + 1..values.len() {
+        values[at] = 0.5 * (values[at - 1] + values[at - CELLS]) + 0.01 * stream.normal();
+    }
+    Grid::new(Geometry::square(CELLS, CELLS, 0.05), values).as_stored()
+}
+
+fn recording(dem: &Grid) -> Recording {
+    let mut stream = noise();
+    let mut three = |scale: f64| [0, 1, 2].map(|_| scale * stream.normal());
+    let position = |t: f64| [5.0 + t, 25.0, dem.height(5.0 + t, 25.0).unwrap_or(0.0)];
+    let times = |rate: usize| (0..=rate * SECONDS).map(move |n| n as f64 / rate as f64);
+    let state = |time_s| StateSample {
+        time_s,
+        position_m: position(time_s),
+        orientation: [0.0, 0.0, 0.0, 1.0],
+        velocity_m_s: three(0.1),
+        angular_velocity_rad_s: three(0.1),
+    };
+    let states: Vec<StateSample> = times(20).map(state).collect();
+    let imu = |time_s| ImuSample {
+        time_s,
+        orientation: [0.0, 0.0, 0.0, 1.0],
+        angular_velocity_rad_s: three(0.1),
+        specific_force_m_s2: three(1.0),
+    };
+    let imu = times(100).map(imu).collect();
+    let mut wheel = |contact_m: [f64; 3]| {
+        let ([torque_n_m, normal_force_n, slip_ratio], [longitudinal_force_n, lateral_force_n, spin_rad_s]) =
+            (three(10.0), three(100.0));
+        WheelState {
+            angle_rad: contact_m[0] / 0.165,
+            spin_rad_s,
+            torque_n_m,
+            normal_force_n,
+            longitudinal_force_n,
+            lateral_force_n,
+            slip_ratio,
+            contact_m,
+        }
+    };
+    let wheels = times(20)
+        .map(|time_s| WheelSample { time_s, wheels: (0..4).map(|_| wheel(position(time_s))).collect() })
+        .collect();
+    let command = |time_s| CommandSample {
+        time_s,
+        speed_m_s: 1.0,
+        yaw_rate_rad_s: 0.1,
+        cross_track_m: 0.01,
+        heading_error_rad: 0.02,
+        distance_to_goal_m: 35.0 - time_s,
+    };
+    let hub =
+        |name: &str, x, y| WheelOutline { name: name.to_owned(), hub_m: [x, y, 0.03], radius_m: 0.165, width_m: 0.114 };
+    Recording {
+        vehicle: VehicleOutline {
+            name: "husky_a200".to_owned(),
+            chassis_size_m: [0.99, 0.57, 0.25],
+            chassis_centre_m: [0.0; 3],
+            wheels: vec![hub("a", 0.26, 0.29), hub("b", 0.26, -0.29), hub("c", -0.26, 0.29), hub("d", -0.26, -0.29)],
+        },
+        sample_rate_hz: 20.0,
+        imu_rate_hz: 100.0,
+        states,
+        imu,
+        wheels,
+        commands: times(20).map(command).collect(),
+        events: vec![],
+    }
+}
+
+fn with_mission<T>(f: impl FnOnce(&MissionMcap) -> T) -> T {
+    let dem = terrain();
+    let classes = dem.map(|z| if z < 0.0 { 0 } else { 1 });
+    let recording = recording(&dem);
+    let metadata = BTreeMap::new();
+    f(&MissionMcap {
+        recording: &recording,
+        dem: &dem,
+        classes: Some(&classes),
+        start_m: [5.0, 25.0],
+        goal_m: [40.0, 25.0],
+        epoch_ns: 1_700_000_000_000_000_000,
+        metadata: &metadata,
+    })
+}
+
+fn folder() -> tempfile::TempDir {
+    tempfile::tempdir().expect("a temporary folder")
+}
+
+fn plain_write(path: &Path, bytes: &[u8]) {
+    sastrugi_store::atomic::write(path, bytes).expect("a written file");
+}
+
+#[divan::bench]
+fn mcap_mission_37s(bencher: Bencher) {
+    let folder = folder();
+    let path = folder.path().join("a.mcap");
+    with_mission(|mission| {
+        let size = mcap::encode_mission(mission).expect("a recording").1.data_bytes;
+        bencher.counter(BytesCount::new(size)).bench_local(|| mcap::write_mission(&path, mission).expect("a file"));
+    });
+}
+
+#[divan::bench]
+fn mcap_mission_37s_floor_plain_write(bencher: Bencher) {
+    let folder = folder();
+    let path = folder.path().join("a.mcap");
+    let (bytes, summary) = with_mission(|mission| mcap::encode_mission(mission).expect("a recording"));
+    bencher.counter(BytesCount::new(summary.data_bytes)).bench_local(|| plain_write(&path, &bytes));
+}
+
+fn rows() -> Vec<SampleRow> {
+    let mut stream = noise();
+    let mut value = || stream.normal();
+    (0..ROWS)
+        .map(|sample| SampleRow {
+            terrain_id: "rough-0001".to_owned(),
+            mission_id: format!("husky-{:04}", sample / 800),
+            sample,
+            time_s: (sample % 800) as f64 / 20.0,
+            x_m: value(),
+            y_m: value(),
+            z_m: value(),
+            qx: value(),
+            qy: value(),
+            qz: value(),
+            qw: value(),
+            vx_m_s: value(),
+            vy_m_s: value(),
+            vz_m_s: value(),
+            roll_deg: value(),
+            pitch_deg: value(),
+            yaw_deg: value(),
+            roll_rate_deg_s: value(),
+            pitch_rate_deg_s: value(),
+            yaw_rate_deg_s: value(),
+            command_speed_m_s: 1.0,
+            command_yaw_rate_deg_s: value(),
+            class: Some(sample % 3),
+        })
+        .collect()
+}
+
+fn write_rows(path: &PathBuf, rows: &[SampleRow]) {
+    let metadata = TableMetadata {
+        study_sha256: String::new(),
+        seed: 1,
+        version: "0".to_owned(),
+        license: "CC-BY-4.0".to_owned(),
+    };
+    let mut writer = TableWriter::create(path, &metadata).expect("a table");
+    rows.iter().for_each(|row| writer.push(row).expect("a row"));
+    writer.finish().expect("a file");
+}
+
+/// Numbers of a row, bytes.
+const ROW_BYTES: u64 = 22 * 8;
+
+#[divan::bench(sample_count = 10)]
+fn parquet_samples_100k(bencher: Bencher) {
+    let (folder, rows) = (folder(), rows());
+    let path = folder.path().join("a.parquet");
+    bencher.counter(BytesCount::new(ROWS as u64 * ROW_BYTES)).bench_local(|| write_rows(&path, &rows));
+}
+
+#[divan::bench(sample_count = 10)]
+fn parquet_samples_100k_floor_plain_write(bencher: Bencher) {
+    let folder = folder();
+    let path = folder.path().join("a.parquet");
+    write_rows(&path, &rows());
+    let bytes = std::fs::read(&path).expect("the file");
+    bencher.counter(BytesCount::new(ROWS as u64 * ROW_BYTES)).bench_local(|| plain_write(&path, &bytes));
+}
+
+#[divan::bench(sample_count = 20)]
+fn geotiff_1009(bencher: Bencher) {
+    let (folder, grid) = (folder(), terrain());
+    let path = folder.path().join("a.tif");
+    bencher.counter(BytesCount::new(CELLS * CELLS * 4)).bench_local(|| {
+        dem::write(&path, &grid, &Crs::default(), &WriteOptions::default()).expect("a file");
+    });
+}
+
+#[divan::bench(sample_count = 20)]
+fn geotiff_1009_floor_deflate_one_thread(bencher: Bencher) {
+    let samples: Vec<u8> = terrain().values.iter().flat_map(|&v| (v as f32).to_be_bytes()).collect();
+    bencher.counter(BytesCount::new(samples.len())).bench_local(|| {
+        let mut encoder = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::new(6));
+        encoder.write_all(&samples).and_then(|()| encoder.finish()).expect("deflate")
+    });
+}

@@ -1,0 +1,151 @@
+use super::*;
+use proptest::prelude::*;
+use sastrugi_schemas::tables::{self, CovarianceRow, PsdRow};
+use std::fs;
+
+fn metadata() -> TableMetadata {
+    TableMetadata {
+        study_sha256: "ab".repeat(32),
+        seed: 7,
+        version: "0.1.0".to_owned(),
+        license: "CC-BY-4.0".to_owned(),
+    }
+}
+
+fn row(fit: u32, bin: i64, value: f64) -> CovarianceRow {
+    CovarianceRow {
+        fit_id: format!("fit-{fit:03}"),
+        bin,
+        lag_m: value,
+        azimuth_deg: (bin % 2 == 0).then_some(value),
+        covariance_m2: -value,
+        pairs: bin * 3,
+        model_m2: value * 1e300,
+        surface_model_m2: f64::NAN,
+    }
+}
+
+fn write(path: &Path, rows: &[CovarianceRow]) -> TableSummary {
+    let mut writer = TableWriter::create(path, &metadata()).unwrap();
+    rows.iter().for_each(|row| writer.push(row).unwrap());
+    writer.finish().unwrap()
+}
+
+fn same(a: &CovarianceRow, b: &CovarianceRow) -> bool {
+    a.cells() == b.cells()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(30))]
+
+    #[test]
+    fn prop_rows_come_back(values in prop::collection::vec(any::<f64>(), 1..400)) {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("t.parquet");
+        let rows: Vec<_> = values.iter().zip(0..).map(|(&v, n)| row(n / 40, i64::from(n % 40), v)).collect();
+        let summary = write(&path, &rows);
+        let back: Vec<CovarianceRow> = read_table(&path).unwrap();
+        prop_assert_eq!(summary.rows, rows.len() as u64);
+        prop_assert!(back.len() == rows.len() && back.iter().zip(&rows).all(|(a, b)| same(a, b)));
+        let again = write(&folder.path().join("u.parquet"), &back);
+        prop_assert_eq!(again, summary);
+        prop_assert_eq!(fs::read(path).unwrap(), fs::read(folder.path().join("u.parquet")).unwrap());
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(600))]
+
+    #[test]
+    fn prop_damaged_tables_are_errors(
+        at in any::<prop::sample::Index>(),
+        bytes in prop::collection::vec(any::<u8>(), 1..5),
+        cut in any::<Option<prop::sample::Index>>(),
+    ) {
+        let mut file = sample().to_vec();
+        let at = at.index(file.len());
+        let end = (at + bytes.len()).min(file.len());
+        file[at..end].copy_from_slice(&bytes[..end - at]);
+        if let Some(cut) = cut {
+            file.truncate(cut.index(file.len()));
+        }
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("t.parquet");
+        fs::write(&path, file).unwrap();
+        let _ = read_table::<CovarianceRow>(&path);
+    }
+}
+
+fn sample() -> &'static [u8] {
+    static SAMPLE: std::sync::OnceLock<Vec<u8>> = std::sync::OnceLock::new();
+    SAMPLE.get_or_init(|| {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("t.parquet");
+        let rows: Vec<_> = (0..200).map(|n| row(n / 40, i64::from(n % 40), f64::from(n).sqrt())).collect();
+        write(&path, &rows);
+        fs::read(path).unwrap()
+    })
+}
+
+#[test]
+fn val_rows_out_of_order_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("t.parquet");
+    let mut writer = TableWriter::create(&path, &metadata()).unwrap();
+    writer.push(&row(0, 1, 0.0)).unwrap();
+    for bin in [1, 0] {
+        assert!(matches!(writer.push(&row(0, bin, 0.0)), Err(TableError::Order { row: 1, .. })));
+    }
+    writer.push(&row(1, 0, 0.0)).unwrap();
+    assert!(!path.exists());
+    drop(writer);
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+}
+
+#[test]
+fn val_many_rows_stream_through() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("t.parquet");
+    let psd =
+        |bin: i64| PsdRow { terrain_id: "a".to_owned(), bin, frequency_cycles_m: bin as f64, psd_m4: 1.0, modes: bin };
+    let mut writer = TableWriter::create(&path, &metadata()).unwrap();
+    let count = 2 * ROW_GROUP_ROWS as i64 + 17;
+    (0..count).for_each(|bin| writer.push(&psd(bin)).unwrap());
+    writer.finish().unwrap();
+    let mut expected = 0;
+    for_each_row(&path, |row: PsdRow| {
+        assert_eq!(row, psd(expected));
+        expected += 1;
+    })
+    .unwrap();
+    assert_eq!(expected, count);
+    assert_eq!(check_table(&path, &PsdRow::TABLE).unwrap(), count as u64);
+}
+
+#[test]
+fn val_what_is_no_table_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("t.parquet");
+    assert!(read_table::<PsdRow>(&path).unwrap_err().unusable_input());
+    fs::write(&path, b"PAR1").unwrap();
+    assert!(read_table::<PsdRow>(&path).unwrap_err().unusable_input());
+    fs::write(&path, sample()).unwrap();
+    assert!(read_table::<PsdRow>(&path).unwrap_err().unusable_input());
+}
+
+#[test]
+fn prop_every_table_has_keys_first_and_a_schema() {
+    for table in tables::ALL {
+        let keys = table.columns.iter().take_while(|c| c.key).count();
+        assert!(keys > 0 && table.columns.iter().skip(keys).all(|c| !c.key), "{}", table.name);
+        assert_eq!(schema(table).fields().len(), table.columns.len());
+        assert!(properties(table, &metadata()).is_ok());
+    }
+}
+
+/// Bytes of a table: a change of encoder must not pass unnoticed.
+#[test]
+fn gold_bytes_of_a_table() {
+    assert_eq!(crate::digest::of_bytes(sample()), GOLD_TABLE);
+}
+const GOLD_TABLE: &str = "1905df1eba12d2a79a7ec6be8b1908935c415f50dbb550be1b48c3ef734ea2a0";
