@@ -39,7 +39,17 @@ pub(crate) struct Tread {
     pub relaxation_length_m: f64,
     /// Friction coefficient.
     pub friction: f64,
+    /// Rolling resistance over normal force.
+    pub rolling_resistance: f64,
     pub step_s: f64,
+}
+
+impl Tread {
+    /// Couple that rolling resistance puts on a wheel, N m.
+    #[inline(always)]
+    pub(crate) fn rolling_n_m(&self, normal_n: f64, spin: f64) -> f64 {
+        -self.rolling_resistance * self.radius_m * normal_n * (spin / ROLLING_SPIN_RAD_S).clamp(-1.0, 1.0)
+    }
 }
 
 /// Friction of one wheel over a time step, as a function of its spin at the end.
@@ -120,25 +130,18 @@ impl Servo {
 }
 
 /// The wheels of one side over a time step.
-pub(crate) struct Side {
+pub(crate) struct Side<'a> {
+    pub tread: &'a Tread,
     pub servo: Servo,
-    pub radius_m: f64,
-    pub rolling_resistance: f64,
     /// Moment of inertia of all wheels of the side over the time step, kg m2/s.
     pub inertia_over_step: f64,
     /// Body rate about the axle, rad/s.
     pub chassis_spin: f64,
 }
 
-impl Side {
-    /// Couple that rolling resistance puts on a wheel, N m.
-    #[inline(always)]
-    pub(crate) fn rolling_n_m(&self, normal_n: f64, spin: f64) -> f64 {
-        -self.rolling_resistance * self.radius_m * normal_n * (spin / ROLLING_SPIN_RAD_S).clamp(-1.0, 1.0)
-    }
-
+impl Side<'_> {
     /// Spin at the end of the step, rad/s, given the wheels of the side that touch the ground.
-    pub(crate) fn solve<'a>(&self, start: f64, grips: impl Iterator<Item = &'a Grip> + Clone) -> f64 {
+    pub(crate) fn solve<'g>(&self, start: f64, grips: impl Iterator<Item = &'g Grip> + Clone) -> f64 {
         let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
         let mut spin = start;
         for _ in 0..STEPS_MAX {
@@ -161,7 +164,7 @@ impl Side {
 
     /// Momentum balance of the side, N m, and its derivative by the spin.
     #[inline(always)]
-    fn residual<'a>(&self, spin: f64, start: f64, grips: impl Iterator<Item = &'a Grip>) -> (f64, f64) {
+    fn residual<'g>(&self, spin: f64, start: f64, grips: impl Iterator<Item = &'g Grip>) -> (f64, f64) {
         let torque = self.servo.torque(spin - self.chassis_spin);
         let servo_slope = if torque.abs() < self.servo.limit { self.servo.gain } else { 0.0 };
         let mut residual = self.inertia_over_step * (spin - start) - torque;
@@ -169,10 +172,10 @@ impl Side {
         let rolls = spin.abs() >= ROLLING_SPIN_RAD_S;
         for grip in grips {
             let (force, force_slope) = grip.forces(spin);
-            residual += self.radius_m * force[0] - self.rolling_n_m(grip.normal_n, spin);
-            slope += self.radius_m * force_slope;
+            residual += self.tread.radius_m * force[0] - self.tread.rolling_n_m(grip.normal_n, spin);
+            slope += self.tread.radius_m * force_slope;
             if !rolls {
-                slope += self.rolling_resistance * self.radius_m * grip.normal_n / ROLLING_SPIN_RAD_S;
+                slope -= self.tread.rolling_n_m(grip.normal_n, ROLLING_SPIN_RAD_S) / ROLLING_SPIN_RAD_S;
             }
         }
         (residual, slope)

@@ -27,6 +27,18 @@ pub enum GroundError {
         /// Name of the vehicle.
         vehicle: String,
     },
+    /// The cells are so fine (or their size so odd) that a vehicle covers too many.
+    #[error(
+        "drive `{vehicle}` on cells of {cell_m} m: it reaches over more than {limit} of them; resample the terrain first"
+    )]
+    CellTooSmall {
+        /// Smaller side of a cell, m.
+        cell_m: f64,
+        /// Most cells from the vehicle's centre to its farthest contact point.
+        limit: f64,
+        /// Name of the vehicle.
+        vehicle: String,
+    },
     /// Fewer than two rows or columns: no bilinear cell.
     #[error("drive on a terrain of {rows} x {cols} cells; it needs at least 2 x 2")]
     TooSmall {
@@ -52,28 +64,34 @@ pub struct Ground {
     /// Upper bound of the heights in reach of a point of the bilinear cell that starts here.
     ceiling: Vec<f32>,
     reach_m: f64,
+    extent_m: f64,
     warnings: Vec<String>,
 }
+
+/// Most cells from a vehicle's centre to its farthest contact point.
+const EXTENT_MAX_CELLS: f64 = 1000.0;
 
 impl Ground {
     /// The ground of a terrain (heights in m, NaN without data; rounded to single precision as a release stores them) for
     /// a vehicle.
     ///
     /// # Errors
-    /// [`GroundError`] for cells larger than the wheelbase and for terrains without a bilinear cell.
+    /// [`GroundError`] for cells larger than the wheelbase or far too fine, and for terrains without a bilinear cell.
     pub fn new(dem: &Grid, vehicle: &Vehicle) -> Result<Self, GroundError> {
         let geometry = dem.geometry;
-        let cell_m = geometry.cell[0].max(geometry.cell[1]);
+        let coarse_m = geometry.cell[0].max(geometry.cell[1]);
+        let fine_m = geometry.cell[0].min(geometry.cell[1]);
+        let name = || vehicle.name().to_owned();
         if geometry.rows < 2 || geometry.cols < 2 {
             return Err(GroundError::TooSmall { rows: geometry.rows, cols: geometry.cols });
         }
-        if cell_m > vehicle.wheelbase_m() {
-            let vehicle_name = vehicle.name().to_owned();
-            return Err(GroundError::CellTooLarge {
-                cell_m,
-                wheelbase_m: vehicle.wheelbase_m(),
-                vehicle: vehicle_name,
-            });
+        if coarse_m > vehicle.wheelbase_m() {
+            let wheelbase_m = vehicle.wheelbase_m();
+            return Err(GroundError::CellTooLarge { cell_m: coarse_m, wheelbase_m, vehicle: name() });
+        }
+        let few_cells = fine_m * EXTENT_MAX_CELLS >= vehicle.extent_m();
+        if !few_cells {
+            return Err(GroundError::CellTooSmall { cell_m: fine_m, limit: EXTENT_MAX_CELLS, vehicle: name() });
         }
         let rim = geometry.cell.map(|cell| (vehicle.extent_m() / cell).ceil() as usize + 2);
         let (heights, cols) = framed(dem, rim);
@@ -89,7 +107,8 @@ impl Ground {
             ceiling: ceiling(&heights, cols, reach),
             heights,
             reach_m: vehicle.reach_m(),
-            warnings: cell_warning(cell_m, vehicle).into_iter().collect(),
+            extent_m: vehicle.extent_m(),
+            warnings: cell_warning(coarse_m, vehicle).into_iter().collect(),
         })
     }
 
@@ -98,9 +117,9 @@ impl Ground {
         &self.warnings
     }
 
-    /// Largest distance of contact points from their group's centre that the ceiling allows for, m.
-    pub(crate) fn reach_m(&self) -> f64 {
-        self.reach_m
+    /// True when ceiling and rim are wide enough for the vehicle.
+    pub(crate) fn carries(&self, vehicle: &Vehicle) -> bool {
+        self.reach_m >= vehicle.reach_m() && self.extent_m >= vehicle.extent_m()
     }
 
     /// True when the point lies between the outermost cell centres.
@@ -190,7 +209,8 @@ fn framed(dem: &Grid, rim: [usize; 2]) -> (Vec<f32>, usize) {
     let south_first = (0..dem.rows()).rev().map(|row| dem.row(row));
     for (target, source) in heights.chunks_exact_mut(cols).skip(rim[1]).zip(south_first) {
         for (t, &s) in target[rim[0]..].iter_mut().zip(source) {
-            *t = s as f32;
+            // What overflows single precision is no height.
+            *t = Some(s as f32).filter(|z| z.is_finite()).unwrap_or(f32::NAN);
         }
     }
     (heights, cols)

@@ -6,7 +6,7 @@ use super::contact::Touch;
 use super::drive::{Grip, Servo, Side, Tread};
 use super::ground::Ground;
 use super::model::Vehicle;
-use super::settings::{SurfaceParameters, TraverseSettings};
+use super::settings::TraverseSettings;
 use super::vector::{Vec3, add, add_scaled, cross, dot, scale, sub};
 use sastrugi_schemas::topics::WheelState;
 
@@ -15,7 +15,7 @@ use sastrugi_schemas::topics::WheelState;
 pub(crate) struct Simulation<'a> {
     ground: &'a Ground,
     vehicle: &'a Vehicle,
-    surface: &'a SurfaceParameters,
+    belly_friction: f64,
     tread: Tread,
     pub body: Body,
     /// Spin of the wheels of either side in the map frame, about the axle, rad/s.
@@ -53,13 +53,14 @@ impl<'a> Simulation<'a> {
             damping: tyre.tangential_damping_n_s_m,
             relaxation_length_m: tyre.relaxation_length_m,
             friction: surface.wheel_friction,
+            rolling_resistance: surface.rolling_resistance,
             step_s: settings.step_s(),
         };
         let wheels = vehicle.wheels.len();
         Self {
             ground,
             vehicle,
-            surface,
+            belly_friction: surface.belly_friction,
             tread,
             body,
             spin: [0.0; 2],
@@ -124,29 +125,24 @@ impl<'a> Simulation<'a> {
         }
     }
 
-    fn side(&self, servo: Servo) -> Side {
-        Side {
-            servo,
-            radius_m: self.tread.radius_m,
-            rolling_resistance: self.surface.rolling_resistance,
-            inertia_over_step: self.vehicle.side_spin_inertia() / self.tread.step_s,
-            chassis_spin: self.body.rate[1],
-        }
-    }
-
     /// Spin of both sides at the end of the step.
     fn spun(&self, servos: [Servo; 2]) -> [f64; 2] {
         [0, 1].map(|side| {
             let grips = self.vehicle.wheels.iter().zip(&self.rolls).filter(|(wheel, _)| wheel.side == side);
             let grips = grips.filter_map(|(_, roll)| roll.touch.as_ref().map(|(_, grip)| grip));
-            self.side(servos[side]).solve(self.spin[side], grips)
+            let side_of_step = Side {
+                tread: &self.tread,
+                servo: servos[side],
+                inertia_over_step: self.vehicle.side_spin_inertia() / self.tread.step_s,
+                chassis_spin: self.body.rate[1],
+            };
+            side_of_step.solve(self.spin[side], grips)
         })
     }
 
     /// Force and moment of all wheels; moves their treads on.
     fn roll(&mut self, motion: &Motion, spun: [f64; 2]) -> (Vec3, Vec3) {
         let (mut force, mut moment) = ([0.0; 3], [0.0; 3]);
-        let side = self.side(Servo::BRAKE);
         let wheel_inertia = self.vehicle.parameters().wheels.spin_inertia_kg_m2;
         for ((wheel, roll), deflection) in self.vehicle.wheels.iter().zip(&mut self.rolls).zip(&mut self.deflections) {
             let spin = spun[wheel.side];
@@ -155,7 +151,7 @@ impl<'a> Simulation<'a> {
             let ([forward, left], deflected) = grip.settle(&self.tread, spin);
             *deflection = deflected;
             roll.friction = [forward, left];
-            let rolling = side.rolling_n_m(grip.normal_n, spin);
+            let rolling = self.tread.rolling_n_m(grip.normal_n, spin);
             roll.torque += self.tread.radius_m * forward - rolling;
             let tangential = add_scaled(scale(touch.forward, forward), touch.left, left);
             let push = add_scaled(tangential, touch.normal, grip.normal_n);
@@ -168,8 +164,8 @@ impl<'a> Simulation<'a> {
 
     fn press_belly(&mut self, motion: &Motion) -> Load {
         let (belly, parameters) = (&self.vehicle.belly, &self.vehicle.parameters().belly);
-        let friction = self.surface.belly_friction;
-        let load = belly.press(self.ground, motion, parameters, friction, self.tread.step_s, &mut self.bristles);
+        let (friction, step_s) = (self.belly_friction, self.tread.step_s);
+        let load = belly.press(self.ground, motion, parameters, friction, step_s, &mut self.bristles);
         self.undefined |= load.undefined;
         load
     }

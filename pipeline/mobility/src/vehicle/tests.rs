@@ -4,6 +4,7 @@ use super::traverse::settled;
 use super::*;
 use crate::metrics::{Differentiator, EulerAngles, Metrics};
 use crate::missions::Mission;
+use proptest::prelude::*;
 use sastrugi_numeric::{Geometry, Grid, Streams, sums};
 use sastrugi_schemas::topics::{Event, EventKind, Recording};
 use serde_json::{Value, json};
@@ -436,6 +437,15 @@ fn val_coarse_ground_is_warned_of_or_refused() {
     assert!(Ground::new(&flat(0.2), &vehicle).unwrap().warnings()[0].contains("wheel radius"));
     let error = Ground::new(&flat(1.0), &vehicle).unwrap_err();
     assert!(error.to_string().contains("elaborate"), "{error}");
+    assert!(matches!(Ground::new(&flat(1e-5), &vehicle), Err(GroundError::CellTooSmall { .. })));
+    let longer = TraverseParameters {
+        vehicle_changes: changes(json!({"chassis": {"size_m": [1.05, 0.57, 0.25]}})),
+        ..TraverseParameters::default()
+    };
+    let ground = Ground::new(&flat(0.05), &vehicle).unwrap();
+    let (longer, _) = longer.prepare().unwrap();
+    let mission = Mission::between(0, [0.5, 0.5], [1.5, 0.5]);
+    assert!(matches!(drive(&ground, &longer, &settings, &mission), Err(TraverseError::OtherVehicle { .. })));
     let line = Grid::filled(Geometry::square(1, 40, 0.05), 0.0);
     assert_eq!(Ground::new(&line, &vehicle).unwrap_err(), GroundError::TooSmall { rows: 1, cols: 40 });
     let ground = Ground::new(&flat(0.2), &vehicle).unwrap();
@@ -496,4 +506,70 @@ fn conv_outcomes_do_not_hang_on_the_step() {
     for (a, b) in medians[0].into_iter().zip(medians[1]) {
         assert!((a / b - 1.0).abs() < 0.03, "{medians:?}");
     }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(128))]
+
+    /// No terrain makes the model panic: few cells, cliffs, holes, heights beyond any sense.
+    #[test]
+    fn prop_any_ground_has_an_outcome(
+        (rows, cols) in (1usize..24, 1usize..24),
+        cell in 1e-3..0.5f64,
+        heights in prop::collection::vec(prop_oneof![
+            8 => -0.2..0.2f64,
+            2 => -20.0..20.0f64,
+            1 => prop::sample::select(vec![f64::NAN, f64::INFINITY, 1e30, -1e300]),
+        ], 24 * 24),
+        ends in prop::array::uniform4(-0.1..1.1f64),
+    ) {
+        let geometry = Geometry { rows, cols, cell: [cell, 0.7 * cell], origin: [5e5, -3e6] };
+        let dem = Grid::new(geometry, heights[..rows * cols].to_vec());
+        let (vehicle, settings) = prepared(|p| (p.timeout_s, p.stuck_time_s, p.settle_s) = (1.0, 0.5, 0.2));
+        let Ok(ground) = Ground::new(&dem, &vehicle) else { return Ok(()) };
+        let size = geometry.size();
+        let at = |x: f64, y: f64| [geometry.origin[0] + x * size[0], geometry.origin[1] + y * size[1]];
+        let mission = Mission::between(0, at(ends[0], ends[1]), at(ends[2], ends[3]));
+        let recording = drive(&ground, &vehicle, &settings, &mission).unwrap();
+        prop_assert!(outcome(&recording).kind != EventKind::Start);
+        prop_assert!(recording.states.iter().all(|s| s.position_m.iter().all(|c| c.is_finite())));
+    }
+}
+
+/// Paths of all numbers in a JSON value.
+fn numbers(value: &Value, path: &str) -> Vec<String> {
+    match value {
+        Value::Object(map) => map.iter().flat_map(|(k, v)| numbers(v, &format!("{path}/{k}"))).collect(),
+        Value::Array(list) => list.iter().enumerate().flat_map(|(i, v)| numbers(v, &format!("{path}/{i}"))).collect(),
+        Value::Number(_) => vec![path.to_owned()],
+        _ => Vec::new(),
+    }
+}
+
+/// Every number of a vehicle replaced by odd ones: refused, or driven without a panic.
+#[test]
+fn prop_odd_vehicle_numbers_are_refused_or_driven() {
+    let dem = terrain([6.0, 4.0], |x, _| 0.1 * libm::sin(3.0 * x));
+    let all = serde_json::to_value(prepared(|_| ()).0.parameters()).unwrap();
+    let mut driven = 0;
+    for path in numbers(&all, "") {
+        for odd in [0.0, -1.0, 1e-300, 1e-9, 0.5, 2.0, 101.0, 1e9, 1e300] {
+            let mut changed = all.clone();
+            *changed.pointer_mut(&path).unwrap() = json!(odd);
+            if odd == f64::trunc(odd) && odd.abs() < 1e4 {
+                *changed.pointer_mut(&path).unwrap() = json!(odd as i64);
+            }
+            let parameters = TraverseParameters {
+                vehicle_changes: changes(changed),
+                timeout_s: 0.2,
+                settle_s: 0.1,
+                ..TraverseParameters::default()
+            };
+            let Ok((vehicle, settings)) = parameters.prepare() else { continue };
+            let Ok(ground) = Ground::new(&dem, &vehicle) else { continue };
+            drive(&ground, &vehicle, &settings, &Mission::between(0, [2.0, 2.0], [4.0, 2.0])).unwrap();
+            driven += 1;
+        }
+    }
+    assert!(driven > 50, "{driven}");
 }

@@ -15,14 +15,10 @@ use sastrugi_schemas::topics::{CommandSample, Event, EventKind, ImuSample, Recor
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum TraverseError {
     /// The ground was prepared for a smaller vehicle.
-    #[error(
-        "drive a vehicle with a reach of {reach_m} m on ground prepared for {ground_m} m; prepare it for this vehicle"
-    )]
+    #[error("drive `{vehicle}` on ground prepared for a smaller vehicle; prepare it for this one")]
     OtherVehicle {
-        /// Reach of the vehicle, m.
-        reach_m: f64,
-        /// Reach that the ground was prepared for, m.
-        ground_m: f64,
+        /// Name of the vehicle.
+        vehicle: String,
     },
     /// Start or goal is not a point.
     #[error("drive from {start_m:?} to {goal_m:?}: start and goal must be finite and apart")]
@@ -44,8 +40,8 @@ pub fn drive(
     settings: &TraverseSettings,
     mission: &Mission,
 ) -> Result<Recording, TraverseError> {
-    if ground.reach_m() < vehicle.reach_m() {
-        return Err(TraverseError::OtherVehicle { reach_m: vehicle.reach_m(), ground_m: ground.reach_m() });
+    if !ground.carries(vehicle) {
+        return Err(TraverseError::OtherVehicle { vehicle: vehicle.name().to_owned() });
     }
     let (start_m, goal_m) = (mission.start_m, mission.goal_m);
     let length_m = mission.length_m();
