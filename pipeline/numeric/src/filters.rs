@@ -15,7 +15,8 @@ const REACH_SIGMAS: f64 = 4.0;
 
 /// The grid after a Gaussian low-pass of standard deviation `sigma_px` cells, the same number along both axes. Cells
 /// without data spread over the kernel's reach. `sigma_px` that is not above 0 (and finite) leaves the grid as it is;
-/// below 1/8 of a cell the kernel is a single cell.
+/// below 1/8 of a cell the kernel is a single cell. Time and memory grow with `sigma_px`: callers keep it below the size
+/// of the grid.
 pub fn gaussian_low_pass(grid: &Grid, sigma_px: f64) -> Grid {
     if !(sigma_px > 0.0 && sigma_px.is_finite()) {
         return grid.clone();

@@ -35,7 +35,9 @@ fn disk(classes: &Grid<u8>, radius_m: f64) -> Vec<u32> {
     let [cell_x, cell_y] = classes.geometry.cell;
     let squared = if radius_m > 0.0 { radius_m * radius_m * (1.0 + RADIUS_SLACK) } else { 0.0 };
     let rest = |row: usize| squared - (row as f64 * cell_y) * (row as f64 * cell_y);
-    (0..classes.rows()).map(rest).take_while(|&rest| rest >= 0.0).map(|rest| (rest.sqrt() / cell_x) as u32).collect()
+    // Wider than the grid is as wide as the grid, and less than the distance that stands for "none".
+    let half_width = |rest: f64| ((rest.sqrt() / cell_x) as u32).min(classes.cols() as u32);
+    (0..classes.rows()).map(rest).take_while(|&rest| rest >= 0.0).map(half_width).collect()
 }
 
 /// The cells that the closing raises to `threshold` or above.
@@ -120,7 +122,7 @@ mod tests {
     fn val_equals_brute_force() {
         for (seed, cell) in [(1, [0.05, 0.05]), (2, [0.05, 0.08]), (3, [0.1, 0.03])] {
             let map = random_map(23, 31, cell, seed);
-            for radius in [0.0, 0.05, 0.11, 0.2, 0.5, 9.0] {
+            for radius in [0.0, 0.05, 0.11, 0.2, 0.5, 9.0, f64::INFINITY] {
                 assert_eq!(close_disk(&map, radius), brute_force(&map, radius), "cell {cell:?}, radius {radius}");
             }
         }
