@@ -186,3 +186,21 @@ fn val_plan_says_what_is_stale_and_why() {
     assert!(reason("traverse/husky@smooth").contains("missions/short@smooth, which changed"));
     assert_eq!(plan["stale"].as_array().unwrap().len(), 6);
 }
+
+/// `schemas/published` holds what users rely on: the study's JSON Schema, the tables' columns. To refresh after a change of
+/// the contract: `SASTRUGI_REFRESH=1 cargo test --release -p sastrugi-tests --test cli published`.
+#[test]
+fn gold_published_schemas_are_current() {
+    let folder = area();
+    let published = sastrugi_fixtures::workspace_root().join("schemas/published");
+    for (file, arguments) in [("study.schema.json", ["schema", "study"]), ("tables.json", ["schema", "tables"])] {
+        let mut all = arguments.to_vec();
+        all.push("--json");
+        let now = ok(folder.path(), &all);
+        if std::env::var_os("SASTRUGI_REFRESH").is_some() {
+            write(&published, file, &now);
+        }
+        let kept = std::fs::read_to_string(published.join(file)).unwrap();
+        assert!(now == kept, "{file} is stale; refresh it and say why in the commit message");
+    }
+}

@@ -394,3 +394,45 @@ pub fn run_text(
     let loaded = load_text(text, "this command", folder)?;
     run(&loaded, request, progress)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const STUDY: &str = "[study]\nname = \"x\"\nseed = 1\ndate = \"2026-01-01\"\n\n[[terrain]]\nid = \"t\"\nkind = \"multifractal\"\n\
+        count = 2\nsize_px = [64, 64]\nhigh.fractal_dimension = 2.5\nsweep.cell_m = [0.05, 0.1]\n\n[[missions]]\nid = \"m\"\nterrains = [\"t\"]\n\n\
+        [[traverse]]\nid = \"h\"\nmissions = \"m\"\ncontroller.lookahead_m = 1.0\n";
+
+    #[test]
+    fn val_a_study_becomes_its_items() {
+        let loaded = load_text(STUDY, "study", Path::new("")).unwrap();
+        // Four terrains, each described, with missions drawn and driven.
+        assert_eq!(loaded.graph.len(), 16);
+        assert_eq!(loaded.released, STUDY);
+    }
+
+    #[test]
+    fn val_the_released_study_points_into_the_release() {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join("my dem.TIF"), b"x").unwrap();
+        let text = "[study]\nname = \"x\"\nseed = 1\ndate = \"2026-01-01\"\n[[dem]]\nid = \"d\"\nfile = \"my dem.TIF\" # mine\n";
+        let loaded = load_text(text, "study", folder.path()).unwrap();
+        assert_eq!(loaded.released, text.replace("my dem.TIF", "dem/d.tif"));
+    }
+
+    proptest! {
+        /// Whatever bytes a study file holds, reading it ends in a study or an error, never in a panic.
+        #[test]
+        fn prop_any_text_is_read_or_refused(text in "\\PC*") {
+            let _ = load_text(&text, "study", Path::new(""));
+        }
+
+        #[test]
+        fn prop_a_damaged_study_is_read_or_refused(at in 0usize..STUDY.len(), cut in 0usize..6, put in "[\\[\\]{}=\"'.,#0-9a-z\\-\n]{0,4}") {
+            let end = (at + cut).min(STUDY.len());
+            let text = format!("{}{put}{}", &STUDY[..at], &STUDY[end..]);
+            let _ = load_text(&text, "study", Path::new(""));
+        }
+    }
+}
