@@ -13,7 +13,7 @@ use sastrugi_store::mcap::{self, MissionMcap};
 use sastrugi_store::parquet::{TableMetadata, TableWriter};
 use std::collections::BTreeMap;
 use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 const CELLS: usize = 1009;
 const SECONDS: usize = 37;
@@ -175,7 +175,7 @@ fn rows() -> Vec<SampleRow> {
         .collect()
 }
 
-fn write_rows(path: &PathBuf, rows: &[SampleRow]) {
+fn write_rows(path: &Path, rows: &[SampleRow]) {
     let metadata = TableMetadata {
         study_sha256: String::new(),
         seed: 1,

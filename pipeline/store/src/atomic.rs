@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Start of the name of every file under construction; no artifact's name starts with a dot.
-pub const TEMPORARY_PREFIX: &str = ".sastrugi-partial-";
+const TEMPORARY_PREFIX: &str = ".sastrugi-partial-";
 
 /// A file under construction. Dropped without [`AtomicFile::commit`], it leaves nothing behind.
 #[derive(Debug)]
@@ -86,11 +86,6 @@ pub fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
 /// The file system refused.
 pub fn sync_folder(folder: &Path) -> io::Result<()> {
     File::open(folder)?.sync_all()
-}
-
-/// True for a name that only a file under construction has.
-pub fn is_temporary(name: &str) -> bool {
-    name.starts_with(TEMPORARY_PREFIX)
 }
 
 fn folder_of(path: &Path) -> &Path {

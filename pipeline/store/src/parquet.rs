@@ -226,11 +226,6 @@ impl<R: Record> TableWriter<R> {
         if self.waiting == BATCH_ROWS { self.encode() } else { Ok(()) }
     }
 
-    /// Number of rows so far.
-    pub fn rows(&self) -> u64 {
-        self.rows
-    }
-
     fn encode(&mut self) -> Result<(), TableError> {
         self.waiting = 0;
         let arrays = self.columns.iter_mut().map(ColumnBuilder::finish).collect();

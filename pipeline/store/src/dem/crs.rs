@@ -59,11 +59,6 @@ impl Crs {
         crs
     }
 
-    /// The system of a raster that was moved to local metres: none.
-    pub fn local() -> Self {
-        Self::default()
-    }
-
     /// Sentences on units that are not metres.
     pub(super) fn unit_notes(&self) -> Vec<String> {
         let not_metre = |id| self.short(id).filter(|unit| *unit != 9001 && !NO_CODE.contains(unit));

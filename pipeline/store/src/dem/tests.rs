@@ -213,7 +213,7 @@ fn val_tiles_need_a_name_and_a_size() {
 fn val_what_a_format_cannot_hold_is_not_written() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.tif");
-    for value in [NO_DATA, 1e39] {
+    for value in [NO_DATA, NO_DATA - 1e-6, 1e39] {
         let grid = Grid::filled(Geometry::square(2, 2, 1.0), value);
         assert!(write(&path, &grid, &Crs::default(), &WriteOptions::default()).is_err());
         assert!(!path.exists());

@@ -29,8 +29,9 @@ const UNIT_METRE: &str =
 
 /// Heights as float32.
 pub(super) fn heights(grid: &Grid, crs: &Crs, compression: Compression) -> Result<Vec<u8>, Refusal> {
-    free_of_no_data_value(grid)?;
-    let stored: Vec<f32> = grid.values.iter().map(|&v| if v.is_nan() { NO_DATA as f32 } else { v as f32 }).collect();
+    let rounded = grid.as_stored();
+    free_of_no_data_value(&rounded)?;
+    let stored: Vec<f32> = rounded.values.iter().map(|&v| if v.is_nan() { NO_DATA } else { v } as f32).collect();
     if let Some(at) = stored.iter().position(|v| v.is_infinite()) {
         return Err(Refusal::new(format!("the height {} m does not fit in single precision", grid.values[at])));
     }

@@ -58,11 +58,8 @@ impl ReleaseBuilder {
         Self::create(&with_suffix(dest, &format!(".assembling-{study}")), head)
     }
 
-    /// Starts a release in a folder that is the caller's to empty, on the same file system as its place.
-    ///
-    /// # Errors
-    /// The folder cannot be made.
-    pub fn create(staging: &Path, head: Head) -> Result<Self, ReleaseError> {
+    /// Starts a release in a folder, which is emptied.
+    pub(super) fn create(staging: &Path, head: Head) -> Result<Self, ReleaseError> {
         remove_folder(staging)?;
         fs::create_dir_all(staging).map_err(ReleaseError::io(staging))?;
         Ok(Self { staging: staging.to_owned(), head, artifacts: vec![], failed: vec![] })
@@ -71,11 +68,6 @@ impl ReleaseBuilder {
     /// The folder under construction.
     pub fn staging(&self) -> &Path {
         &self.staging
-    }
-
-    /// Files so far.
-    pub fn artifacts(&self) -> &[Artifact] {
-        &self.artifacts
     }
 
     /// Copies a file into the release.
