@@ -145,8 +145,8 @@ fn numeric(numbers: &Numbers, column: usize) -> bool {
     cells.find(|c| **c != Cell::Null).is_some_and(|c| matches!(c, Cell::F64(_) | Cell::I64(_)))
 }
 
-/// Decimals that give the largest figure of a column four digits; `None` when that would leave less than two of the
-/// smallest.
+/// Decimals of a column: four digits of its largest figure, two of its smallest. `None` where that takes more than five
+/// digits, or where the figures are very large or small.
 fn decimals(numbers: &Numbers, column: usize) -> Option<usize> {
     let magnitude = |row: &Vec<Cell>| match row.get(column) {
         Some(Cell::F64(v)) if *v != 0.0 => Some(v.abs()),
@@ -157,9 +157,10 @@ fn decimals(numbers: &Numbers, column: usize) -> Option<usize> {
         return Some(0);
     }
     let (low, high) = (magnitudes().fold(f64::INFINITY, f64::min), magnitudes().fold(0.0, f64::max));
-    let places =
-        (1..=7).find(|places| high >= libm::pow(10.0, 4.0 - f64::from(*places))).map(|p: u8| usize::from(p) - 1);
-    places.filter(|&places| high < 1e6 && low >= 10.0 / libm::pow(10.0, places as f64))
+    let reaches =
+        |v: f64, digits: f64| (0..=6).find(|d| v * libm::pow(10.0, f64::from(*d)) >= libm::pow(10.0, digits - 1.0));
+    let places: i32 = reaches(high, 4.0)?.max(reaches(low, 2.0)?);
+    (high * libm::pow(10.0, f64::from(places)) < 1e5).then_some(usize::try_from(places).unwrap_or(0))
 }
 
 fn heading(heading: &Heading, numeric: bool) -> String {
@@ -187,5 +188,25 @@ fn cell((cell, decimals): (&Cell, &Option<usize>)) -> String {
         }
         Cell::I64(v) => format!("<td class=\"n\">{v}</td>"),
         Cell::Bool(v) => format!("<td>{}</td>", if *v { "yes" } else { "no" }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::content::number as figure;
+
+    #[test]
+    fn val_decimals_of_a_column() {
+        let of = |values: &[f64]| {
+            let rows = values.iter().map(|v| vec![figure(*v)]).collect();
+            decimals(&Numbers { rows, ..Numbers::new("", &[("x", "")]) }, 0)
+        };
+        assert_eq!(of(&[84.75, 0.73, f64::NAN]), Some(2));
+        assert_eq!(of(&[100.0, 0.6377]), Some(2));
+        assert_eq!(of(&[9023.4, 0.05]), None);
+        assert_eq!(of(&[20.0, 400.0, 0.0]), Some(0));
+        assert_eq!(of(&[1e-9, 2e-9]), None);
+        assert_eq!(of(&[]), Some(0));
     }
 }

@@ -61,6 +61,14 @@ pub fn empty() -> Data {
 
 /// A release with `per_group` terrains in each of three groups.
 pub fn full(per_group: usize, side: usize) -> Data {
+    let (mut data, shelf) = parts(per_group, side);
+    data.artifacts = data.terrains.iter().map(|t| Artifact { path: t.path.clone(), bytes: 1_234_567 }).collect();
+    data.files = Box::new(shelf);
+    data
+}
+
+/// Its rows, and its files.
+pub fn parts(per_group: usize, side: usize) -> (Data, Shelf) {
     let mut data = empty();
     let mut shelf = Shelf::default();
     for (g, name) in ["2.30", "2.45", "2.60"].into_iter().enumerate() {
@@ -69,9 +77,7 @@ pub fn full(per_group: usize, side: usize) -> Data {
         }
     }
     measured(&mut data, &mut shelf);
-    data.artifacts = data.terrains.iter().map(|t| Artifact { path: t.path.clone(), bytes: 1_234_567 }).collect();
-    data.files = Box::new(shelf);
-    data
+    (data, shelf)
 }
 
 fn stream(item: &str) -> Stream {

@@ -1,6 +1,7 @@
 //! Structure of whole reports: nothing here compares with a stored page.
 
 mod made_up;
+mod on_disk;
 pub mod xml;
 
 use crate::data::Data;

@@ -64,10 +64,14 @@ fn share_bar(rows: &mut Rows, row: usize, group: &Group<TerrainRow>, class: Roug
     terrains.iter().for_each(|&x| rows.svg.ring((x, y), 2.2, Stroke::new(Paint::Ink, 0.9).faint(0.6)));
     let last = terrains.iter().copied().fold(end, f64::max);
     let value = set::percent(middle, 1);
-    match last + 8.0 + text_width(&value, 11.5) > WIDTH {
-        true => rows.svg.text_sized((zero + 6.0, y + 4.0), Anchor::Start, label_on(class), 11.5, &value),
-        false => rows.svg.text_sized((last + 8.0, y + 4.0), Anchor::Start, Paint::Ink, 11.5, &value),
-    }
+    let width = text_width(&value, 11.5);
+    // Behind the last mark; where there is no room, on the bar; where that is short, at the edge.
+    let (x, anchor, paint) = match (last + 8.0 + width <= WIDTH, end - zero > width + 12.0) {
+        (true, _) => (last + 8.0, Anchor::Start, Paint::Ink),
+        (false, true) => (zero + 6.0, Anchor::Start, label_on(class)),
+        (false, false) => (WIDTH - 1.0, Anchor::End, Paint::Ink),
+    };
+    rows.svg.text_sized((x, y + 4.0), anchor, paint, 11.5, &value);
 }
 
 /// Text on a bar of the class colour.

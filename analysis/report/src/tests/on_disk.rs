@@ -1,0 +1,104 @@
+//! Reports of releases that `sastrugi-store` wrote.
+
+use super::{assert_sound, made_up};
+use crate::{ReportError, Summary, render};
+use sastrugi_schemas::manifest::{FailedItem, Origin};
+use sastrugi_store::dem::{self, Crs};
+use sastrugi_store::release::{Head, ReleaseBuilder};
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+
+const STUDY: &str =
+    "[study]\nname = \"made-up\"\ntitle = \"A <title>\"\nseed = 7\ndate = \"2026-11-21\"\ncreators = [\"A\", \"B\"]\n";
+
+/// A release that will be `dest`, not sealed.
+fn assembled(dest: &Path) -> ReleaseBuilder {
+    let (data, shelf) = made_up::parts(2, 40);
+    let head = Head {
+        name: "made-up".into(),
+        study_sha256: "0".repeat(64),
+        seed: 7,
+        version: "0.1.0".into(),
+        license: "CC-BY-4.0".into(),
+    };
+    let mut builder = ReleaseBuilder::beside(dest, head).unwrap();
+    let folder = builder.staging().to_owned();
+    for (path, grid) in &shelf.grids {
+        dem::write(&folder.join(path), grid, &Crs::default(), &Default::default()).unwrap();
+    }
+    for (path, codes) in &shelf.classes {
+        dem::write_classes(&folder.join(path), codes, &Crs::default()).unwrap();
+    }
+    shelf.grids.keys().chain(shelf.classes.keys()).for_each(|path| builder.adopt(path, Origin::default()).unwrap());
+    for (path, fit) in &shelf.fits {
+        builder.write_text(path, &serde_json::to_string(fit).unwrap(), Origin::default()).unwrap();
+    }
+    builder.write_text("study.toml", STUDY, Origin::default()).unwrap();
+    builder.write_table("0000", data.terrains, Origin::default()).unwrap();
+    builder.write_table("0000", data.fits, Origin::default()).unwrap();
+    builder.write_table("0000", data.covariance, Origin::default()).unwrap();
+    builder.write_table("0000", data.psd, Origin::default()).unwrap();
+    builder.write_table("0000", data.heights, Origin::default()).unwrap();
+    builder.write_table("0000", data.missions, Origin::default()).unwrap();
+    for (terrain, samples) in shelf.samples {
+        builder.write_table(&terrain, samples, Origin::default()).unwrap();
+    }
+    builder
+}
+
+fn report(release: &Path) -> (BTreeMap<String, String>, Summary) {
+    let out = tempfile::tempdir().unwrap();
+    let summary = render(release, out.path(), &|_| ()).unwrap();
+    let read =
+        |path: &std::path::PathBuf| (path.display().to_string(), fs::read_to_string(out.path().join(path)).unwrap());
+    (summary.files.iter().map(read).collect(), summary)
+}
+
+#[test]
+fn prop_a_release_reads_the_same_before_and_after_sealing() {
+    let folder = tempfile::tempdir().unwrap();
+    let dest = folder.path().join("release");
+    let builder = assembled(&dest);
+    let before = report(builder.staging());
+    assert_sound(&before.0);
+    assert!(before.1.figures.iter().any(|f| f.starts_with("mission-")), "{:?}", before.1.figures);
+    assert!(before.0["index.html"].contains("<h1>A &lt;title&gt;</h1>"));
+    builder.seal(&dest).unwrap();
+    assert_eq!(before, report(&dest));
+}
+
+#[test]
+fn val_failed_items_are_listed() {
+    let folder = tempfile::tempdir().unwrap();
+    let dest = folder.path().join("release");
+    let mut builder = assembled(&dest);
+    let parameters = serde_json::json!({ "size_m": [1, 1] });
+    builder.failed(FailedItem { stage: "terrain".into(), item: "x".into(), error: "too small".into(), parameters });
+    builder.seal(&dest).unwrap();
+    let (files, _) = report(&dest);
+    assert!(files["index.html"].contains("1 item of the study failed"));
+    assert!(files["data/failed.json"].contains("too small"));
+}
+
+#[test]
+fn val_unusable_releases_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let error = |release: &Path| render(release, &folder.path().join("out"), &|_| ()).unwrap_err();
+    assert!(matches!(error(&folder.path().join("nowhere")), ReportError::NotARelease { .. }));
+    let builder = assembled(&folder.path().join("release"));
+    let staging = builder.staging().to_owned();
+    let damage = |path: &str, bytes: &[u8]| {
+        let whole = fs::read(staging.join(path)).unwrap();
+        fs::write(staging.join(path), bytes).unwrap();
+        let error = error(&staging);
+        fs::write(staging.join(path), whole).unwrap();
+        (matches!(&error, ReportError::Read { path: named, .. } if named == path), error.unusable_input())
+    };
+    for path in
+        ["tables/missions/part-0000.parquet", "fit/jacksboro-paper.json", "dem/jacksboro.metric.tif", "study.toml"]
+    {
+        assert_eq!(damage(path, b"\x00[["), (true, true), "{path}");
+    }
+    assert!(render(&staging, &folder.path().join("out"), &|_| ()).is_ok());
+}
