@@ -384,6 +384,17 @@ fn prop_same_input_same_bits() {
     assert_eq!(a, b);
 }
 
+/// Poses of one mission folded to 64 bits (FNV-1a over their bits): the dynamics are frozen. A change that means to change
+/// them refreshes the constant from the message of this test, and says in its commit what changed and by how much.
+#[test]
+fn gold_one_mission() {
+    let recording = run(&ROUGH, &crossing(0), |p| p.timeout_s = 10.0);
+    let words = recording.states.iter().flat_map(|s| s.position_m.into_iter().chain(s.orientation)).map(f64::to_bits);
+    let hash = words.fold(0xcbf2_9ce4_8422_2325, |hash: u64, word| (hash ^ word).wrapping_mul(0x0100_0000_01b3));
+    assert_eq!(hash, GOLD_POSES, "found {hash:#x}");
+}
+const GOLD_POSES: u64 = 0x4ba2_ad15_4a93_1b78;
+
 /// Every refusal of section 7 of the specification, and the key it names.
 #[test]
 fn val_bad_vehicles_are_refused() {
