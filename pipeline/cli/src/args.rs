@@ -158,6 +158,8 @@ pub enum Compress {
     /// Deflate with predictor.
     #[default]
     Deflate,
+    /// Zstandard with predictor.
+    Zstd,
 }
 
 /// `terrain`.

@@ -480,6 +480,30 @@ pub fn for_each_row<R: Record>(path: &Path, f: impl FnMut(R)) -> Result<(), Tabl
     TableReader::open(path)?.try_for_each(|row| row.map(&mut f))
 }
 
+/// What a Parquet file of ours is, for people.
+///
+/// # Errors
+/// As [`TableReader::open`]; also a table that is none of ours.
+pub fn describe_file(path: &Path) -> Result<serde_json::Value, TableError> {
+    for table in sastrugi_schemas::tables::ALL {
+        match open(path, table) {
+            Ok(builder) => {
+                let rows = builder.metadata().file_metadata().num_rows();
+                return Ok(serde_json::json!({
+                    "what": "table",
+                    "table": table.name,
+                    "description": table.description,
+                    "rows": rows,
+                    "columns": table.columns.len(),
+                }));
+            }
+            Err(error @ TableError::Io { .. }) => return Err(error),
+            Err(_) => {}
+        }
+    }
+    Err(TableError::Unusable { path: path.to_owned(), reason: "holds none of the tables of a release".to_owned() })
+}
+
 /// Checks that a file has a table's columns, types, units and descriptions; returns its number of rows.
 ///
 /// # Errors

@@ -33,7 +33,7 @@ super::table! {
         time_s: f64 ["s"],
         /// Length of the path driven, in plan, from the recorded samples.
         path_length_m: f64 ["m"],
-        /// Straight distance from start to goal over path length; null unless successful.
+        /// Straight distance from the first to the last sample over path length; null unless successful.
         efficiency: f64 ["1"],
         /// Root mean square of the vertical acceleration, from the recorded heights differentiated twice.
         rms_vertical_acceleration_m_s2: f64 ["m/s2"],

@@ -5,7 +5,7 @@ super::table! {
     /// spatial frequency in cycles per metre).
     "psd" PsdRow {
         keys {
-            /// Id of the heightfield.
+            /// Id of the heightfield, or of the fit for its residual.
             terrain_id: String,
             /// Number of the bin, from 0.
             bin: i64,

@@ -41,6 +41,8 @@ pub fn info(args: &Info, common: &Common) -> Verdict {
     let extension = args.path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
     let result = match extension.as_str() {
         _ if args.path.is_dir() => release(&args.path)?,
+        "mcap" => sastrugi_store::mcap::describe_file(&args.path).map_err(Failure::input)?,
+        "parquet" => sastrugi_store::parquet::describe_file(&args.path).map_err(Failure::input)?,
         "json" => fit(&args.path)?,
         _ => raster(&args.path, cell(args.cell.as_deref())?)?,
     };

@@ -44,6 +44,7 @@ fn options(compress: Compress) -> WriteOptions {
     let compression = match compress {
         Compress::None => Compression::None,
         Compress::Deflate => Compression::Deflate,
+        Compress::Zstd => Compression::Zstd,
     };
     WriteOptions { compression }
 }

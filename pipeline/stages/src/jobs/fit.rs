@@ -1,10 +1,12 @@
 //! Stage `fit`: the covariance of a measured DEM.
 
 use super::dem::{HEIGHTS, input_error};
+use super::roughness::{height_rows, psd_rows};
 use super::{Estimate, ItemRef, Job, JobError, Outcome, Product, Rows, Work};
 use crate::registry::{BuildError, Builder, unknown_id};
 use crate::revision::Room;
 use crate::runner::graph::Node;
+use sastrugi_roughness::{histogram, power_spectrum};
 use sastrugi_schemas::Kind;
 use sastrugi_schemas::fit::{FitFile, Source};
 use sastrugi_schemas::kind::{read_parameters, schema_of};
@@ -20,6 +22,8 @@ pub const STAGE: &str = "fit";
 pub const FIT: &str = "fit.json";
 const BACKGROUND: &str = "background.tif";
 const RESIDUAL: &str = "residual.tif";
+/// Bins of the residual's height distribution, as many as a heightfield's.
+const HISTOGRAM_BINS: usize = 64;
 
 /// The one kind of fit.
 pub fn kinds() -> Vec<Kind> {
@@ -104,6 +108,8 @@ impl Job for FitJob {
         let rows = Rows {
             fits: vec![fit_row(id, &self.dem_id, &fit)],
             covariance: covariance_rows(id, &fit),
+            psd: psd_rows(id, &power_spectrum(&outcome.residual)),
+            height_distribution: height_rows(id, &histogram(&outcome.residual, HISTOGRAM_BINS)),
             ..Rows::default()
         };
         Ok(Outcome { products, rows, notes: fit.warnings })

@@ -108,17 +108,19 @@ pub struct Product {
     pub release_path: Option<String>,
     /// Hash of the decoded content (heights, rows, messages), where there is one.
     pub content: Option<String>,
+    /// Number of messages, for recordings.
+    pub records: Option<u64>,
 }
 
 impl Product {
     /// A file that goes into the release.
     pub fn released(file: &str, release_path: String, content: Option<String>) -> Self {
-        Self { file: file.to_owned(), release_path: Some(release_path), content }
+        Self { file: file.to_owned(), release_path: Some(release_path), content, records: None }
     }
 
     /// A file for later stages.
     pub fn internal(file: &str) -> Self {
-        Self { file: file.to_owned(), release_path: None, content: None }
+        Self { file: file.to_owned(), release_path: None, content: None, records: None }
     }
 }
 

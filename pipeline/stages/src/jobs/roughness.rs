@@ -5,7 +5,10 @@ use super::{Estimate, ItemRef, Job, JobError, Outcome, Product, Rows, Work};
 use crate::registry::Heightfield;
 use crate::revision::Room;
 use sastrugi_numeric::Grid;
-use sastrugi_roughness::{ClassThresholds, DescribeSettings, Summary, classify, close_disk, describe, moore_gradient};
+use sastrugi_roughness::{
+    ClassThresholds, DescribeSettings, HistogramBin, SpectrumBin, Summary, classify, close_disk, describe,
+    moore_gradient,
+};
 use sastrugi_schemas::study::RoughnessSection;
 use sastrugi_schemas::tables::{HeightDistributionRow, PsdRow, TerrainRow};
 use sastrugi_store::{dem, digest};
@@ -62,29 +65,31 @@ impl RoughnessJob {
             path: self.field.release_path.clone(),
         }
     }
+}
 
-    fn psd_rows(&self, summary: &Summary) -> Vec<PsdRow> {
-        let row = |(bin, b): (usize, &sastrugi_roughness::SpectrumBin)| PsdRow {
-            terrain_id: self.id.clone(),
-            bin: bin as i64,
-            frequency_cycles_m: b.frequency_cycles_m,
-            psd_m4: b.psd_m4,
-            modes: b.modes as i64,
-        };
-        summary.spectrum.iter().enumerate().map(row).collect()
-    }
+/// Rows of the table `psd`.
+pub fn psd_rows(id: &str, spectrum: &[SpectrumBin]) -> Vec<PsdRow> {
+    let row = |(bin, b): (usize, &SpectrumBin)| PsdRow {
+        terrain_id: id.to_owned(),
+        bin: bin as i64,
+        frequency_cycles_m: b.frequency_cycles_m,
+        psd_m4: b.psd_m4,
+        modes: b.modes as i64,
+    };
+    spectrum.iter().enumerate().map(row).collect()
+}
 
-    fn height_rows(&self, summary: &Summary) -> Vec<HeightDistributionRow> {
-        let row = |(bin, b): (usize, &sastrugi_roughness::HistogramBin)| HeightDistributionRow {
-            terrain_id: self.id.clone(),
-            bin: bin as i64,
-            low_m: b.low_m,
-            high_m: b.high_m,
-            cells: b.cells as i64,
-            density_per_m: b.density_per_m,
-        };
-        summary.histogram.iter().enumerate().map(row).collect()
-    }
+/// Rows of the table `height_distribution`.
+pub fn height_rows(id: &str, histogram: &[HistogramBin]) -> Vec<HeightDistributionRow> {
+    let row = |(bin, b): (usize, &HistogramBin)| HeightDistributionRow {
+        terrain_id: id.to_owned(),
+        bin: bin as i64,
+        low_m: b.low_m,
+        high_m: b.high_m,
+        cells: b.cells as i64,
+        density_per_m: b.density_per_m,
+    };
+    histogram.iter().enumerate().map(row).collect()
 }
 
 /// Settings of the kernel.
@@ -140,8 +145,8 @@ impl Job for RoughnessJob {
         ];
         let rows = Rows {
             terrains: vec![self.terrain_row(&read.grid, &summary)],
-            psd: self.psd_rows(&summary),
-            height_distribution: self.height_rows(&summary),
+            psd: psd_rows(id, &summary.spectrum),
+            height_distribution: height_rows(id, &summary.histogram),
             ..Rows::default()
         };
         Ok(Outcome { products, rows, notes: Vec::new() })

@@ -14,9 +14,9 @@ use sastrugi_schemas::Kind;
 use sastrugi_schemas::kind::{read_parameters, schema_of};
 use sastrugi_schemas::study::{StudyHead, TraverseItem};
 use sastrugi_schemas::tables::{MissionRow, SampleRow};
-use sastrugi_store::dem;
 use sastrugi_store::mcap::{MissionMcap, write_mission};
 use sastrugi_store::parquet::{TableMetadata, TableWriter};
+use sastrugi_store::{dem, digest};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
@@ -101,6 +101,7 @@ struct Driven {
     file: String,
     release_path: String,
     content: String,
+    messages: u64,
     row: MissionRow,
     samples: Vec<SampleRow>,
 }
@@ -109,6 +110,7 @@ struct Driven {
 struct Site {
     ground: Ground,
     heights: Grid,
+    heights_sha256: String,
     classes: Grid<u8>,
 }
 
@@ -118,7 +120,8 @@ impl TraverseJob {
         let path = work.parent(&roughness::item(&self.terrain), roughness::CLASSES_RAW)?;
         let classes = dem::read_classes(&path).map_err(|e| input_error(&e))?;
         let ground = Ground::new(&heights.grid, &self.vehicle).map_err(JobError::new)?;
-        Ok(Site { ground, heights: heights.grid, classes })
+        let heights_sha256 = digest::heights(&heights.grid);
+        Ok(Site { ground, heights: heights.grid, heights_sha256, classes })
     }
 
     fn drive(&self, work: &Work<'_>, site: &Site, mission: &Mission) -> Result<Driven, JobError> {
@@ -137,7 +140,7 @@ impl TraverseJob {
         row.mission_id.clone_from(&id);
         let mut samples = sample_rows(&self.terrain, mission, &recording, &site.classes);
         samples.iter_mut().for_each(|s| s.mission_id.clone_from(&id));
-        let metadata = self.metadata(&row);
+        let metadata = self.metadata(&row, &site.heights_sha256);
         let mcap = MissionMcap {
             recording: &recording,
             dem: &site.heights,
@@ -149,11 +152,11 @@ impl TraverseJob {
         };
         let file = format!("{id}.mcap");
         let summary = write_mission(&work.output(&file), &mcap).map_err(|e| fail(&e))?;
-        Ok(Driven { file, release_path, content: summary.content_sha256, row, samples })
+        Ok(Driven { file, release_path, content: summary.content_sha256, messages: summary.messages, row, samples })
     }
 
     /// Records that a viewer of one file needs to know where it came from.
-    fn metadata(&self, row: &MissionRow) -> BTreeMap<String, BTreeMap<String, String>> {
+    fn metadata(&self, row: &MissionRow, heights_sha256: &str) -> BTreeMap<String, BTreeMap<String, String>> {
         let head = &self.head;
         let study = [("name", head.name.clone()), ("seed", head.seed.to_string()), ("license", head.license.clone())];
         let terrain = [("id", self.terrain.clone()), ("group", self.group.clone().unwrap_or_default())];
@@ -172,6 +175,7 @@ impl TraverseJob {
             ("mission".to_owned(), map(&mission)),
             ("vehicle".to_owned(), map(&vehicle)),
             ("outcome".to_owned(), map(&outcome)),
+            ("hashes".to_owned(), map(&[("terrain_heights_sha256", heights_sha256.to_owned())])),
         ]
         .into()
     }
@@ -206,7 +210,7 @@ impl Job for TraverseJob {
     }
 
     fn rooms(&self) -> &'static [Room] {
-        &[Room::Roughness, Room::Statistics, Room::Mobility]
+        &[Room::Mobility]
     }
 
     fn memory_bytes(&self) -> u64 {
@@ -229,7 +233,8 @@ impl Job for TraverseJob {
         let mut products = vec![Product::internal(SAMPLES)];
         let mut rows = Rows::default();
         for d in driven {
-            products.push(Product::released(&d.file, d.release_path, Some(d.content)));
+            let product = Product::released(&d.file, d.release_path, Some(d.content));
+            products.push(Product { records: Some(d.messages), ..product });
             rows.missions.push(d.row);
         }
         Ok(Outcome { products, rows, notes: site.ground.warnings().to_vec() })

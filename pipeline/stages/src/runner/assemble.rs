@@ -6,7 +6,7 @@ use super::cache::{Record, load_record};
 use super::execute::Failure;
 use super::progress::Progress;
 use crate::error::Error;
-use crate::jobs::{ItemRef, Rows, roughness, traverse};
+use crate::jobs::{ItemRef, Rows, fit, roughness, traverse};
 use sastrugi_schemas::Record as Row;
 use sastrugi_schemas::manifest::{FailedItem, Origin};
 use sastrugi_schemas::study::StudyHead;
@@ -47,7 +47,7 @@ pub fn assemble(mut contents: Contents<'_>, dest: &Path, progress: &dyn Progress
     add_tables(&mut builder, &contents)?;
     add_documents(&mut builder, &contents)?;
     progress.phase("writing the report");
-    add_report(&mut builder)?;
+    add_report(&mut builder, progress)?;
     progress.phase("writing checksums");
     builder.seal(dest).map_err(release_error)
 }
@@ -62,10 +62,13 @@ pub fn release_error(error: ReleaseError) -> Error {
 }
 
 impl Contents<'_> {
-    /// Results of one stage, in order of their ids.
-    fn results<'s>(&'s self, stage: &'s str) -> impl Iterator<Item = (&'s ItemRef, &'s PathBuf)> {
-        let of_stage = move |(item, _): &&(ItemRef, Option<PathBuf>)| item.stage == stage;
-        self.items.iter().filter(of_stage).filter_map(|(item, folder)| Some((item, folder.as_ref()?)))
+    /// Results of these stages, in order of their ids.
+    fn results(&self, stages: &[&str]) -> Vec<(&ItemRef, &PathBuf)> {
+        let of_stages = |(item, _): &&(ItemRef, Option<PathBuf>)| stages.contains(&item.stage.as_str());
+        let found = self.items.iter().filter(of_stages).filter_map(|(item, folder)| Some((item, folder.as_ref()?)));
+        let mut results: Vec<_> = found.collect();
+        results.sort_by(|a, b| a.0.id.cmp(&b.0.id));
+        results
     }
 }
 
@@ -84,7 +87,7 @@ fn add_artifacts(builder: &mut ReleaseBuilder, contents: &Contents<'_>) -> Resul
                 stage: record.item.stage.clone(),
                 item: record.item.id.clone(),
                 content_sha256: file.product.content.clone(),
-                records: None,
+                records: file.product.records,
                 parents: record.ingredients.parents.keys().cloned().collect(),
                 stream: record.ingredients.stream.clone(),
             };
@@ -103,11 +106,12 @@ fn add_artifacts(builder: &mut ReleaseBuilder, contents: &Contents<'_>) -> Resul
 }
 
 fn add_tables(builder: &mut ReleaseBuilder, contents: &Contents<'_>) -> Result<(), Error> {
-    add_table(builder, contents, roughness::STAGE, |rows| rows.terrains)?;
-    add_table(builder, contents, roughness::STAGE, |rows| rows.psd)?;
-    add_table(builder, contents, roughness::STAGE, |rows| rows.height_distribution)?;
-    add_table(builder, contents, crate::jobs::fit::STAGE, |rows| rows.fits)?;
-    add_table(builder, contents, crate::jobs::fit::STAGE, |rows| rows.covariance)?;
+    let described = [roughness::STAGE, fit::STAGE];
+    add_table(builder, contents, &[roughness::STAGE], |rows| rows.terrains)?;
+    add_table(builder, contents, &described, |rows| rows.psd)?;
+    add_table(builder, contents, &described, |rows| rows.height_distribution)?;
+    add_table(builder, contents, &[fit::STAGE], |rows| rows.fits)?;
+    add_table(builder, contents, &[fit::STAGE], |rows| rows.covariance)?;
     add_missions(builder, contents)
 }
 
@@ -115,18 +119,18 @@ fn add_tables(builder: &mut ReleaseBuilder, contents: &Contents<'_>) -> Result<(
 fn add_table<R: Row>(
     builder: &mut ReleaseBuilder,
     contents: &Contents<'_>,
-    stage: &str,
+    stages: &[&str],
     take: impl Fn(Rows) -> Vec<R>,
 ) -> Result<(), Error> {
     let mut trouble = None;
-    let rows = contents.results(stage).map_while(|(_, folder)| match record(folder) {
+    let rows = contents.results(stages).into_iter().map_while(|(_, folder)| match record(folder) {
         Ok(record) => Some(take(record.rows)),
         Err(error) => {
             trouble = Some(error);
             None
         }
     });
-    let written = builder.write_table("0000", rows.flatten(), made_by(stage));
+    let written = builder.write_table("0000", rows.flatten(), made_by(&stages.join("+")));
     match trouble {
         Some(error) => Err(error),
         None => written.map_err(release_error),
@@ -140,7 +144,7 @@ fn made_by(stage: &str) -> Origin {
 /// `missions` and `samples`: all runs on one terrain together, sorted by mission.
 fn add_missions(builder: &mut ReleaseBuilder, contents: &Contents<'_>) -> Result<(), Error> {
     let mut by_terrain: BTreeMap<String, Vec<&PathBuf>> = BTreeMap::new();
-    for (item, folder) in contents.results(traverse::STAGE) {
+    for (item, folder) in contents.results(&[traverse::STAGE]) {
         by_terrain.entry(traverse::terrain_of(&item.id).to_owned()).or_default().push(folder);
     }
     let mut missions = Vec::new();
@@ -171,9 +175,11 @@ fn add_documents(builder: &mut ReleaseBuilder, contents: &Contents<'_>) -> Resul
     Ok(())
 }
 
-fn add_report(builder: &mut ReleaseBuilder) -> Result<(), Error> {
+fn add_report(builder: &mut ReleaseBuilder, progress: &dyn Progress) -> Result<(), Error> {
+    builder.write_draft().map_err(release_error)?;
     let staging = builder.staging().to_owned();
-    sastrugi_report::render(&staging, &staging.join("report"), &|_| {}).map_err(Error::failed)?;
+    sastrugi_report::render(&staging, &staging.join("report"), &|phase| progress.phase(phase))
+        .map_err(Error::failed)?;
     for path in files_below(&staging, Path::new("report"))? {
         builder.adopt(&path, Origin { stage: "report".to_owned(), ..Origin::default() }).map_err(release_error)?;
     }

@@ -265,6 +265,8 @@ pub enum Compression {
     /// Deflate with predictor.
     #[default]
     Deflate,
+    /// Zstandard with predictor.
+    Zstd,
 }
 
 /// How a raster is written.

@@ -18,6 +18,10 @@ const TILE: usize = 256;
 const LEVEL: u32 = 6;
 const COMPRESSION_NONE: u16 = 1;
 const COMPRESSION_DEFLATE: u16 = 8;
+/// As GDAL writes it.
+const COMPRESSION_ZSTD: u16 = 50000;
+/// zstd's own default.
+const ZSTD_LEVEL: i32 = 3;
 const PREDICTOR_NONE: u16 = 1;
 const PREDICTOR_FLOAT: u16 = 3;
 const SAMPLE_UNSIGNED: u16 = 1;
@@ -39,10 +43,12 @@ pub(super) fn heights(grid: &Grid, crs: &Crs, compression: Compression) -> Resul
     let encode = |tile: Vec<f32>| match compression {
         Compression::None => Ok(tile.iter().flat_map(|v| v.to_le_bytes()).collect()),
         Compression::Deflate => deflated(&float_predicted(&tile)),
+        Compression::Zstd => zstandard(&float_predicted(&tile)),
     };
     let (code, predictor) = match compression {
         Compression::None => (COMPRESSION_NONE, PREDICTOR_NONE),
         Compression::Deflate => (COMPRESSION_DEFLATE, PREDICTOR_FLOAT),
+        Compression::Zstd => (COMPRESSION_ZSTD, PREDICTOR_FLOAT),
     };
     let mut tags = sample_tags(code, predictor, 32, SAMPLE_FLOAT);
     tags.push(Tag::ascii(42112, UNIT_METRE));
@@ -126,6 +132,11 @@ fn deflated(bytes: &[u8]) -> Result<Vec<u8>, Refusal> {
     let mut encoder = ZlibEncoder::new(Vec::with_capacity(bytes.len() / 2), flate2::Compression::new(LEVEL));
     let written = encoder.write_all(bytes).and_then(|()| encoder.finish());
     written.map_err(|e| Refusal::new(format!("deflate failed: {e}")))
+}
+
+/// One frame, one thread: the same bytes everywhere.
+fn zstandard(bytes: &[u8]) -> Result<Vec<u8>, Refusal> {
+    zstd::bulk::compress(bytes, ZSTD_LEVEL).map_err(|e| Refusal::new(format!("zstd failed: {e}")))
 }
 
 fn place_tags(g: &Geometry) -> [Tag; 2] {

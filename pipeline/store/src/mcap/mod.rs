@@ -26,13 +26,21 @@ const ZSTD_LEVEL: u32 = 1;
 /// Uncompressed size of a chunk, bytes.
 const CHUNK_BYTES: u64 = 4 << 20;
 
-/// Why a recording was not written.
+/// Why a recording was not written or read.
 #[derive(Debug, thiserror::Error)]
 pub enum McapError {
     /// The recording cannot be put into messages.
     #[error("the recording cannot be written: {reason}")]
     Unfit {
         /// What does not fit.
+        reason: String,
+    },
+    /// The file is no MCAP file, or not a whole one.
+    #[error("{}: {reason}", path.display())]
+    Unusable {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
         reason: String,
     },
     /// The MCAP writer failed.
@@ -101,6 +109,29 @@ pub fn write_mission(path: &Path, mission: &MissionMcap) -> Result<McapSummary, 
     let (bytes, summary) = encode_mission(mission)?;
     atomic::write(path, &bytes).map_err(|source| McapError::Io { path: path.to_owned(), source })?;
     Ok(summary)
+}
+
+/// What an MCAP file is, for people: its topics with their message counts, and its length in time.
+///
+/// # Errors
+/// [`McapError::Unusable`] for a file without a readable summary, [`McapError::Io`] for one that cannot be read.
+pub fn describe_file(path: &Path) -> Result<serde_json::Value, McapError> {
+    let bytes = std::fs::read(path).map_err(|source| McapError::Io { path: path.to_owned(), source })?;
+    let unusable = |reason: String| McapError::Unusable { path: path.to_owned(), reason };
+    let summary =
+        mcap::Summary::read(&bytes).map_err(|e| unusable(format!("no MCAP file, or not a whole one: {e}")))?;
+    let summary = summary.ok_or_else(|| unusable("the file has no summary: it was not finished".to_owned()))?;
+    let stats = summary.stats.ok_or_else(|| unusable("the summary has no statistics".to_owned()))?;
+    let count = |id: &u16| stats.channel_message_counts.get(id).copied().unwrap_or(0);
+    let topics: BTreeMap<&str, u64> = summary.channels.iter().map(|(id, c)| (c.topic.as_str(), count(id))).collect();
+    let duration_ns = stats.message_end_time.saturating_sub(stats.message_start_time);
+    Ok(serde_json::json!({
+        "what": "MCAP recording",
+        "messages": stats.message_count,
+        "duration_s": duration_ns as f64 * 1e-9,
+        "topics": topics,
+        "metadata": summary.metadata_indexes.iter().map(|m| m.name.as_str()).collect::<Vec<_>>(),
+    }))
 }
 
 /// A mission as the bytes of an MCAP file.

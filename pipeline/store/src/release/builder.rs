@@ -6,6 +6,7 @@ use crate::digest;
 use crate::parquet::{TableMetadata, TableWriter};
 use sastrugi_schemas::Record;
 use sastrugi_schemas::manifest::{Artifact, FORMAT, FailedItem, Manifest, Origin, PROGRAM};
+use std::collections::BTreeSet;
 use std::ffi::OsString;
 use std::fmt::Write as _;
 use std::fs::{self, File};
@@ -44,25 +45,25 @@ pub struct ReleaseBuilder {
     staging: PathBuf,
     head: Head,
     artifacts: Vec<Artifact>,
+    paths: BTreeSet<String>,
     failed: Vec<FailedItem>,
 }
 
 impl ReleaseBuilder {
-    /// Starts a release beside its place: in `<dest>.assembling-<study>`, which is emptied when a killed run left it.
+    /// Starts a release beside its place: in `<dest>.assembling`, which is emptied when a killed run left it.
     ///
     /// # Errors
     /// [`ReleaseError::Occupied`] when `dest` holds something that is no release; the folder cannot be made.
     pub fn beside(dest: &Path, head: Head) -> Result<Self, ReleaseError> {
         check_dest(dest)?;
-        let study: String = head.study_sha256.chars().take(12).collect();
-        Self::create(&with_suffix(dest, &format!(".assembling-{study}")), head)
+        Self::create(&with_suffix(dest, ".assembling"), head)
     }
 
     /// Starts a release in a folder, which is emptied.
     pub(super) fn create(staging: &Path, head: Head) -> Result<Self, ReleaseError> {
         remove_folder(staging)?;
         fs::create_dir_all(staging).map_err(ReleaseError::io(staging))?;
-        Ok(Self { staging: staging.to_owned(), head, artifacts: vec![], failed: vec![] })
+        Ok(Self { staging: staging.to_owned(), head, artifacts: vec![], paths: BTreeSet::new(), failed: vec![] })
     }
 
     /// The folder under construction.
@@ -79,7 +80,7 @@ impl ReleaseBuilder {
         let mut from = File::open(source).map_err(ReleaseError::io(source))?;
         let mut to = File::create(&target).map_err(ReleaseError::io(&target))?;
         let (bytes, sha256) = digest::copy(&mut from, &mut to).map_err(ReleaseError::io(&target))?;
-        self.artifacts.push(Artifact { path: path.to_owned(), bytes, sha256, origin });
+        self.list(Artifact { path: path.to_owned(), bytes, sha256, origin });
         Ok(())
     }
 
@@ -91,7 +92,7 @@ impl ReleaseBuilder {
         let target = self.target(path)?;
         fs::write(&target, text).map_err(ReleaseError::io(&target))?;
         let (bytes, sha256) = (text.len() as u64, digest::of_text(text));
-        self.artifacts.push(Artifact { path: path.to_owned(), bytes, sha256, origin });
+        self.list(Artifact { path: path.to_owned(), bytes, sha256, origin });
         Ok(())
     }
 
@@ -102,7 +103,7 @@ impl ReleaseBuilder {
     pub fn adopt(&mut self, path: &str, origin: Origin) -> Result<(), ReleaseError> {
         let target = self.target(path)?;
         let (bytes, sha256) = digest::of_file(&target).map_err(ReleaseError::io(&target))?;
-        self.artifacts.push(Artifact { path: path.to_owned(), bytes, sha256, origin });
+        self.list(Artifact { path: path.to_owned(), bytes, sha256, origin });
         Ok(())
     }
 
@@ -136,10 +137,36 @@ impl ReleaseBuilder {
         self.failed.push(item);
     }
 
+    fn list(&mut self, artifact: Artifact) {
+        self.paths.insert(artifact.path.clone());
+        self.artifacts.push(artifact);
+    }
+
+    /// Writes the manifest as far as it goes, for readers of the folder under construction (the report); sealing writes it
+    /// again.
+    ///
+    /// # Errors
+    /// The file system failed.
+    pub fn write_draft(&mut self) -> Result<(), ReleaseError> {
+        let json = json_text(&self.manifest())?;
+        let path = self.staging.join(MANIFEST);
+        fs::write(&path, json).map_err(ReleaseError::io(&path))
+    }
+
+    /// The manifest of what is listed, in order.
+    fn manifest(&mut self) -> Manifest {
+        self.artifacts.sort_by(|a, b| a.path.cmp(&b.path));
+        self.failed.sort_by(|a, b| (&a.stage, &a.item).cmp(&(&b.stage, &b.item)));
+        let Head { name, study_sha256, seed, version, license } = self.head.clone();
+        let (artifacts, failed) = (self.artifacts.clone(), self.failed.clone());
+        let program = PROGRAM.to_owned();
+        Manifest { program, version, format: FORMAT, name, study_sha256, seed, license, artifacts, failed }
+    }
+
     /// Where a file of the release goes; its folder is made.
     fn target(&self, path: &str) -> Result<PathBuf, ReleaseError> {
         check_path(path)?;
-        if self.artifacts.iter().any(|a| a.path == path) {
+        if self.paths.contains(path) {
             return Err(ReleaseError::Path { path: path.to_owned(), reason: "it is there twice" });
         }
         let target = self.staging.join(path);
@@ -156,21 +183,8 @@ impl ReleaseBuilder {
     /// [`ReleaseError::Occupied`] when `dest` holds something that is no release; the file system failed.
     pub fn seal(mut self, dest: &Path) -> Result<Release, ReleaseError> {
         check_dest(dest)?;
-        self.artifacts.sort_by(|a, b| a.path.cmp(&b.path));
-        self.failed.sort_by(|a, b| (&a.stage, &a.item).cmp(&(&b.stage, &b.item)));
-        let Head { name, study_sha256, seed, version, license } = self.head;
-        let manifest = Manifest {
-            program: PROGRAM.to_owned(),
-            version,
-            format: FORMAT,
-            name,
-            study_sha256,
-            seed,
-            license,
-            artifacts: self.artifacts,
-            failed: self.failed,
-        };
-        let json = serde_json::to_string_pretty(&manifest)? + "\n";
+        let manifest = self.manifest();
+        let json = json_text(&manifest)?;
         let in_staging = |name: &str, text: &str| {
             let path = self.staging.join(name);
             fs::write(&path, text).map_err(ReleaseError::io(&path))
@@ -181,6 +195,10 @@ impl ReleaseBuilder {
         put_in_place(&self.staging, dest)?;
         Ok(Release { folder: dest.to_owned(), manifest })
     }
+}
+
+fn json_text(manifest: &Manifest) -> Result<String, ReleaseError> {
+    Ok(serde_json::to_string_pretty(manifest)? + "\n")
 }
 
 /// The text of `SHA256SUMS`: every file of the manifest and the manifest itself, by path.
