@@ -4,6 +4,7 @@ pub mod bins;
 pub mod exponential;
 pub mod filtered;
 pub mod masked;
+pub mod partial;
 pub mod trimmed;
 
 use sastrugi_schemas::fit::FitFile;

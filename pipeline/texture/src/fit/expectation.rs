@@ -16,6 +16,7 @@
 use crate::covariance::Covariance;
 use crate::covariance::bins::{LagBins, Member};
 use crate::covariance::filtered::{DetrendFilter, LagField};
+use crate::covariance::partial::PartialWindows;
 use crate::covariance::trimmed::TrimmedNormal;
 
 /// Lags that stand for a bin in the covariance of the bins.
@@ -27,8 +28,10 @@ const RIDGE: f64 = 1e-9;
 
 /// The estimator as a function of the model.
 pub struct Expectation<'a> {
-    /// The detrender.
+    /// The detrender where windows are complete.
     pub filter: DetrendFilter,
+    /// What partial windows change.
+    pub partial: PartialWindows,
     /// The bins of the data.
     pub bins: &'a LagBins,
     /// Residuals beyond this were trimmed, m.
@@ -41,9 +44,14 @@ impl Expectation<'_> {
     /// Expected covariance of each bin, m2.
     pub fn mean(&self, model: &Covariance) -> Vec<f64> {
         let residual = self.filter.residual_covariance(model);
-        let variance = residual.at([0, 0]);
+        let partial = self.partial.correction(model);
+        let variance = residual.at([0, 0]) + partial[0];
         let trimmed = self.trimmed(variance);
-        self.bins.average(|lag| variance * trimmed.covariance(residual.at(lag) / variance))
+        let mut mean = vec![0.0; self.bins.len()];
+        for m in &self.bins.members {
+            mean[m.bin] += m.weight * variance * trimmed.covariance((residual.at(m.lag) + partial[m.bin]) / variance);
+        }
+        mean
     }
 
     /// Covariance of the bins' estimates, row-major, m4.

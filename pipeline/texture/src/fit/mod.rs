@@ -24,7 +24,8 @@ mod report;
 pub use error::FitError;
 pub use params::{FitParameters, FitSettings, Mode};
 
-use crate::covariance::filtered::{DetrendFilter, DetrendedCells};
+use crate::covariance::filtered::DetrendFilter;
+use crate::covariance::partial::{DetrendedCells, PartialWindows};
 use crate::covariance::{Covariance, LagBins, masked_covariance};
 use crate::detrend::{BoxWindow, box_mean};
 use crate::outliers;
@@ -57,23 +58,13 @@ pub struct FitOutcome {
 /// # Errors
 /// See [`FitError`].
 pub fn fit(dem: &Grid, settings: &FitSettings) -> Result<FitOutcome, FitError> {
-    let window = settings.window(&dem.geometry)?;
-    let detrended = Detrended::new(dem, settings, window)?;
-    let trimmed = detrended.trimmed(settings);
-    let cell_m = dem.geometry.cell;
-    let max_lag_m = settings.max_lag_m(&dem.geometry);
-    let max_lag = [1, 0].map(|axis: usize| (max_lag_m / cell_m[axis] * (1.0 + 1e-9)) as usize);
-    let bins = LagBins::of(&masked_covariance(&trimmed.residual, dem.cols(), max_lag), cell_m, max_lag_m);
-    if bins.len() < BINS_MIN {
-        return Err(FitError::TooFewLags { found: bins.len(), needed: BINS_MIN });
-    }
-    let case = Case { settings, cols: dem.cols(), window, cell_m, max_lag, max_lag_m, detrended, trimmed, bins };
+    let case = Case::new(dem, settings)?;
     let naive = case.naive();
     let estimate = match settings.mode() {
         Mode::Paper => naive.clone(),
         Mode::Corrected => case.corrected(&naive),
     };
-    let cell = cell_m[0].max(cell_m[1]);
+    let cell = dem.geometry.cell[0].max(dem.geometry.cell[1]);
     if estimate.model.range_m <= cell {
         return Err(FitError::White { range_m: estimate.model.range_m, cell_m: cell });
     }
@@ -203,7 +194,39 @@ struct Objective {
     rise_at_3b: f64,
 }
 
-impl Case<'_> {
+impl<'a> Case<'a> {
+    /// Detrends, trims and correlates.
+    fn new(dem: &Grid, settings: &'a FitSettings) -> Result<Self, FitError> {
+        let window = settings.window(&dem.geometry)?;
+        let detrended = Detrended::new(dem, settings, window)?;
+        let trimmed = detrended.trimmed(settings);
+        let cell_m = dem.geometry.cell;
+        let max_lag_m = settings.max_lag_m(&dem.geometry);
+        let max_lag = [1, 0].map(|axis: usize| (max_lag_m / cell_m[axis] * (1.0 + 1e-9)) as usize);
+        let bins = LagBins::of(&masked_covariance(&trimmed.residual, dem.cols(), max_lag), cell_m, max_lag_m);
+        if bins.len() < BINS_MIN {
+            return Err(FitError::TooFewLags { found: bins.len(), needed: BINS_MIN });
+        }
+        Ok(Self { settings, cols: dem.cols(), window, cell_m, max_lag, max_lag_m, detrended, trimmed, bins })
+    }
+
+    /// The estimator as a function of the model.
+    fn expectation(&self) -> Expectation<'_> {
+        let cells = DetrendedCells {
+            values: &self.detrended.trusted,
+            cols: self.cols,
+            count: &self.detrended.count,
+            residual: &self.detrended.residual,
+        };
+        Expectation {
+            filter: DetrendFilter::new(self.window, self.cell_m, self.max_lag),
+            partial: PartialWindows::new(&cells, self.window, self.cell_m, &self.bins),
+            bins: &self.bins,
+            threshold_m: self.trimmed.threshold_m,
+            cells: self.trimmed.detrended,
+        }
+    }
+
     /// Width of the window, m (the mean of both ways).
     fn window_m(&self) -> f64 {
         let [x, y] = self.window.size_m(self.cell_m);
@@ -235,19 +258,7 @@ impl Case<'_> {
 
     /// Generalised least squares of the model as the estimator sees it.
     fn corrected(&self, naive: &Estimate) -> Estimate {
-        let used: Vec<bool> = self.detrended.residual.iter().map(|r| !r.is_nan()).collect();
-        let cells = DetrendedCells {
-            values: &self.detrended.trusted,
-            cols: self.cols,
-            count: &self.detrended.count,
-            used: &used,
-        };
-        let expectation = Expectation {
-            filter: DetrendFilter::new(&cells, self.window, self.cell_m, self.max_lag),
-            bins: &self.bins,
-            threshold_m: self.trimmed.threshold_m,
-            cells: self.trimmed.detrended,
-        };
+        let expectation = self.expectation();
         let start = [libm::log(1.2 * naive.model.sigma_m), libm::log(1.5 * naive.model.range_m)];
         let mut end = self.search(&start, &expectation, None);
         let mut iterations = end.steps;

@@ -158,14 +158,3 @@ fn prop_threads_change_no_bit() {
     };
     assert!(run(1).iter().zip(&run(4)).all(|(a, b)| a.to_bits() == b.to_bits()));
 }
-
-#[test]
-#[ignore]
-fn probe_clip() {
-    for n in [100, 200, 400, 1000, 2000] {
-        for ratio in [8.0, 10.0, 12.0, 14.0, 16.0] {
-            let spectrum = spectrum::EvenSpectrum::of(&exponential(1.0, 0.1 * n as f64 / ratio), [n, n], 0.1);
-            println!("n {n} L/b {ratio} {:e}", spectrum.negative() / (spectrum.total() + 2.0 * spectrum.negative()));
-        }
-    }
-}

@@ -1,0 +1,388 @@
+//! Partial windows: see [`super::filtered`].
+//!
+//! The window of a cell is cut into blocks, and each block to the rectangle that holds its data. Its share of the data is
+//! exact; it stands at one of its cells, which moves from pair to pair. The two cells of a pair have data, which scattered
+//! holes make more than the share of their block: they stand as points of their own. Where the windows overlap, a cell
+//! lacks data in both or in none: `m^2 = m` adds the variance of m at distance 0, and takes it off at the distances within
+//! the block, whose count is given. So the border, holes of a window's size and scattered cells are accounted
+//! for. Pairs and cells follow a low-discrepancy sequence (Kronecker with powers of the generalised golden ratio: Roberts,
+//! 2018): nothing is random.
+
+use super::Covariance;
+use super::bins::{LagBins, Member, length_m};
+use crate::detrend::BoxWindow;
+use rayon::prelude::*;
+
+/// Pairs with a partial window that are averaged over in each bin (about).
+const PARTIAL_PAIRS: f64 = 2048.0;
+/// Most pairs looked at in each bin.
+const PAIRS_MAX: f64 = 32_768.0;
+/// Blocks along a window for its covariance with a cell.
+const FINE_BLOCKS: usize = 8;
+/// Blocks along a window for its covariance with another window, which is smoother.
+const COARSE_BLOCKS: usize = 4;
+/// Distances kept per cell; between them the covariance is taken as linear, with an error of 5e-4 (cell / b)^2.
+const DISTANCES_PER_CELL: f64 = 16.0;
+
+/// The raster's cells as the detrender saw them.
+pub struct DetrendedCells<'a> {
+    /// Data that entered the moving average; NaN where there was none. Row-major.
+    pub values: &'a [f64],
+    /// Number of columns.
+    pub cols: usize,
+    /// Data in each cell's window.
+    pub count: &'a [u32],
+    /// Residuals; NaN on cells that are not used.
+    pub residual: &'a [f64],
+}
+
+/// What partial windows add to the covariance of the residual in each bin, as weights of the model by distance.
+pub struct PartialWindows {
+    step_m: f64,
+    /// `weights[bin][k]`: weight of the covariance at `k * step_m`.
+    weights: Vec<Vec<f64>>,
+}
+
+impl PartialWindows {
+    /// The weights for the bins of a raster.
+    pub fn new(cells: &DetrendedCells, window: BoxWindow, cell_m: [f64; 2], bins: &LagBins) -> Self {
+        let step_m = cell_m[0].min(cell_m[1]) / DISTANCES_PER_CELL;
+        let centres = centres(cells, window.area() as u32);
+        if centres.is_empty() {
+            return Self { step_m, weights: vec![Vec::new(); bins.len()] };
+        }
+        let sampler = Sampler { cells, window, cell_m, data: DataCount::new(cells) };
+        let [rows, cols] = window.cells().map(|w| w as isize);
+        let lag_max_m = bins.members.iter().map(|m| length_m(m.lag, cell_m)).fold(0.0, f64::max);
+        let distances = ((lag_max_m + length_m([rows, cols], cell_m)) / step_m) as usize + 2;
+        let members: Vec<&[Member]> = bins.members.chunk_by(|a, b| a.bin == b.bin).collect();
+        let weights = members.into_par_iter().enumerate().map(|(bin, members)| {
+            let draws = centres.iter().enumerate().map(|(s, &cell)| (cell, Draw { index: s * bins.len() + bin }));
+            sampler.mean_weights(draws, members, Line { step_m, weights: vec![0.0; distances] })
+        });
+        Self { step_m, weights: weights.collect() }
+    }
+
+    /// What is added in each bin for a model, m2.
+    pub fn correction(&self, model: &Covariance) -> Vec<f64> {
+        let distances = self.weights.iter().map(Vec::len).max().unwrap_or(0);
+        let covariance: Vec<f64> = (0..distances).map(|k| model.at(k as f64 * self.step_m)).collect();
+        self.weights.iter().map(|line| line.iter().zip(&covariance).map(|(w, c)| w * c).sum()).collect()
+    }
+}
+
+/// First cells of the pairs, spread evenly over the cells used: the more, the fewer windows are partial; none when all
+/// are complete.
+fn centres(cells: &DetrendedCells, area: u32) -> Vec<usize> {
+    let used = || (0..cells.residual.len()).filter(|&k| !cells.residual[k].is_nan());
+    let (total, partial) = (used().count(), used().filter(|&k| cells.count[k] < area).count());
+    if partial == 0 {
+        return Vec::new();
+    }
+    let samples = (PARTIAL_PAIRS * total as f64 / partial as f64).min(PAIRS_MAX) as usize;
+    let mut ranks: Vec<usize> = (0..samples).map(|index| Draw { index }.below(5, total)).collect();
+    ranks.sort_unstable();
+    let mut wanted = ranks.into_iter().peekable();
+    let mut centres = Vec::with_capacity(samples);
+    for (rank, cell) in used().enumerate() {
+        while wanted.next_if_eq(&rank).is_some() {
+            centres.push(cell);
+        }
+    }
+    centres
+}
+
+/// Weights by distance.
+struct Line {
+    step_m: f64,
+    weights: Vec<f64>,
+}
+
+impl Line {
+    /// Adds a weight at a distance, shared between the two neighbouring nodes.
+    fn add(&mut self, distance_m: f64, weight: f64) {
+        let position = distance_m / self.step_m;
+        let node = position as usize;
+        let part = position - node as f64;
+        if let [near, far] = &mut self.weights[node..node + 2] {
+            *near += weight * (1.0 - part);
+            *far += weight * part;
+        }
+    }
+}
+
+/// A block of a window, or one of the pair's cells.
+#[derive(Clone, Copy)]
+struct Part {
+    /// Share of the moving average's weight.
+    share: f64,
+    /// Offset of the cell it stands at.
+    offset: [isize; 2],
+    /// Share when the window is complete.
+    complete_share: f64,
+    /// Offset of the cell it stands at when the window is complete.
+    complete_offset: [isize; 2],
+    /// Number of cells times the variance of `D_i` in them.
+    scatter: f64,
+    /// Distance between two of its cells, m.
+    spread_m: f64,
+}
+
+impl Part {
+    /// True when it stands at the same cell as in a complete window.
+    fn in_place(&self) -> bool {
+        self.offset == self.complete_offset
+    }
+}
+
+struct Sampler<'a> {
+    cells: &'a DetrendedCells<'a>,
+    window: BoxWindow,
+    cell_m: [f64; 2],
+    data: DataCount,
+}
+
+impl Sampler<'_> {
+    /// Mean over the pairs that start at the drawn cells.
+    fn mean_weights(&self, draws: impl Iterator<Item = (usize, Draw)>, members: &[Member], mut line: Line) -> Vec<f64> {
+        let mut pairs = 0;
+        for (cell, draw) in draws {
+            let lag = members[draw.below(0, members.len())].lag;
+            pairs += usize::from(self.add_pair(cell, lag, &draw, &mut line));
+        }
+        line.weights.iter_mut().for_each(|w| *w /= pairs.max(1) as f64);
+        line.weights
+    }
+
+    /// Adds the pair of `cell` and the cell a lag away; false when that one is not used.
+    fn add_pair(&self, cell: usize, lag: [isize; 2], draw: &Draw, line: &mut Line) -> bool {
+        let at = [cell / self.cells.cols, cell % self.cells.cols].map(|k| k as isize);
+        let partner = [at[0] + lag[0], at[1] + lag[1]];
+        let Some(second) = self.index(partner).filter(|&k| !self.cells.residual[k].is_nan()) else { return false };
+        let counts = [self.cells.count[cell], self.cells.count[second]];
+        if counts.iter().any(|&n| (n as usize) < self.window.area()) {
+            let shifts = [[draw.unit(1), draw.unit(2)], [draw.unit(3), draw.unit(4)]];
+            let back = lag.map(|l| -l);
+            let windows = |blocks| {
+                [
+                    self.parts(at, counts[0], lag, blocks, shifts[0]),
+                    self.parts(partner, counts[1], back, blocks, shifts[1]),
+                ]
+            };
+            self.add_cell_window(lag, &windows(FINE_BLOCKS), line);
+            self.add_window_window(lag, &windows(COARSE_BLOCKS), line);
+        }
+        true
+    }
+
+    /// `- D_i(j) C(h - j) - D_(i+h)(k) C(h + k)`, less the same of complete windows.
+    fn add_cell_window(&self, lag: [isize; 2], [near, far]: &[Vec<Part>; 2], line: &mut Line) {
+        for (parts, sign) in [(near, -1), (far, 1)] {
+            for p in parts {
+                let distance = |o: [isize; 2]| length_m([lag[0] + sign * o[0], lag[1] + sign * o[1]], self.cell_m);
+                line.add(distance(p.offset), -p.share);
+                line.add(distance(p.complete_offset), p.complete_share);
+            }
+        }
+    }
+
+    /// `D_i(j) D_(i+h)(k) C(h + k - j)`, less the same of complete windows.
+    fn add_window_window(&self, lag: [isize; 2], [near, far]: &[Vec<Part>; 2], line: &mut Line) {
+        let half = self.window.half.map(|h| h as isize);
+        let distance =
+            |n: [isize; 2], f: [isize; 2]| length_m([lag[0] + f[0] - n[0], lag[1] + f[1] - n[1]], self.cell_m);
+        for n in near {
+            for f in far {
+                let (share, complete) = (n.share * f.share, n.complete_share * f.complete_share);
+                if n.in_place() && f.in_place() {
+                    line.add(distance(n.offset, f.offset), share - complete);
+                } else {
+                    line.add(distance(n.offset, f.offset), share);
+                    line.add(distance(n.complete_offset, f.complete_offset), -complete);
+                }
+            }
+            if (0..2).all(|k| (n.offset[k] - lag[k]).abs() <= half[k]) {
+                line.add(0.0, n.scatter);
+                line.add(n.spread_m, -n.scatter);
+            }
+        }
+    }
+
+    /// The parts of the window of the cell `at`, which has data as the cell `other` away has: its blocks, `blocks` each
+    /// way, at cells given by `shift`, and the two cells.
+    fn parts(&self, at: [isize; 2], count: u32, other: [isize; 2], blocks: usize, shift: [f64; 2]) -> Vec<Part> {
+        let known: &[[isize; 2]] = if other == [0, 0] { &[[0, 0]] } else { &[[0, 0], other] };
+        let axes = [0, 1].map(|axis| Axis::new(self.window.half[axis], blocks));
+        let cell_share = 1.0 / f64::from(count);
+        let mut parts = Vec::with_capacity(blocks * blocks + 2);
+        for index in 0..axes[0].blocks * axes[1].blocks {
+            let whole = [axes[0].span(index / axes[1].blocks), axes[1].span(index % axes[1].blocks)];
+            let place = [0, 1].map(|k| fraction(shift[k] + index as f64 * LATTICE[k]));
+            let (filled, data) = self.data.shrink(at, whole);
+            let here = known.iter().filter(|cell| (0..2).all(|k| (filled[k][0]..filled[k][1]).contains(&cell[k])));
+            let known_count = here.clone().count() as f64;
+            let others = cells(filled) - known_count;
+            let density = if others > 0.0 { (f64::from(data) - known_count) / others } else { 1.0 };
+            let offset = [0, 1].map(|k| point(filled[k], place[k]));
+            let mate = [0, 1].map(|k| point(filled[k], fraction(place[k] + MATE_STEPS * LATTICE[k])));
+            parts.push(Part {
+                share: density * cells(filled) * cell_share,
+                offset,
+                complete_share: cells(whole) / self.window.area() as f64,
+                complete_offset: [0, 1].map(|k| point(whole[k], place[k])),
+                scatter: scatter(density, cells(filled)) * cell_share * cell_share,
+                spread_m: length_m([offset[0] - mate[0], offset[1] - mate[1]], self.cell_m),
+            });
+            let share = (1.0 - density) * cell_share;
+            parts.extend(here.map(|&offset| Part {
+                share,
+                offset,
+                complete_share: 0.0,
+                complete_offset: offset,
+                scatter: 0.0,
+                spread_m: 0.0,
+            }));
+        }
+        parts
+    }
+
+    /// Index of a cell, `None` beyond the raster.
+    fn index(&self, [row, col]: [isize; 2]) -> Option<usize> {
+        let rows = self.cells.values.len() / self.cells.cols;
+        let inside = row >= 0 && col >= 0 && row < rows as isize && col < self.cells.cols as isize;
+        inside.then(|| row as usize * self.cells.cols + col as usize)
+    }
+}
+
+/// 1 / g and 1 / g^2 of the plastic number g: a lattice in the square.
+const LATTICE: [f64; 2] = [0.754_877_666_246_692_7, 0.569_840_290_998_053_2];
+
+/// Number of cells times the variance of `m` in a block whose count is given.
+fn scatter(density: f64, cells: f64) -> f64 {
+    if cells > 1.0 { density * (1.0 - density) * cells * cells / (cells - 1.0) } else { 0.0 }
+}
+
+/// Lattice steps to a second cell of a block.
+const MATE_STEPS: f64 = 37.0;
+
+/// Rows and columns `from..to`, as offsets from a cell.
+type Rectangle = [[isize; 2]; 2];
+
+fn cells([rows, cols]: Rectangle) -> f64 {
+    ((rows[1] - rows[0]) * (cols[1] - cols[0])) as f64
+}
+
+/// The offset at a fraction of a span.
+fn point([from, to]: [isize; 2], fraction: f64) -> isize {
+    from + (fraction * (to - from) as f64) as isize
+}
+
+/// A window's offsets along one axis, cut into blocks.
+struct Axis {
+    half: isize,
+    width: usize,
+    blocks: usize,
+}
+
+impl Axis {
+    fn new(half: usize, blocks: usize) -> Self {
+        let width = 2 * half + 1;
+        Self { half: half as isize, width, blocks: blocks.min(width) }
+    }
+
+    /// Offsets of a block, `from..to`.
+    fn span(&self, block: usize) -> [isize; 2] {
+        [block, block + 1].map(|k| (k * self.width / self.blocks) as isize - self.half)
+    }
+}
+
+/// Number of cells with data in any rectangle, from sums over all cells above and to the left (Crow, 1984).
+struct DataCount {
+    rows: isize,
+    cols: isize,
+    sums: Vec<u32>,
+}
+
+impl DataCount {
+    fn new(cells: &DetrendedCells) -> Self {
+        let cols = cells.cols;
+        let stride = cols + 1;
+        let mut sums = vec![0; stride];
+        for (r, line) in cells.values.chunks_exact(cols).enumerate() {
+            let mut data = 0;
+            sums.push(0);
+            for (c, value) in line.iter().enumerate() {
+                data += u32::from(!value.is_nan());
+                sums.push(data + sums[r * stride + c + 1]);
+            }
+        }
+        Self { rows: (cells.values.len() / cols) as isize, cols: cols as isize, sums }
+    }
+
+    /// Cells with data in the rows and columns `from..to`; cells beyond the raster have none.
+    fn within(&self, [rows, cols]: Rectangle) -> u32 {
+        let [top, bottom] = rows.map(|r| r.clamp(0, self.rows));
+        let [left, right] = cols.map(|c| c.clamp(0, self.cols));
+        let at = |r: isize, c: isize| self.sums[(r * (self.cols + 1) + c) as usize];
+        at(bottom, right) + at(top, left) - at(top, right) - at(bottom, left)
+    }
+
+    /// The smallest rectangle in the block about the cell `at` that holds the block's data, and how much that is. A block
+    /// without data is left as it is.
+    fn shrink(&self, at: [isize; 2], block: Rectangle) -> (Rectangle, u32) {
+        let count = |r: Rectangle| self.within([0, 1].map(|k| r[k].map(|s| at[k] + s)));
+        let data = count(block);
+        let mut filled = block;
+        if data == 0 || f64::from(data) == cells(block) {
+            return (filled, data);
+        }
+        for axis in 0..2 {
+            let [from, to] = block[axis];
+            let with = |span: [isize; 2]| if axis == 0 { [span, filled[1]] } else { [filled[0], span] };
+            let first = bisect(from, to - 1, |s| count(with([s + 1, to])) < data);
+            let last = bisect(first, to - 1, |s| count(with([first, s + 1])) == data);
+            filled[axis] = [first, last + 1];
+        }
+        (filled, data)
+    }
+}
+
+/// First of `from..=last` where `holds` turns true, and `last` when it does nowhere before.
+fn bisect(mut from: isize, mut last: isize, holds: impl Fn(isize) -> bool) -> isize {
+    while from < last {
+        let middle = from + (last - from) / 2;
+        if holds(middle) { last = middle } else { from = middle + 1 }
+    }
+    from
+}
+
+/// Point of a Kronecker sequence in six dimensions.
+struct Draw {
+    index: usize,
+}
+
+impl Draw {
+    /// Coordinate in [0, 1).
+    fn unit(&self, dimension: usize) -> f64 {
+        /// Powers 1 to 6 of 1 / g, g^7 = g + 1.
+        const STEPS: [f64; 6] = [
+            0.898_653_712_628_699_2,
+            0.807_578_495_221_344_7,
+            0.725_733_412_969_759_7,
+            0.652_183_025_943_971_5,
+            0.586_086_697_577_967_9,
+            0.526_688_986_700_735_7,
+        ];
+        fraction(0.5 + self.index as f64 * STEPS[dimension])
+    }
+
+    /// Integer below `n`.
+    fn below(&self, dimension: usize, n: usize) -> usize {
+        (self.unit(dimension) * n as f64) as usize
+    }
+}
+
+/// Part of a positive number after the point.
+fn fraction(x: f64) -> f64 {
+    x - x.floor()
+}
