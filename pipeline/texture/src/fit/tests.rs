@@ -103,21 +103,31 @@ fn val_paper_mode_has_the_published_bias() {
     assert_bias("paper 1 m", study(1.0, 512, 6, &s, untouched), [-0.43, -0.76], [0.02; 2]);
 }
 
-/// Acceptance 1 of the specification. Null: no bias. 200 fields at b = 0.28 m: standard errors 0.07 % and 0.16 %, so
-/// limits of 0.5 % and 1 % are six or seven of them (false alarm below 1e-8); 600 fields at b = 1 m and a 2 m window:
-/// 0.18 % and 0.38 %, limits of 1 % and 2 % above five (4e-7).
+/// Acceptance 1 of the specification, b = 0.28 m. Null: no bias. 200 fields: standard errors 0.07 % and 0.16 %, with 10 %
+/// trimmed 0.08 % and 0.18 %; limits of 0.5 % and 1 % are at least five of them (false alarm below 6e-7).
 #[test]
 #[ignore = "slow: ./test --full"]
 fn stat_corrected_fit_is_unbiased() {
-    let holes: [(&str, Spoil); 3] = [("", untouched), (", scattered", scattered), (", blocky", blocky)];
-    for (name, spoil) in holes {
-        for (window, trim) in [(2.0, 0.05), (1.0, 0.05), (4.0, 0.05), (2.0, 0.01), (2.0, 0.1)] {
-            let found = study(0.28, 512, 200, &settings(Mode::Corrected, window, trim), spoil);
-            assert_bias(&format!("b 0.28 m, window {window} m, trim {trim}{name}"), found, [0.0; 2], [0.005, 0.01]);
-        }
-        let found = study(1.0, 512, 600, &settings(Mode::Corrected, 2.0, 0.05), spoil);
-        assert_bias(&format!("b 1 m, window 2 m, trim 0.05{name}"), found, [0.0; 2], [0.01, 0.02]);
-    }
+    let check = |name: &str, window, trim, spoil| {
+        let found = study(0.28, 512, 200, &settings(Mode::Corrected, window, trim), spoil);
+        assert_bias(name, found, [0.0; 2], [0.005, 0.01]);
+    };
+    check("b 0.28 m", 2.0, 0.05, untouched);
+    check("b 0.28 m, window 1 m", 1.0, 0.05, untouched);
+    check("b 0.28 m, window 4 m", 4.0, 0.05, untouched);
+    check("b 0.28 m, trim 1 %", 2.0, 0.01, untouched);
+    check("b 0.28 m, trim 10 %", 2.0, 0.1, untouched);
+    check("b 0.28 m, 20 % scattered no-data", 2.0, 0.05, scattered);
+    check("b 0.28 m, 20 % blocky no-data", 2.0, 0.05, blocky);
+}
+
+/// Acceptance 1, b = 1 m at a window of 2 m. Null: no bias. 600 fields: standard errors 0.18 % and 0.38 %, so limits of
+/// 1 % and 2 % are above five of them (4e-7).
+#[test]
+#[ignore = "slow: ./test --full"]
+fn stat_corrected_fit_is_unbiased_near_the_window() {
+    let found = study(1.0, 512, 600, &settings(Mode::Corrected, 2.0, 0.05), untouched);
+    assert_bias("b 1 m", found, [0.0; 2], [0.01, 0.02]);
 }
 
 /// Acceptance 4. Null: trees are taken out without a trace. 200 fields: standard errors 0.07 % and 0.16 %.
@@ -136,6 +146,7 @@ fn stat_trees_do_not_enter() {
 fn stat_corrected_fit_is_efficient() {
     for (range_m, bound) in [(0.28, [0.0078, 0.0162]), (1.0, [0.0275, 0.0553])] {
         let found = study(range_m, 512, 200, &settings(Mode::Corrected, 2.0, 0.05), untouched);
+        println!("b {range_m} m: scatter {:.4} {:.4}", found[0][1], found[1][1]);
         for k in 0..2 {
             assert!(found[k][1] <= 2.0 * bound[k], "b {range_m} m: {found:?}, bound {bound:?}");
         }
