@@ -2,11 +2,11 @@
 //!
 //! `z = IDFT[ sqrt(lambda M) Q ]`, `lambda = DFT(C)` the spectrum of the covariance C on a torus of M cells, every lag
 //! taken the short way round, and Q random with `Q(-k)` the conjugate of `Q(k)`:
-//! * `phase = "unit"`: `Q = exp(i theta)`, theta uniform ([P], section 3.3). The covariance of the field on the torus,
+//! * `phase = "unit"`: `Q = exp(i theta)`, theta uniform (\[P\], section 3.3). The covariance of the field on the torus,
 //!   `1 / M * sum of z(i) z(i + h)`, is C(h) in every realisation.
 //! * `phase = "gaussian"`: Q complex normal. The field is a normal one, and its covariance is C on average only.
 //!
-//! Source: [P] = Vecherin et al. 2022, Eqs. 11 and 12; Oliver 1995, Mathematical Geology 27, 939. Departures from [P]:
+//! Source: \[P\] = Vecherin et al. 2022, Eqs. 11 and 12; Oliver 1995, Mathematical Geology 27, 939. Departures from \[P\]:
 //! * the spectrum is the DFT of the covariance, not Eq. 10 sampled: Eq. 10 lacks a factor 2 pi under the paper's own
 //!   Eqs. 8 and 11, and sampled at the wavenumbers of a grid it loses 2 to 10 % of the variance;
 //! * the mean over the tile is not removed: the mode at k = 0 belongs to the covariance.
