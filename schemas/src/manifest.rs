@@ -30,6 +30,9 @@ pub struct Manifest {
     pub artifacts: Vec<Artifact>,
     /// Items that failed, by stage and item.
     pub failed: Vec<FailedItem>,
+    /// Sentences that readers of an item's files must know, in order of the items.
+    #[serde(default)]
+    pub notes: Vec<ItemNote>,
 }
 
 /// One file of a release.
@@ -67,6 +70,18 @@ pub struct Origin {
     /// Words of its random streams, joined by `/`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stream: Option<String>,
+}
+
+/// A sentence about an item: a conversion, a rounded size, a warning of a fit.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ItemNote {
+    /// Stage.
+    pub stage: String,
+    /// Item of that stage.
+    pub item: String,
+    /// The sentence.
+    pub note: String,
 }
 
 /// An item that failed.

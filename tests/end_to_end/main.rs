@@ -169,6 +169,43 @@ fn val_sha256sum_reads_the_sums() {
     assert_eq!(call.code, 0, "{}{}", call.stdout, call.stderr);
 }
 
+/// Changes one bit in the middle of a file.
+fn flip(path: &Path) {
+    let mut bytes = fs::read(path).unwrap();
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 1;
+    fs::write(path, bytes).unwrap();
+}
+
+/// A result that was changed in the work area is found, dropped, and made again by the next run.
+#[test]
+fn val_a_changed_result_is_not_sealed() {
+    let folder = area();
+    release_in(folder.path());
+    let whole = sums(&folder.path().join("release"));
+    let item = folder.path().join("release.work/items/terrain/smooth");
+    flip(&fs::read_dir(item).unwrap().next().unwrap().unwrap().path().join("heights.tif"));
+    let call = sastrugi_in(folder.path(), &["run", "study.toml", "-o", "release", "--quiet"]);
+    assert!(call.code == 1 && call.stderr.contains("terrain/smooth"), "{} {}", call.code, call.stderr);
+    release_in(folder.path());
+    assert_eq!(sums(&folder.path().join("release")), whole);
+}
+
+/// Nothing is written into a sealed release, by whatever name it is called.
+#[test]
+fn val_a_sealed_release_stays_sealed() {
+    let folder = area();
+    release_in(folder.path());
+    std::os::unix::fs::symlink(folder.path().join("release"), folder.path().join("link")).unwrap();
+    for output in ["release/new", "other/../release/new", "link/new"] {
+        let call = sastrugi_in(folder.path(), &["report", "release", "-o", output, "--quiet"]);
+        assert_eq!(call.code, 2, "{output}: {}", call.stderr);
+    }
+    let inside = ["run", "study.toml", "-o", "release", "--work", "release/work", "--quiet"];
+    assert_eq!(sastrugi_in(folder.path(), &inside).code, 2);
+    assert_eq!(sastrugi_in(folder.path(), &["verify", "release", "--quiet"]).code, 0);
+}
+
 /// Shards that do not fit together are refused with the reason.
 #[test]
 fn val_merge_refuses_what_does_not_fit() {
@@ -195,6 +232,6 @@ fn val_merge_refuses_what_does_not_fit() {
     refused(&["a", "a"], "both shard 1");
     refused(&["a", "c"], "another study");
     let record = fs::read_dir(path.join("b/items/terrain")).unwrap().next().unwrap().unwrap().path();
-    fs::remove_file(record.join("heights.tif")).unwrap();
+    flip(&record.join("heights.tif"));
     refused(&["a", "b"], "missing or damaged");
 }

@@ -3,7 +3,7 @@
 //!
 //! * [`questions`]: one folder per question that the page answers (query, figure, table), listed in one registry.
 //! * [`papers`]: published figures as data.
-//! * [`render`]: drawing, which knows nothing of what it draws.
+//! * [`mod@render`]: drawing, which knows nothing of what it draws.
 //! * [`data`]: the only way to the release's rows and files.
 //!
 //! No kernel runs here: spectra, histograms, covariances, backgrounds, residuals and class maps are read as a stage

@@ -36,7 +36,7 @@ fn refuse_arguments(error: &clap::Error) -> ExitCode {
 
 /// Every file appears whole or not at all, so the process may end here and now.
 fn interrupted() {
-    eprintln!("\nsastrugi: interrupted; what is finished is kept, the same command goes on from there");
+    eprintln!("\nsastrugi: interrupted; nothing half-written bears its name, and a run goes on from what it finished");
     std::process::exit(i32::from(Code::Retry as u8));
 }
 

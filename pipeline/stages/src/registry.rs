@@ -53,6 +53,9 @@ const SECTIONS: [Section; 6] = [
     },
 ];
 
+/// Endings that files of the release have beside an id.
+const RESERVED: [&str; 4] = [".raw", ".metric", ".background", ".residual"];
+
 /// Names of the sections that are arrays of tables.
 pub fn section_names() -> Vec<&'static str> {
     SECTIONS.iter().map(|s| s.name).collect()
@@ -139,6 +142,8 @@ pub struct Heightfield {
     pub stream: Option<String>,
     /// Its path in the release.
     pub release_path: String,
+    /// Number of cells; for a measured DEM, which is not read before the run, as many as its file may hold.
+    pub cells: u64,
 }
 
 /// A graph under construction, with what later sections refer to.
@@ -174,6 +179,11 @@ impl Builder<'_> {
     /// # Errors
     /// When it is taken.
     pub fn claim(&mut self, entry: &Entry<'_>, section: &'static str, id: &str) -> Result<(), StudyError> {
+        if let Some(ending) = RESERVED.into_iter().find(|ending| id.ends_with(ending)) {
+            return Err(
+                entry.error("id", format!("the id \"{id}\" ends in {ending}, which names files of the release"))
+            );
+        }
         match self.ids.insert(id.to_owned(), section) {
             None => Ok(()),
             Some(other) => {

@@ -54,6 +54,9 @@ pub fn load_text(text: &str, name: &str, folder: &Path) -> Result<Loaded, Error>
         error,
     })?;
     let plan = registry::build(&study).map_err(|error| of_build(name, text, error))?;
+    if plan.graph.is_empty() {
+        return Err(Error::Usage(format!("{name}: the study has no items; add [[terrain]], [[dem]] ...")));
+    }
     let released = released_text(text, &plan);
     Ok(Loaded { study, graph: plan.graph, released })
 }
@@ -157,6 +160,35 @@ fn check_destination(request: &RunRequest<'_>) -> Result<(), Error> {
             Err(Error::Usage(format!("{}: is a file; -o names a folder", request.output.display())))
         }
         _ => Ok(()),
+    }?;
+    let inside = request.work.is_some_and(|work| resolved(work).starts_with(resolved(request.output)));
+    if inside {
+        return Err(Error::Usage(
+            "the work area lies inside of the output, which is replaced as a whole; name another --work".to_owned(),
+        ));
+    }
+    if resolved(request.output) == resolved(Path::new(".")) {
+        return Err(Error::Usage("the output is the current folder; name a folder to make with -o".to_owned()));
+    }
+    Ok(())
+}
+
+/// A path with links and dots resolved as far as it exists.
+pub fn resolved(path: &Path) -> PathBuf {
+    let absolute = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+    let mut missing = Vec::new();
+    let mut at = absolute.as_path();
+    loop {
+        if let Ok(real) = at.canonicalize() {
+            return missing.iter().rev().fold(real, |path: PathBuf, name| path.join(name));
+        }
+        match (at.parent(), at.file_name()) {
+            (Some(parent), Some(name)) => {
+                missing.push(name.to_owned());
+                at = parent;
+            }
+            _ => return absolute,
+        }
     }
 }
 
@@ -278,8 +310,8 @@ pub fn verify(
         return Ok(verification);
     }
     let loaded = load(&folder.join("study.toml"))?;
-    let scratch = default_work(&folder.with_extension("verify"));
-    let _cleared = Scratch::new(&scratch)?;
+    let holder = Scratch::new()?;
+    let scratch = holder.0.clone();
     match recompute {
         Recompute::All => recompute_all(&release, &loaded, &scratch, limits, progress, &mut verification)?,
         Recompute::Some(count) => {
@@ -294,26 +326,23 @@ fn problem_text(kind: ProblemKind, message: &str) -> String {
     if message.is_empty() { kind } else { format!("{kind}: {message}") }
 }
 
-/// A folder that is gone when its holder is.
+/// A folder of this process alone, gone with its holder.
 struct Scratch(PathBuf);
 
 impl Scratch {
-    fn new(path: &Path) -> Result<Self, Error> {
-        let scratch = Self(path.to_owned());
-        scratch.clear();
-        fs::create_dir_all(path).map_err(|e| Error::failed(format!("{}: {e}", path.display())))?;
-        Ok(scratch)
-    }
-
-    fn clear(&self) {
-        // What cannot be removed is cleared by the next run.
-        let _ = fs::remove_dir_all(&self.0);
+    fn new() -> Result<Self, Error> {
+        let path = std::env::temp_dir().join(format!("sastrugi-verify-{}", std::process::id()));
+        // Left by a killed process that had the same number.
+        let _ = fs::remove_dir_all(&path);
+        fs::create_dir(&path).map_err(|e| Error::failed(format!("{}: {e}", path.display())))?;
+        Ok(Self(path))
     }
 }
 
 impl Drop for Scratch {
     fn drop(&mut self) {
-        self.clear();
+        // What cannot be removed lies in the folder for temporary files.
+        let _ = fs::remove_dir_all(&self.0);
     }
 }
 
@@ -362,14 +391,23 @@ fn recompute_some(
     by_key.sort_by_key(|&p| graph.key(p).to_owned());
     let chosen: Vec<usize> = by_key.into_iter().take(count).collect();
     let cache = Cache::open(scratch)?;
-    execute(graph, &cache, &graph.closure(chosen.iter().copied()), limits, progress);
+    let execution = execute(graph, &cache, &graph.closure(chosen.iter().copied()), limits, progress);
+    let failed_there: Vec<ItemRef> =
+        release.manifest().failed.iter().map(|f| ItemRef::new(&f.stage, &f.item)).collect();
+    let unexpected = execution.failures.iter().filter(|f| !failed_there.contains(&f.item));
+    verification.differences.extend(
+        unexpected.map(|f| Difference {
+            path: f.item.to_string(),
+            problem: format!("cannot be computed again: {}", f.message),
+        }),
+    );
     let there: BTreeMap<&str, &str> =
         release.manifest().artifacts.iter().map(|a| (a.path.as_str(), a.sha256.as_str())).collect();
     for position in chosen {
         let item = &graph.node(position).item;
+        let Some(record) = cache.load(item, graph.key(position)) else { continue };
         verification.recomputed.push(item.to_string());
-        let files = cache.load(item, graph.key(position)).map(|r| r.files).unwrap_or_default();
-        for file in files {
+        for file in record.files {
             let Some(path) = file.product.release_path else { continue };
             if there.get(path.as_str()) != Some(&file.sha256.as_str()) {
                 verification

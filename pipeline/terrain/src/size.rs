@@ -5,8 +5,8 @@ use sastrugi_schemas::ParameterError;
 
 /// Fewest cells along a side.
 const MIN_SIDE_PX: u32 = 3;
-/// Most cells of a heightfield (32 GiB of heights).
-const MAX_CELLS: u64 = 1 << 32;
+/// Most cells of a heightfield: 2 GiB of heights, as many as can be read back.
+const MAX_CELLS: u64 = 1 << 28;
 /// A quotient this near to an integer is that integer.
 const INTEGER_TOLERANCE: f64 = 1e-6;
 

@@ -1,8 +1,8 @@
 //! Texture of a measured surface, and synthetic texture that matches it.
 //!
 //! A DEM is split at an outer scale into a background (moving average) and a residual; the residual's covariance is
-//! estimated from every pair of cells with data and a covariance model is fitted to it ([`fit`]); random fields with
-//! that covariance are made ([`synth`]) and laid onto base terrains ([`onto`]).
+//! estimated from every pair of cells with data and a covariance model is fitted to it ([`mod@fit`]); random fields with
+//! that covariance are made ([`synth`]) and laid onto base terrains ([`onto()`]).
 //!
 //! Source: Vecherin, Meyer, Quinn, Letcher and Parker, Simulation of snow texture for autonomous vehicle numerical
 //! modeling, GVSETS 2022; see `docs/papers/vecherin.md` for where we depart from it and why.

@@ -78,8 +78,8 @@ fn finish_run(common: &Common, run: impl FnOnce(&Teller) -> Result<RunSummary, F
 pub fn plan(args: &Plan, common: &Common) -> Verdict {
     let loaded = studies::load(&args.study)?;
     let plan = studies::plan_of(&loaded, &args.place.output, args.place.work.as_deref())?;
-    let total_seconds: f64 = plan.stale.iter().map(|s| s.seconds).sum();
-    let total_bytes: f64 = plan.stale.iter().map(|s| s.bytes).sum();
+    let total_seconds = plan.stale.iter().fold(0.0, |sum, s| sum + s.seconds);
+    let total_bytes = plan.stale.iter().fold(0.0, |sum, s| sum + s.bytes);
     let mut text = format!(
         "{} items, {} ready, {} to compute: about {} on one core, about {} of artifacts",
         plan.items,
@@ -134,8 +134,7 @@ fn parse_recompute(text: &str) -> Result<Recompute, Failure> {
 /// `report`.
 pub fn report(args: &Report, common: &Common) -> Verdict {
     let output = args.output.clone().unwrap_or_else(|| default_report(&args.release));
-    let inside = |p: &Path| std::path::absolute(p).unwrap_or_else(|_| p.to_owned());
-    if inside(&output).starts_with(inside(&args.release)) {
+    if studies::resolved(&output).starts_with(studies::resolved(&args.release)) {
         let message = "the report cannot go into the release, which is sealed; name a folder beside it with -o";
         return Err(Failure::usage(message));
     }

@@ -21,6 +21,11 @@ struct DemJob {
     path: PathBuf,
     extension: String,
     bytes: u64,
+    sha256: String,
+    /// Path of the original in the release.
+    original: String,
+    /// Coordinate system beside an ESRI ASCII grid, when there is one.
+    sidecar: Option<PathBuf>,
 }
 
 /// Adds the items of `[[dem]]`.
@@ -35,9 +40,12 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
         check(&item).map_err(|(key, message)| entry.error(key, format!("`{key}` {message}")))?;
         let input = input_file(builder.study.folder.join(&item.file))?;
         let extension = extension(&item.file);
-        let release_path = format!("dem/{}.{extension}", item.id);
-        builder.inputs.push(InputPlace { index, release_path });
+        let original = original_path(&item.id, &item.file, &extension);
+        builder.inputs.push(InputPlace { index, release_path: original.clone() });
+        let sidecar = sidecar(&input.path, &extension);
+        let side_input = sidecar.clone().map(input_file).transpose()?;
         let id = item.id.clone();
+        let bytes = std::fs::metadata(&input.path).map_or(0, |m| m.len());
         let field = Heightfield {
             item: ItemRef::new(STAGE, &id),
             group: item.group.clone(),
@@ -45,13 +53,21 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
             parameters: recipe(&item),
             stream: None,
             release_path: format!("dem/{id}.metric.tif"),
+            cells: bytes,
         };
-        let bytes = std::fs::metadata(&input.path).map_or(0, |m| m.len());
-        let job = DemJob { item, path: input.path.clone(), extension, bytes };
+        let job = DemJob {
+            item,
+            path: input.path.clone(),
+            extension,
+            bytes,
+            sha256: input.sha256.clone(),
+            original,
+            sidecar,
+        };
         let node = Node {
             item: field.item.clone(),
             parents: Vec::new(),
-            inputs: vec![input],
+            inputs: [input].into_iter().chain(side_input).collect(),
             stream: None,
             job: Box::new(job),
         };
@@ -86,14 +102,27 @@ fn extension(file: &str) -> String {
     if plain { ending } else { "dat".to_owned() }
 }
 
-/// What decides the result beside the bytes of the file, whose name and place do not.
+/// Where the original goes in the release: an .hgt tile keeps its name, which says where it lies.
+fn original_path(id: &str, file: &str, extension: &str) -> String {
+    match Path::new(file).file_name().and_then(|n| n.to_str()) {
+        Some(name) if extension == "hgt" => format!("dem/{id}/{name}"),
+        _ => format!("dem/{id}.{extension}"),
+    }
+}
+
+/// The .prj file beside an ESRI ASCII grid, which says whether it is geographic.
+fn sidecar(path: &Path, extension: &str) -> Option<PathBuf> {
+    Some(path.with_extension("prj")).filter(|prj| extension == "asc" && prj.is_file())
+}
+
+/// What decides the result beside the bytes of the files. The name counts for .hgt alone (see [`DemJob::recipe`]).
 fn recipe(item: &DemItem) -> Value {
     json!({ "window": item.window, "cell_m": item.cell_m, "license": item.license, "attribution": item.attribution })
 }
 
 impl Job for DemJob {
     fn recipe(&self) -> Value {
-        json!({ "extension": self.extension, "item": recipe(&self.item) })
+        json!({ "original": self.original, "item": recipe(&self.item) })
     }
 
     fn rooms(&self) -> &'static [Room] {
@@ -115,13 +144,21 @@ impl Job for DemJob {
             .map_err(JobError::new)?;
         let original = format!("original.{}", self.extension);
         let bytes = std::fs::read(&self.path).map_err(|e| JobError::input(format!("{}: {e}", self.path.display())))?;
+        if digest::of_bytes(&bytes) != self.sha256 {
+            return Err(JobError::input(format!("{}: the file changed during the run", self.path.display())));
+        }
         atomic::write(&work.output(&original), &bytes).map_err(JobError::new)?;
         let id = &self.item.id;
         let content = digest::heights(&metric.grid);
-        let products = vec![
+        let mut products = vec![
             Product::released(HEIGHTS, format!("dem/{id}.metric.tif"), Some(content)),
-            Product::released(&original, format!("dem/{id}.{}", self.extension), None),
+            Product::released(&original, self.original.clone(), None),
         ];
+        if let Some(prj) = &self.sidecar {
+            let text = std::fs::read(prj).map_err(|e| JobError::input(format!("{}: {e}", prj.display())))?;
+            atomic::write(&work.output("original.prj"), &text).map_err(JobError::new)?;
+            products.push(Product::released("original.prj", format!("dem/{id}.prj"), None));
+        }
         Ok(Outcome { products, notes, ..Outcome::default() })
     }
 }

@@ -42,6 +42,7 @@ struct FitJob {
     dem: ItemRef,
     source: Source,
     settings: FitSettings,
+    cells: u64,
 }
 
 /// Adds the items of `[[fit]]`.
@@ -66,6 +67,7 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
                 dem: field.item.clone(),
                 source: source.clone(),
                 settings,
+                cells: field.cells,
             };
             let item = ItemRef::new(STAGE, &one.id);
             let node =
@@ -87,7 +89,8 @@ impl Job for FitJob {
     }
 
     fn memory_bytes(&self) -> u64 {
-        1 << 30
+        // 51 bytes a cell measured at 4096 x 4096; the bins of the estimator beside them.
+        (256 << 20) + 64 * self.cells
     }
 
     fn estimate(&self) -> Estimate {

@@ -122,8 +122,8 @@ impl Job for RoughnessJob {
     }
 
     fn memory_bytes(&self) -> u64 {
-        // A spectrum, a gradient and a distance map of a raster of a few million cells.
-        512 << 20
+        // Heights, gradient, classes, a distance map and a padded spectrum: 66 bytes a cell measured at 4096 x 4096.
+        (64 << 20) + 72 * self.field.cells
     }
 
     fn estimate(&self) -> Estimate {

@@ -46,6 +46,7 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
                 parameters: generator.parameters(),
                 stream: Some(streams.label()),
                 release_path: format!("terrain/{}.tif", one.id),
+                cells: generator.geometry().len() as u64,
             };
             let job = TerrainJob { id: one.id.clone(), generator, streams, png16: item.png16 };
             let node = Node {

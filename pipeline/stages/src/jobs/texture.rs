@@ -5,7 +5,7 @@ use super::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work, fit};
 use crate::registry::{BuildError, Builder, Heightfield, unknown_id};
 use crate::revision::Room;
 use crate::runner::graph::Node;
-use sastrugi_numeric::Streams;
+use sastrugi_numeric::{Grid, Streams};
 use sastrugi_schemas::fit::FitFile;
 use sastrugi_schemas::study::TextureItem;
 use sastrugi_schemas::{Kind, ParameterError};
@@ -46,6 +46,7 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
         if !builder.fits.contains(&item.fit) {
             return Err(unknown_id(&entry, "fit", &item.fit, builder.fits.iter()).into());
         }
+        let base_cells = item.onto.as_ref().and_then(|id| builder.heightfields.get(id)).map(|f| f.cells);
         let base = match &item.onto {
             None => None,
             Some(id) => match builder.heightfields.get(id) {
@@ -66,6 +67,7 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
                 parameters: parameters(&item, draft.as_ref()),
                 stream: Some(streams.label()),
                 release_path: format!("texture/{}.tif", one.id),
+                cells: base_cells.unwrap_or(draft.geometry().len() as u64),
             };
             let fit = ItemRef::new(fit::STAGE, &item.fit);
             let parents = [fit.clone()].into_iter().chain(base.clone()).collect();
@@ -99,6 +101,25 @@ fn parameters(item: &TextureItem, draft: &dyn Synthesis) -> Value {
         all.extend(own);
     }
     Value::Object(all)
+}
+
+/// Base plus texture; a texture that does not repeat without seams must cover the base.
+///
+/// # Errors
+/// Cell sizes that differ, or a base larger than such a texture.
+pub fn lay_onto(base: &Grid, texture: &Grid, parameters: &Value) -> Result<Grid, JobError> {
+    let larger = base.rows() > texture.rows() || base.cols() > texture.cols();
+    if larger && parameters["periodic"] == json!(false) {
+        return Err(JobError::new(format!(
+            "the base of {} x {} cells is larger than the texture of {} x {}, which does not repeat without seams; make the \
+             texture larger or periodic",
+            base.rows(),
+            base.cols(),
+            texture.rows(),
+            texture.cols()
+        )));
+    }
+    sastrugi_texture::onto(base, texture).map_err(JobError::new)
 }
 
 impl Job for TextureJob {
@@ -137,7 +158,7 @@ impl Job for TextureJob {
             None => (grid, Crs::default()),
             Some(base) => {
                 let base = dem::read(&work.parent(base, HEIGHTS)?).map_err(|e| input_error(&e))?;
-                (sastrugi_texture::onto(&base.grid, &grid).map_err(JobError::new)?, base.info.crs)
+                (lay_onto(&base.grid, &grid, &synthesis.parameters())?, base.info.crs)
             }
         };
         dem::write(&work.output(HEIGHTS), &heights, &crs, &Default::default()).map_err(JobError::new)?;

@@ -8,11 +8,12 @@ use super::progress::Progress;
 use crate::error::Error;
 use crate::jobs::{ItemRef, Rows, fit, roughness, traverse};
 use sastrugi_schemas::Record as Row;
-use sastrugi_schemas::manifest::{FailedItem, Origin};
+use sastrugi_schemas::manifest::{FailedItem, ItemNote, Origin};
 use sastrugi_schemas::study::StudyHead;
 use sastrugi_schemas::tables::SampleRow;
-use sastrugi_store::release::{Head, Release, ReleaseBuilder, ReleaseError};
+use sastrugi_store::release::{self, Head, Release, ReleaseBuilder, ReleaseError};
 use std::collections::BTreeMap;
+use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
 
 /// What goes into a release.
@@ -33,6 +34,7 @@ pub struct Contents<'a> {
 /// A destination that is not ours, results that cannot be read, or a file system that refuses.
 pub fn assemble(mut contents: Contents<'_>, dest: &Path, progress: &dyn Progress) -> Result<Release, Error> {
     contents.items.sort();
+    let _lock = DestinationLock::take(dest)?;
     let head = Head {
         name: contents.head.name.clone(),
         study_sha256: sastrugi_store::digest::of_text(contents.study),
@@ -50,6 +52,41 @@ pub fn assemble(mut contents: Contents<'_>, dest: &Path, progress: &dyn Progress
     add_report(&mut builder, progress)?;
     progress.phase("writing checksums");
     builder.seal(dest).map_err(release_error)
+}
+
+/// One writer per destination: a lock file beside it, removed when the writer ends. The operating system frees the lock of
+/// a killed one.
+pub struct DestinationLock {
+    path: PathBuf,
+    _file: File,
+}
+
+impl DestinationLock {
+    /// Takes the lock of a destination.
+    ///
+    /// # Errors
+    /// [`Error::Retry`] while another process writes there.
+    pub fn take(dest: &Path) -> Result<Self, Error> {
+        let path = release::beside(dest, "lock");
+        if let Some(folder) = path.parent().filter(|f| !f.as_os_str().is_empty()) {
+            std::fs::create_dir_all(folder).map_err(|e| Error::failed(format!("{}: {e}", folder.display())))?;
+        }
+        let file = File::create(&path).map_err(|e| Error::failed(format!("{}: {e}", path.display())))?;
+        match file.try_lock() {
+            Ok(()) => Ok(Self { path, _file: file }),
+            Err(TryLockError::WouldBlock) => {
+                Err(Error::Retry(format!("another run is writing {}; wait for it", dest.display())))
+            }
+            Err(TryLockError::Error(e)) => Err(Error::failed(format!("{}: {e}", path.display()))),
+        }
+    }
+}
+
+impl Drop for DestinationLock {
+    fn drop(&mut self) {
+        // A lock file that stays is harmless: what counts is the lock.
+        let _ = std::fs::remove_file(&self.path);
+    }
 }
 
 /// A store error as the caller should see it.
@@ -91,7 +128,14 @@ fn add_artifacts(builder: &mut ReleaseBuilder, contents: &Contents<'_>) -> Resul
                 parents: record.ingredients.parents.keys().cloned().collect(),
                 stream: record.ingredients.stream.clone(),
             };
-            builder.add_file(path, &folder.join(&file.product.file), origin).map_err(release_error)?;
+            let sha256 = builder.add_file(path, &folder.join(&file.product.file), origin).map_err(release_error)?;
+            if sha256 != file.sha256 {
+                return Err(damaged(folder, &record.item, &file.product.file));
+            }
+        }
+        for note in record.notes {
+            let ItemRef { stage, id: item } = record.item.clone();
+            builder.note(ItemNote { stage, item, note });
         }
     }
     for failure in contents.failures {
@@ -103,6 +147,13 @@ fn add_artifacts(builder: &mut ReleaseBuilder, contents: &Contents<'_>) -> Resul
         });
     }
     Ok(())
+}
+
+/// A result that is not what it was when it was made is dropped, so that the next run makes it again.
+fn damaged(folder: &Path, item: &ItemRef, file: &str) -> Error {
+    let dropped = std::fs::remove_dir_all(folder).is_ok();
+    let advice = if dropped { "it was dropped; run again" } else { "remove it and run again" };
+    Error::Failed(format!("{item}: {file} was changed in the work area {}; {advice}", folder.display()))
 }
 
 fn add_tables(builder: &mut ReleaseBuilder, contents: &Contents<'_>) -> Result<(), Error> {

@@ -3,15 +3,16 @@
 //! An item belongs to shard `1 + (key modulo N)`. A shard computes the parents that its items need, whether they are its
 //! own or not, and keeps its own items only.
 
-use super::cache::{Cache, Record, load_record};
+use super::assemble::DestinationLock;
+use super::cache::{Cache, Record, StoredFile, load_record};
 use super::execute::Failure;
 use super::graph::Graph;
 use crate::error::Error;
 use crate::jobs::ItemRef;
-use sastrugi_store::atomic;
+use sastrugi_store::{atomic, digest};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::fs;
+use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 
 const DESCRIPTION: &str = "shard.json";
@@ -76,7 +77,8 @@ pub fn write(
     failures: &[Failure],
 ) -> Result<(), Error> {
     check_target(target)?;
-    let staging = sibling(target, ".assembling");
+    let _lock = DestinationLock::take(target)?;
+    let staging = sastrugi_store::release::beside(target, "assembling");
     remove(&staging)?;
     fs::create_dir_all(&staging).map_err(Error::failed)?;
     let own: Vec<usize> = (0..graph.len()).filter(|&p| part.owns(graph.key(p))).collect();
@@ -112,12 +114,6 @@ fn check_target(target: &Path) -> Result<(), Error> {
     Ok(())
 }
 
-fn sibling(path: &Path, ending: &str) -> PathBuf {
-    let mut name = path.as_os_str().to_owned();
-    name.push(ending);
-    PathBuf::from(name)
-}
-
 fn remove(folder: &Path) -> Result<(), Error> {
     match fs::remove_dir_all(folder) {
         Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(Error::failed(format!("{}: {e}", folder.display()))),
@@ -133,8 +129,10 @@ fn copy_result(record: &Record, from: &Path, to: &Path) -> Result<(), Error> {
     fs::create_dir_all(to).map_err(Error::failed)?;
     let names = record.files.iter().map(|f| f.product.file.as_str()).chain(["record.json"]);
     for name in names {
-        fs::copy(from.join(name), to.join(name))
-            .map_err(|e| Error::failed(format!("{}: {e}", to.join(name).display())))?;
+        let target = to.join(name);
+        fs::copy(from.join(name), &target)
+            .and_then(|_| File::open(&target)?.sync_all())
+            .map_err(|e| Error::failed(format!("{}: {e}", target.display())))?;
     }
     Ok(())
 }
@@ -169,13 +167,20 @@ pub fn join(folders: &[PathBuf]) -> Result<Joined, Error> {
     for (item, key) in &first.items {
         let owner = (1..=first.part.count).find(|&index| Part { index, ..first.part }.owns(key));
         let folder = owner.and_then(|o| by_part.get(&o)).map(|f| item_folder(f, item));
-        let result = folder.filter(|f| load_record(f).is_some_and(|r| r.key == *key));
+        let result = folder.filter(|f| load_record(f).is_some_and(|r| r.key == *key && is_intact(&r, f)));
         if result.is_none() && !failures.contains_key(item) {
             return Err(Error::Input(format!("{item} is missing or damaged in its shard; run that shard again")));
         }
         items.push((item.clone(), result));
     }
     Ok(Joined { study, items, failures: failures.into_values().collect() })
+}
+
+/// True when every file has the bytes that it was made with.
+fn is_intact(record: &Record, folder: &Path) -> bool {
+    let same =
+        |f: &StoredFile| digest::of_file(&folder.join(&f.product.file)).is_ok_and(|(_, sha256)| sha256 == f.sha256);
+    record.files.iter().all(same)
 }
 
 fn read(folder: &Path) -> Result<Description, Error> {

@@ -84,7 +84,8 @@ impl<'a> Entry<'a> {
         if count == Some(0) {
             return Err(self.error("count", "`count` is 0; it must be 1 or more"));
         }
-        let total = sweep.values().map(Vec::len).product::<usize>() * count.unwrap_or(1) as usize;
+        let total =
+            sweep.values().fold(count.unwrap_or(1) as usize, |total, values| total.saturating_mul(values.len()));
         if total > ITEMS_MAX {
             return Err(self.error("count", format!("this stands for {total} items; at most {ITEMS_MAX} are possible")));
         }

@@ -2,8 +2,8 @@
 
 use super::parameters;
 use crate::error::Error;
-use crate::jobs::dem::input_error;
-use crate::jobs::texture::{STAGE, kinds};
+use crate::jobs::texture::{STAGE, kinds, lay_onto};
+use crate::verbs::fit::read_metric;
 use sastrugi_numeric::Streams;
 use sastrugi_schemas::fit::FitFile;
 use sastrugi_store::dem::{self, Crs, WriteOptions};
@@ -41,13 +41,13 @@ pub fn texture(request: &Request<'_>) -> Result<Value, Error> {
     let synthesis = sastrugi_texture::prepare(request.method, &request.parameters, &fit)?;
     super::check_output(request.output)?;
     let streams = Streams::for_seed(request.seed, STAGE);
-    let outcome = synthesis.generate(&streams).map_err(Error::failed)?;
+    let outcome = synthesis.generate(&streams).map_err(|e| Error::Usage(e.to_string()))?;
     let (heights, crs) = match request.onto {
         None => (outcome.grid, Crs::default()),
         Some(path) => {
-            let base = dem::read(path).map_err(|e| Error::from(input_error(&e)))?;
-            let sum = sastrugi_texture::onto(&base.grid, &outcome.grid).map_err(|e| Error::Usage(e.to_string()))?;
-            (sum, base.info.crs)
+            let (base, _) = read_metric(path, None, None)?;
+            let sum = lay_onto(&base.grid, &outcome.grid, &synthesis.parameters());
+            (sum.map_err(|e| Error::Usage(e.message))?, base.info.crs)
         }
     };
     let mut notes = synthesis.notes();

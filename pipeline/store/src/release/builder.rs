@@ -5,7 +5,7 @@ use crate::atomic::sync_folder;
 use crate::digest;
 use crate::parquet::{TableMetadata, TableWriter};
 use sastrugi_schemas::Record;
-use sastrugi_schemas::manifest::{Artifact, FORMAT, FailedItem, Manifest, Origin, PROGRAM};
+use sastrugi_schemas::manifest::{Artifact, FORMAT, FailedItem, ItemNote, Manifest, Origin, PROGRAM};
 use std::collections::BTreeSet;
 use std::ffi::OsString;
 use std::fmt::Write as _;
@@ -47,23 +47,31 @@ pub struct ReleaseBuilder {
     artifacts: Vec<Artifact>,
     paths: BTreeSet<String>,
     failed: Vec<FailedItem>,
+    notes: Vec<ItemNote>,
 }
 
 impl ReleaseBuilder {
-    /// Starts a release beside its place: in `<dest>.assembling`, which is emptied when a killed run left it.
+    /// Starts a release beside its place: in `.sastrugi-assembling-<dest>`, which is emptied when a killed run left it.
     ///
     /// # Errors
     /// [`ReleaseError::Occupied`] when `dest` holds something that is no release; the folder cannot be made.
     pub fn beside(dest: &Path, head: Head) -> Result<Self, ReleaseError> {
         check_dest(dest)?;
-        Self::create(&with_suffix(dest, ".assembling"), head)
+        Self::create(&beside(dest, "assembling"), head)
     }
 
     /// Starts a release in a folder, which is emptied.
     pub(super) fn create(staging: &Path, head: Head) -> Result<Self, ReleaseError> {
         remove_folder(staging)?;
         fs::create_dir_all(staging).map_err(ReleaseError::io(staging))?;
-        Ok(Self { staging: staging.to_owned(), head, artifacts: vec![], paths: BTreeSet::new(), failed: vec![] })
+        Ok(Self {
+            staging: staging.to_owned(),
+            head,
+            artifacts: vec![],
+            paths: BTreeSet::new(),
+            failed: vec![],
+            notes: vec![],
+        })
     }
 
     /// The folder under construction.
@@ -71,17 +79,17 @@ impl ReleaseBuilder {
         &self.staging
     }
 
-    /// Copies a file into the release.
+    /// Copies a file into the release; returns its SHA-256.
     ///
     /// # Errors
     /// The path is not usable, or a file cannot be read or written.
-    pub fn add_file(&mut self, path: &str, source: &Path, origin: Origin) -> Result<(), ReleaseError> {
+    pub fn add_file(&mut self, path: &str, source: &Path, origin: Origin) -> Result<String, ReleaseError> {
         let target = self.target(path)?;
         let mut from = File::open(source).map_err(ReleaseError::io(source))?;
         let mut to = File::create(&target).map_err(ReleaseError::io(&target))?;
         let (bytes, sha256) = digest::copy(&mut from, &mut to).map_err(ReleaseError::io(&target))?;
-        self.list(Artifact { path: path.to_owned(), bytes, sha256, origin });
-        Ok(())
+        self.list(Artifact { path: path.to_owned(), bytes, sha256: sha256.clone(), origin });
+        Ok(sha256)
     }
 
     /// Writes a text file into the release.
@@ -137,6 +145,11 @@ impl ReleaseBuilder {
         self.failed.push(item);
     }
 
+    /// Lists a sentence that readers of an item's files must know.
+    pub fn note(&mut self, note: ItemNote) {
+        self.notes.push(note);
+    }
+
     fn list(&mut self, artifact: Artifact) {
         self.paths.insert(artifact.path.clone());
         self.artifacts.push(artifact);
@@ -158,9 +171,9 @@ impl ReleaseBuilder {
         self.artifacts.sort_by(|a, b| a.path.cmp(&b.path));
         self.failed.sort_by(|a, b| (&a.stage, &a.item).cmp(&(&b.stage, &b.item)));
         let Head { name, study_sha256, seed, version, license } = self.head.clone();
-        let (artifacts, failed) = (self.artifacts.clone(), self.failed.clone());
+        let (artifacts, failed, notes) = (self.artifacts.clone(), self.failed.clone(), self.notes.clone());
         let program = PROGRAM.to_owned();
-        Manifest { program, version, format: FORMAT, name, study_sha256, seed, license, artifacts, failed }
+        Manifest { program, version, format: FORMAT, name, study_sha256, seed, license, artifacts, failed, notes }
     }
 
     /// Where a file of the release goes; its folder is made.
@@ -226,10 +239,10 @@ fn check_dest(dest: &Path) -> Result<(), ReleaseError> {
     }
 }
 
-/// `dest` with a suffix to its name, in the same folder.
-fn with_suffix(dest: &Path, suffix: &str) -> PathBuf {
-    let mut name = dest.file_name().map_or_else(|| OsString::from("release"), OsString::from);
-    name.push(suffix);
+/// `.sastrugi-<role>-<name of dest>` in the same folder: a name that nobody's own folder has.
+pub fn beside(dest: &Path, role: &str) -> PathBuf {
+    let mut name = OsString::from(format!(".sastrugi-{role}-"));
+    name.push(dest.file_name().unwrap_or_else(|| "release".as_ref()));
     dest.with_file_name(name)
 }
 
@@ -241,7 +254,7 @@ fn remove_folder(folder: &Path) -> Result<(), ReleaseError> {
 }
 
 fn put_in_place(staging: &Path, dest: &Path) -> Result<(), ReleaseError> {
-    let aside = with_suffix(dest, ".replaced");
+    let aside = beside(dest, "replaced");
     remove_folder(&aside)?;
     if dest.exists() {
         fs::rename(dest, &aside).map_err(ReleaseError::io(dest))?;

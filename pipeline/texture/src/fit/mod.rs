@@ -6,7 +6,7 @@
 //! 3. Residuals beyond a symmetric threshold are trimmed at the significance level.
 //! 4. Covariance of all pairs of what is left, in isotropic lag bins ([`crate::covariance::masked`]).
 //! 5. `corrected`: sigma and b such that the model, *after the same detrending and trimming*, agrees with the bins by
-//!    generalised least squares ([`expectation`]). `paper`: ordinary least squares of the model itself.
+//!    generalised least squares (`expectation.rs`). `paper`: ordinary least squares of the model itself.
 //!
 //! Source: Vecherin et al. 2022, section 2 and Figure 4a. The paper's order of steps and its plain least squares are kept
 //! as `paper`: on surfaces that are exactly exponential it gives sigma 19 % and b 42 % too small at b = 0.14 windows,

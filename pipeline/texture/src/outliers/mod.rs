@@ -9,7 +9,7 @@
 //!
 //! On normal data 6e-7 of the cells pass the first bound, so a surface without objects is left as it is.
 //!
-//! Cost: a moving average and a selection per round; rounds end when nothing changes, at most [`ROUNDS`].
+//! Cost: a moving average and a selection per round; rounds end when nothing changes, at most `ROUNDS`.
 
 use crate::detrend::{BoxWindow, box_mean};
 
