@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StudyHead {
-    /// Short name, [a-z0-9][a-z0-9.-]{0,63}.
+    /// Short name, `[a-z0-9][a-z0-9.-]{0,63}`.
     pub name: String,
     /// Title of the release; the name when absent.
     #[serde(default)]
@@ -56,7 +56,7 @@ pub enum McapFlavour {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DemItem {
-    /// Id, [a-z0-9][a-z0-9.-]{0,63}, unique in the study.
+    /// Id, `[a-z0-9][a-z0-9.-]{0,63}`, unique in the study.
     pub id: String,
     /// File, relative to the study file.
     pub file: String,
@@ -81,7 +81,7 @@ pub struct DemItem {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TerrainItem {
-    /// Id, [a-z0-9][a-z0-9.-]{0,63}, unique in the study.
+    /// Id, `[a-z0-9][a-z0-9.-]{0,63}`, unique in the study.
     pub id: String,
     /// Generator (see `sastrugi kinds`).
     pub kind: String,
@@ -106,7 +106,7 @@ pub struct TerrainItem {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FitItem {
-    /// Id, [a-z0-9][a-z0-9.-]{0,63}, unique in the study.
+    /// Id, `[a-z0-9][a-z0-9.-]{0,63}`, unique in the study.
     pub id: String,
     /// Id of the DEM to fit.
     pub dem: String,
@@ -119,7 +119,7 @@ pub struct FitItem {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TextureItem {
-    /// Id, [a-z0-9][a-z0-9.-]{0,63}, unique in the study.
+    /// Id, `[a-z0-9][a-z0-9.-]{0,63}`, unique in the study.
     pub id: String,
     /// Id of the fit to match.
     pub fit: String,
@@ -151,7 +151,7 @@ fn default_method() -> String {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MissionsItem {
-    /// Id, [a-z0-9][a-z0-9.-]{0,63}, unique in the study.
+    /// Id, `[a-z0-9][a-z0-9.-]{0,63}`, unique in the study.
     pub id: String,
     /// Ids of the terrains, textures or DEMs to draw missions on; the id of a replicated item stands for all of them.
     pub terrains: Vec<String>,
@@ -164,7 +164,7 @@ pub struct MissionsItem {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TraverseItem {
-    /// Id, [a-z0-9][a-z0-9.-]{0,63}, unique in the study; missions are recorded as `<id>-0001` ...
+    /// Id, `[a-z0-9][a-z0-9.-]{0,63}`, unique in the study; missions are recorded as `<id>-0001` ...
     pub id: String,
     /// Id of the missions to drive.
     pub missions: String,

@@ -296,7 +296,7 @@ pub struct Traverse {
 pub struct Report {
     /// Release folder.
     pub release: PathBuf,
-    /// Folder to write, never inside of the release; ./<name>-report when absent.
+    /// Folder to write, never inside of the release; ./NAME-report when absent.
     #[arg(short, long, value_name = "DIR")]
     pub output: Option<PathBuf>,
 }

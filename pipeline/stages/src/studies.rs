@@ -15,7 +15,7 @@ use sastrugi_store::release::{self, ProblemKind, Release};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 use toml_edit::{DocumentMut, Item, Value};
 
 /// A study with its graph.
@@ -176,20 +176,14 @@ fn check_destination(request: &RunRequest<'_>) -> Result<(), Error> {
 /// A path with links and dots resolved as far as it exists.
 pub fn resolved(path: &Path) -> PathBuf {
     let absolute = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
-    let mut missing = Vec::new();
-    let mut at = absolute.as_path();
-    loop {
-        if let Ok(real) = at.canonicalize() {
-            return missing.iter().rev().fold(real, |path: PathBuf, name| path.join(name));
+    absolute.components().fold(PathBuf::new(), |mut at, component| {
+        match component {
+            Component::ParentDir => drop(at.pop()),
+            Component::CurDir => {}
+            other => at.push(other),
         }
-        match (at.parent(), at.file_name()) {
-            (Some(parent), Some(name)) => {
-                missing.push(name.to_owned());
-                at = parent;
-            }
-            _ => return absolute,
-        }
-    }
+        at.canonicalize().unwrap_or(at)
+    })
 }
 
 fn located(graph: &Graph, cache: &Cache, execution: &Execution, position: usize) -> (ItemRef, Option<PathBuf>) {

@@ -70,7 +70,7 @@ impl Transform {
         false
     }
 
-    /// Working memory that [`Self::forward`] and [`Self::inverse`] need.
+    /// Working memory that [`Self::forward`] and [`Self::inverse_unscaled`] need.
     pub fn scratch(&self) -> Vec<Complex64> {
         let len = match &self.kind {
             Kind::Direct(_) => self.len,

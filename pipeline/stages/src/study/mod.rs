@@ -135,7 +135,7 @@ pub fn check_roughness(section: &RoughnessSection) -> Result<(), ParameterError>
     Ok(())
 }
 
-/// Ids match [a-z0-9][a-z0-9.-]{0,63}.
+/// Ids match `[a-z0-9][a-z0-9.-]{0,63}`.
 fn check_id(key: &str, id: &str) -> Result<(), ParameterError> {
     let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit();
     let right = id.len() <= 64 && id.starts_with(plain) && id.chars().all(|c| plain(c) || c == '.' || c == '-');
