@@ -2,7 +2,7 @@
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Rough-terrain datasets that can be reproduced bit for bit, and the statistics to compare them.
 #[derive(Debug, Parser)]
@@ -90,6 +90,20 @@ pub enum Verb {
         after_help = "Example:\n  sastrugi completions bash > ~/.local/share/bash-completion/completions/sastrugi"
     )]
     Completions(Completions),
+}
+
+impl Verb {
+    /// The single file that the verb writes.
+    pub fn output_file(&self) -> Option<&Path> {
+        match self {
+            Self::Terrain(args) => Some(&args.output),
+            Self::Fit(args) => Some(&args.output),
+            Self::Texture(args) => Some(&args.output),
+            Self::Convert(args) => Some(&args.output),
+            Self::Roughness(args) => args.classes.as_deref(),
+            _ => None,
+        }
+    }
 }
 
 /// Where results and work go, and how much memory may be used.

@@ -25,8 +25,7 @@ impl AtomicFile {
     pub fn create(path: &Path) -> io::Result<Self> {
         let folder = folder_of(path);
         fs::create_dir_all(folder)?;
-        let temporary = folder.join(temporary_name());
-        let file = File::options().read(true).write(true).create(true).truncate(true).open(&temporary)?;
+        let (file, temporary) = temporary_file(folder)?;
         Ok(Self { writer: Some(BufWriter::with_capacity(1 << 16, file)), temporary, path: path.to_owned() })
     }
 
@@ -95,10 +94,34 @@ fn folder_of(path: &Path) -> &Path {
     }
 }
 
-/// Unique in this folder among living processes and their threads.
-fn temporary_name() -> String {
+/// A new file in the folder, locked as long as it is under construction (see [`clear_leftovers`]).
+fn temporary_file(folder: &Path) -> io::Result<(File, PathBuf)> {
     static COUNT: AtomicU64 = AtomicU64::new(0);
-    format!("{TEMPORARY_PREFIX}{}-{}", std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed))
+    loop {
+        // Unique in this folder among living processes and their threads.
+        let count = COUNT.fetch_add(1, Ordering::Relaxed);
+        let path = folder.join(format!("{TEMPORARY_PREFIX}{}-{count}", std::process::id()));
+        let file = File::options().read(true).write(true).create(true).truncate(true).open(&path)?;
+        // A file system without locks has no clearing either, which needs the lock.
+        let locked = file.try_lock().is_ok();
+        if !locked || path.exists() {
+            return Ok((file, path));
+        }
+        // Cleared between its making and its lock; another name then.
+    }
+}
+
+/// Removes what killed processes left under construction in the folder of `path`. Files of living processes are locked and
+/// stay.
+pub fn clear_leftovers(path: &Path) {
+    let entries = fs::read_dir(folder_of(path)).into_iter().flatten().flatten();
+    let leftovers = entries.filter(|e| e.file_name().to_string_lossy().starts_with(TEMPORARY_PREFIX));
+    for entry in leftovers {
+        // What cannot be opened, locked or removed stays: it is harmless and bears no artifact's name.
+        if File::open(entry.path()).is_ok_and(|file| file.try_lock().is_ok()) {
+            let _ = fs::remove_file(entry.path());
+        }
+    }
 }
 
 fn closed() -> io::Error {
@@ -122,5 +145,18 @@ mod tests {
         write(&path, b"again").unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"again");
         assert_eq!(fs::read_dir(folder.path().join("a")).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn val_only_dead_files_are_cleared() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("b.txt");
+        fs::write(folder.path().join(format!("{TEMPORARY_PREFIX}1-0")), b"left").unwrap();
+        fs::write(folder.path().join("other"), b"kept").unwrap();
+        let alive = AtomicFile::create(&path).unwrap();
+        clear_leftovers(&path);
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 2);
+        alive.commit().unwrap();
+        assert!(path.exists());
     }
 }

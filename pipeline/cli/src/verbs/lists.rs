@@ -97,7 +97,10 @@ fn describe_table(table: &Table) -> String {
 }
 
 /// `completions`.
-pub fn completions(args: &Completions) -> Verdict {
-    clap_complete::generate(args.shell, &mut Arguments::command(), "sastrugi", &mut std::io::stdout());
+pub fn completions(args: &Completions, common: &Common) -> Verdict {
+    let mut script = Vec::new();
+    clap_complete::generate(args.shell, &mut Arguments::command(), "sastrugi", &mut script);
+    let script = String::from_utf8(script).map_err(Failure::failed)?;
+    print(common.json, &json!({ "shell": args.shell.to_string(), "script": script }), &script)?;
     Ok(Code::Done)
 }

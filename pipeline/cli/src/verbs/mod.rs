@@ -9,11 +9,13 @@ use crate::Verdict;
 use crate::args::{Arguments, Compress, Verb};
 use crate::failure::Failure;
 use sastrugi_stages::verbs::numbers;
+use sastrugi_store::atomic;
 use sastrugi_store::dem::{Compression, WriteOptions};
 
 /// Does what was asked.
 pub fn dispatch(arguments: &Arguments) -> Verdict {
     let common = &arguments.common;
+    arguments.verb.output_file().into_iter().for_each(atomic::clear_leftovers);
     match &arguments.verb {
         Verb::Run(args) => study::run(args, common),
         Verb::Plan(args) => study::plan(args, common),
@@ -29,7 +31,7 @@ pub fn dispatch(arguments: &Arguments) -> Verdict {
         Verb::Info(args) => files::info(args, common),
         Verb::Kinds(args) => lists::kinds(args, common),
         Verb::Schema(args) => lists::schema(args, common),
-        Verb::Completions(args) => lists::completions(args),
+        Verb::Completions(args) => lists::completions(args, &arguments.common),
     }
 }
 
