@@ -1,6 +1,6 @@
 //! Parquet tables of a release: one file per table, rows as plain structs, units and descriptions beside each column.
 //!
-//! A row type is declared once by [`table!`]; the column list, the reading order and the cells follow from it.
+//! A row type is declared once by the macro `table!`; the column list, the reading order and the cells follow from it.
 
 pub mod covariance;
 pub mod fits;

@@ -3,7 +3,7 @@
 //! # Model
 //! A rigid body with six degrees of freedom and one more per side, the spin of the wheels that a motor channel turns
 //! together. State: position of the centre of mass, velocity, unit quaternion, body angular velocity `w`, spin `W` of
-//! either side, and one deflection per contact ([`contact`], [`belly`]). With mass `m`, inertia `I` (wheels included,
+//! either side, and one deflection per contact (`contact.rs`, `belly.rs`). With mass `m`, inertia `I` (wheels included,
 //! save their spin), contact forces `F` at `p`, rolling-resistance couples and wheel spin momentum `J W` about the axle
 //! direction `y`,
 //!

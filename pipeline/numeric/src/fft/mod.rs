@@ -1,6 +1,6 @@
 //! Fourier transforms whose bits do not depend on the CPU.
 //!
-//! Lengths 2^a 3^b 5^c are transformed by [`stockham`] with `libm` twiddles, other lengths through Bluestein's chirp (1970)
+//! Lengths 2^a 3^b 5^c are transformed by `stockham.rs` with `libm` twiddles, other lengths through Bluestein's chirp (1970)
 //! on such a length. Forward transforms are unnormalised with
 //! `exp(-2 pi i k n / N)`; inverse transforms divide by the number of points.
 //!
