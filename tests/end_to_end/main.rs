@@ -117,16 +117,18 @@ fn val_verify_names_every_damage() {
 fn val_verify_recomputes_and_compares() {
     let folder = area();
     release_in(folder.path());
-    for (arguments, count) in [(["--recompute", "4"], 4), (["--recompute", "all"], 18)] {
-        let mut call = vec!["verify", "release", "--json", "--quiet"];
-        call.extend(arguments);
-        let call = sastrugi_in(folder.path(), &call);
+    let scratch = area();
+    for (arguments, count) in [(["--recompute", "4"], 4), (["--recompute", "all"], 19)] {
+        let mut call = std::process::Command::new(sastrugi_tests::program());
+        call.args(["verify", "release", "--json", "--quiet"]).args(arguments);
+        let call = sastrugi_tests::called(call.current_dir(folder.path()).env("TMPDIR", scratch.path()));
         assert_eq!(call.code, 0, "{}{}", call.stdout, call.stderr);
         let verification: Value = serde_json::from_str(&call.stdout).unwrap();
         assert_eq!(verification["recomputed"].as_array().unwrap().len(), count);
     }
     let left: Vec<_> = fs::read_dir(folder.path()).unwrap().map(|e| e.unwrap().file_name()).collect();
     assert_eq!(left.len(), 3, "{left:?}");
+    assert_eq!(fs::read_dir(scratch.path()).unwrap().count(), 0, "the scratch stays behind");
     // A release whose heights do not follow from its study, with sums that agree with themselves.
     let release = folder.path().join("release");
     let study = fs::read_to_string(release.join("study.toml")).unwrap();
@@ -135,17 +137,70 @@ fn val_verify_recomputes_and_compares() {
     let call = sastrugi_in(folder.path(), &["verify", "release", "--recompute", "all", "--quiet"]);
     assert_eq!(call.code, 4, "{}{}", call.stdout, call.stderr);
     assert!(call.stdout.contains("terrain/smooth.tif"), "{}", call.stdout);
+    // A study that gives the same heights and other figures: the tables tell.
+    forge(&release, "study.toml", &study.replace("[[dem]]", "[roughness]\nborder_m = 1.0\n\n[[dem]]"));
+    let call = sastrugi_in(folder.path(), &["verify", "release", "--recompute", "18", "--quiet"]);
+    assert_eq!(call.code, 4, "{}{}", call.stdout, call.stderr);
+    assert!(call.stdout.contains("tables/terrains"), "{}", call.stdout);
+}
+
+/// A release whose import failed holds the measured file, and can be made again from itself.
+#[test]
+fn val_a_failed_import_keeps_its_input() {
+    let folder = area();
+    let broken = format!("{}\n[[dem]]\nid = \"broken\"\nfile = \"broken.tif\"\n", small_study());
+    write(folder.path(), "study.toml", &broken);
+    write(folder.path(), "broken.tif", "no raster");
+    let run = ["run", "study.toml", "-o", "release", "--quiet"];
+    let call = sastrugi_in(folder.path(), &run);
+    assert_eq!(call.code, 3, "{}{}", call.stdout, call.stderr);
+    assert_eq!(fs::read(folder.path().join("release/dem/broken.tif")).unwrap(), b"no raster");
+    let plan = sastrugi_in(folder.path(), &["plan", "study.toml", "-o", "release"]);
+    assert!(
+        plan.code == 0 && plan.stdout.contains("dem/broken") && plan.stdout.contains("failed before: "),
+        "{}",
+        plan.stdout
+    );
+    fs::remove_file(folder.path().join("broken.tif")).unwrap();
+    let again = sastrugi_in(folder.path(), &["verify", "release", "--recompute", "all", "--quiet"]);
+    assert_eq!(again.code, 0, "{}{}", again.stdout, again.stderr);
+    // Alone, it makes no release.
+    let head = broken.split("[[dem]]").next().unwrap();
+    write(folder.path(), "broken.tif", "no raster");
+    write(folder.path(), "alone.toml", &format!("{head}[[dem]]\nid = \"broken\"\nfile = \"broken.tif\"\n"));
+    let alone = sastrugi_in(folder.path(), &["run", "alone.toml", "-o", "other", "--quiet"]);
+    assert!(alone.code == 65 && !folder.path().join("other").exists(), "{} {}", alone.code, alone.stderr);
+}
+
+/// `plan` looks at a work area that a run is using, and changes nothing there.
+#[test]
+fn val_a_plan_only_looks() {
+    let folder = area();
+    release_in(folder.path());
+    let unfinished = folder.path().join("release.work/items/terrain/smooth/unfinished-0");
+    fs::create_dir(&unfinished).unwrap();
+    let lock = fs::File::open(folder.path().join("release.work/lock")).unwrap();
+    lock.try_lock().unwrap();
+    let call = sastrugi_in(folder.path(), &["plan", "study.toml", "-o", "release"]);
+    assert!(call.code == 0 && call.stdout.contains("0 to compute"), "{}{}", call.stdout, call.stderr);
+    assert!(unfinished.exists());
+    let none = sastrugi_in(folder.path(), &["plan", "study.toml", "-o", "nothing"]);
+    assert!(none.code == 0 && none.stdout.contains("new") && !folder.path().join("nothing.work").exists());
 }
 
 /// Replaces a document and mends manifest and sums.
 fn forge(release: &Path, path: &str, text: &str) {
     let old = sums(release)[path].clone();
+    let old_bytes = fs::metadata(release.join(path)).unwrap().len();
     fs::write(release.join(path), text).unwrap();
     let new = sha256(text.as_bytes());
     let manifest_path = release.join("manifest.json");
     let manifest = fs::read_to_string(&manifest_path).unwrap();
     let old_manifest = sha256(manifest.as_bytes());
-    let manifest = manifest.replace(&old, &new);
+    let entry = manifest.find(&format!("\"path\": \"{path}\"")).unwrap();
+    let sizes = [old_bytes, text.len() as u64].map(|n| format!("\"bytes\": {n}"));
+    let entry = format!("{}{}", &manifest[..entry], manifest[entry..].replacen(&sizes[0], &sizes[1], 1));
+    let manifest = entry.replace(&old, &new);
     fs::write(&manifest_path, &manifest).unwrap();
     let sums_path = release.join("SHA256SUMS");
     let list = fs::read_to_string(&sums_path).unwrap();

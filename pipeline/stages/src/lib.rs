@@ -9,5 +9,6 @@ pub mod runner;
 pub mod studies;
 pub mod study;
 pub mod verbs;
+pub mod verification;
 
 pub use error::Error;

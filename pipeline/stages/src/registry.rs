@@ -290,13 +290,13 @@ pub fn build(study: &Study) -> Result<Plan, BuildError> {
     Ok(Plan { graph: builder.graph, inputs: builder.inputs })
 }
 
-/// An input file with its hash.
+/// An input file: its length in bytes, and its hash.
 ///
 /// # Errors
 /// A file that is missing or cannot be read.
-pub fn input_file(path: PathBuf) -> Result<InputFile, BuildError> {
+pub fn input_file(path: PathBuf) -> Result<(u64, InputFile), BuildError> {
     match sastrugi_store::digest::of_file(&path) {
-        Ok((_, sha256)) => Ok(InputFile { path, sha256 }),
+        Ok((bytes, sha256)) => Ok((bytes, InputFile { path, sha256 })),
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => {
             Err(BuildError::Input(format!("{}: no such file", path.display())))
         }

@@ -1,9 +1,9 @@
-//! What a command does with a whole study: run, plan, merge, verify.
+//! What a command does with a whole study: run, plan, merge. What it does with a release is in [`crate::verification`].
 
 use crate::error::{Error, of_build};
-use crate::jobs::ItemRef;
+use crate::jobs::{ItemRef, original};
 use crate::registry::{self, Plan};
-use crate::runner::assemble::{Contents, assemble, release_error};
+use crate::runner::assemble::{Contents, assemble};
 use crate::runner::cache::Cache;
 use crate::runner::execute::{Execution, Failure, Limits, execute};
 use crate::runner::graph::Graph;
@@ -11,12 +11,12 @@ use crate::runner::plan::{PlanSummary, plan};
 use crate::runner::progress::Progress;
 use crate::runner::shard::{self, Part};
 use crate::study::Study;
-use sastrugi_store::release::{self, ProblemKind, Release};
+use sastrugi_store::release;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fs;
+use std::ops::Range;
 use std::path::{Component, Path, PathBuf};
-use toml_edit::{DocumentMut, Item, Value};
 
 /// A study with its graph.
 pub struct Loaded {
@@ -57,30 +57,24 @@ pub fn load_text(text: &str, name: &str, folder: &Path) -> Result<Loaded, Error>
     if plan.graph.is_empty() {
         return Err(Error::Usage(format!("{name}: the study has no items; add [[terrain]], [[dem]] ...")));
     }
-    let released = released_text(text, &plan);
+    let released = released_text(text, &study, &plan);
     Ok(Loaded { study, graph: plan.graph, released })
 }
 
-/// The study with its input files at their places in the release; every other character stays.
-fn released_text(text: &str, plan: &Plan) -> String {
-    let Ok(mut document) = text.parse::<DocumentMut>() else { return text.to_owned() };
+/// The study with its input files at their places in the release; every other byte stays.
+fn released_text(text: &str, study: &Study, plan: &Plan) -> String {
+    let mut places: Vec<(Range<usize>, String)> = Vec::new();
     for place in &plan.inputs {
-        let file = match document.get_mut("dem") {
-            Some(Item::ArrayOfTables(tables)) => {
-                tables.get_mut(place.index).and_then(|t| t.get_mut("file")).and_then(Item::as_value_mut)
-            }
-            Some(Item::Value(Value::Array(list))) => {
-                list.get_mut(place.index).and_then(Value::as_inline_table_mut).and_then(|t| t.get_mut("file"))
-            }
-            _ => None,
-        };
-        if let Some(value) = file {
-            let decor = value.decor().clone();
-            *value = Value::from(place.release_path.as_str());
-            *value.decor_mut() = decor;
+        if let Some(span) = study.span_of(&["dem", &place.index.to_string(), "file"]) {
+            places.push((span, toml_edit::Value::from(place.release_path.as_str()).to_string()));
         }
     }
-    document.to_string()
+    // From the end, so that the places before stay where they are.
+    places.sort_by_key(|(span, _)| std::cmp::Reverse(span.start));
+    places.into_iter().fold(text.to_owned(), |mut text, (span, path)| {
+        text.replace_range(span, &path);
+        text
+    })
 }
 
 /// A run.
@@ -128,7 +122,9 @@ pub fn run(loaded: &Loaded, request: &RunRequest<'_>, progress: &dyn Progress) -
     let needed = graph.closure(chosen);
     let execution = execute(graph, &cache, &needed, request.limits, progress);
     write_timings(&cache, &execution)?;
-    if execution.done.is_empty() && !execution.failures.is_empty() {
+    // Originals are only copied: with nothing else there is no release to make.
+    let made = execution.done.iter().any(|&p| graph.node(p).item.stage != original::STAGE);
+    if !made && !execution.failures.is_empty() {
         return Err(all_failed(&execution.failures));
     }
     match request.part {
@@ -216,11 +212,10 @@ fn write_timings(cache: &Cache, execution: &Execution) -> Result<(), Error> {
 /// What a run would do, without doing it.
 ///
 /// # Errors
-/// When another run holds the work area.
+/// When the work area cannot be read.
 pub fn plan_of(loaded: &Loaded, output: &Path, work: Option<&Path>) -> Result<PlanSummary, Error> {
     let work = work.map_or_else(|| default_work(output), Path::to_owned);
-    let cache = if work.is_dir() { Some(Cache::open(&work)?) } else { None };
-    Ok(plan(&loaded.graph, cache.as_ref()))
+    Ok(plan(&loaded.graph, &Cache::look(&work)))
 }
 
 /// Joins shards to a release.
@@ -235,182 +230,6 @@ pub fn merge(shards: &[PathBuf], output: &Path, progress: &dyn Progress) -> Resu
         Contents { head: &study.head, study: &joined.study, items: joined.items, failures: &joined.failures };
     assemble(contents, output, progress)?;
     Ok(RunSummary { output: output.to_owned(), items, computed: 0, failures: joined.failures })
-}
-
-/// Which items to compute again.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Recompute {
-    /// Every one, and the tables and the report.
-    All,
-    /// This many, chosen by their keys.
-    Some(usize),
-}
-
-/// One difference that verification found.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Difference {
-    /// File in the release.
-    pub path: String,
-    /// What is wrong.
-    pub problem: String,
-}
-
-/// What verification found.
-#[derive(Debug, Serialize)]
-pub struct Verification {
-    /// Files checked.
-    pub files: u64,
-    /// Bytes checked.
-    pub bytes: u64,
-    /// Items computed again.
-    pub recomputed: Vec<String>,
-    /// Differences; none in a good release.
-    pub differences: Vec<Difference>,
-    /// Why bytes cannot be compared, where they cannot.
-    pub not_comparable: Option<String>,
-}
-
-/// Checks a release; with `recompute`, also against what its own study gives here and now.
-///
-/// # Errors
-/// A folder that is no release, or work that cannot be done.
-pub fn verify(
-    folder: &Path,
-    recompute: Option<Recompute>,
-    limits: Limits,
-    progress: &dyn Progress,
-) -> Result<Verification, Error> {
-    progress.phase("checking files");
-    let report = release::verify(folder).map_err(release_error)?;
-    let differences: Vec<Difference> = report
-        .problems
-        .iter()
-        .map(|p| Difference { path: p.path.clone(), problem: problem_text(p.kind, &p.message) })
-        .collect();
-    let mut verification = Verification {
-        files: report.files,
-        bytes: report.bytes,
-        recomputed: Vec::new(),
-        differences,
-        not_comparable: None,
-    };
-    let Some(recompute) = recompute.filter(|_| verification.differences.is_empty()) else { return Ok(verification) };
-    let release = Release::open(folder).map_err(release_error)?;
-    let ours = env!("CARGO_PKG_VERSION");
-    if release.manifest().version != ours {
-        let theirs = &release.manifest().version;
-        verification.not_comparable =
-            Some(format!("made by version {theirs}, this is {ours}: not comparable byte by byte"));
-        return Ok(verification);
-    }
-    let loaded = load(&folder.join("study.toml"))?;
-    let holder = Scratch::new()?;
-    let scratch = holder.0.clone();
-    match recompute {
-        Recompute::All => recompute_all(&release, &loaded, &scratch, limits, progress, &mut verification)?,
-        Recompute::Some(count) => {
-            recompute_some(&release, &loaded, &scratch, count, limits, progress, &mut verification)?
-        }
-    }
-    Ok(verification)
-}
-
-fn problem_text(kind: ProblemKind, message: &str) -> String {
-    let kind = format!("{kind:?}").to_lowercase();
-    if message.is_empty() { kind } else { format!("{kind}: {message}") }
-}
-
-/// A folder of this process alone, gone with its holder.
-struct Scratch(PathBuf);
-
-impl Scratch {
-    fn new() -> Result<Self, Error> {
-        let path = std::env::temp_dir().join(format!("sastrugi-verify-{}", std::process::id()));
-        // Left by a killed process that had the same number.
-        let _ = fs::remove_dir_all(&path);
-        fs::create_dir(&path).map_err(|e| Error::failed(format!("{}: {e}", path.display())))?;
-        Ok(Self(path))
-    }
-}
-
-impl Drop for Scratch {
-    fn drop(&mut self) {
-        // What cannot be removed lies in the folder for temporary files.
-        let _ = fs::remove_dir_all(&self.0);
-    }
-}
-
-fn recompute_all(
-    release: &Release,
-    loaded: &Loaded,
-    scratch: &Path,
-    limits: Limits,
-    progress: &dyn Progress,
-    verification: &mut Verification,
-) -> Result<(), Error> {
-    let output = scratch.join("release");
-    let work = scratch.join("work");
-    run(loaded, &RunRequest { output: &output, work: Some(&work), part: None, limits }, progress)?;
-    let again = Release::open(&output).map_err(release_error)?;
-    verification.recomputed = loaded.graph.nodes().iter().map(|n| n.item.to_string()).collect();
-    let sums = |r: &Release| -> BTreeMap<String, String> {
-        r.manifest().artifacts.iter().map(|a| (a.path.clone(), a.sha256.clone())).collect()
-    };
-    verification.differences.extend(compare_sums(&sums(release), &sums(&again)));
-    Ok(())
-}
-
-fn compare_sums(there: &BTreeMap<String, String>, here: &BTreeMap<String, String>) -> Vec<Difference> {
-    let paths: std::collections::BTreeSet<&String> = there.keys().chain(here.keys()).collect();
-    let problem = |path: &&String| match (there.get(*path), here.get(*path)) {
-        (Some(a), Some(b)) if a == b => None,
-        (Some(_), Some(_)) => Some("computed again, its bytes differ"),
-        (Some(_), None) => Some("computed again, it does not appear"),
-        _ => Some("computed again, it appears, and is not in the release"),
-    };
-    paths.iter().filter_map(|p| Some(Difference { path: (*p).clone(), problem: problem(p)?.to_owned() })).collect()
-}
-
-fn recompute_some(
-    release: &Release,
-    loaded: &Loaded,
-    scratch: &Path,
-    count: usize,
-    limits: Limits,
-    progress: &dyn Progress,
-    verification: &mut Verification,
-) -> Result<(), Error> {
-    let graph = &loaded.graph;
-    let mut by_key: Vec<usize> = (0..graph.len()).collect();
-    by_key.sort_by_key(|&p| graph.key(p).to_owned());
-    let chosen: Vec<usize> = by_key.into_iter().take(count).collect();
-    let cache = Cache::open(scratch)?;
-    let execution = execute(graph, &cache, &graph.closure(chosen.iter().copied()), limits, progress);
-    let failed_there: Vec<ItemRef> =
-        release.manifest().failed.iter().map(|f| ItemRef::new(&f.stage, &f.item)).collect();
-    let unexpected = execution.failures.iter().filter(|f| !failed_there.contains(&f.item));
-    verification.differences.extend(
-        unexpected.map(|f| Difference {
-            path: f.item.to_string(),
-            problem: format!("cannot be computed again: {}", f.message),
-        }),
-    );
-    let there: BTreeMap<&str, &str> =
-        release.manifest().artifacts.iter().map(|a| (a.path.as_str(), a.sha256.as_str())).collect();
-    for position in chosen {
-        let item = &graph.node(position).item;
-        let Some(record) = cache.load(item, graph.key(position)) else { continue };
-        verification.recomputed.push(item.to_string());
-        for file in record.files {
-            let Some(path) = file.product.release_path else { continue };
-            if there.get(path.as_str()) != Some(&file.sha256.as_str()) {
-                verification
-                    .differences
-                    .push(Difference { path, problem: "computed again, its bytes differ".to_owned() });
-            }
-        }
-    }
-    Ok(())
 }
 
 /// Runs a study that a verb made up, to a release of its own.
@@ -451,6 +270,14 @@ mod tests {
         let text = "[study]\nname = \"x\"\nseed = 1\ndate = \"2026-01-01\"\n[[dem]]\nid = \"d\"\nfile = \"my dem.TIF\" # mine\n";
         let loaded = load_text(text, "study", folder.path()).unwrap();
         assert_eq!(loaded.released, text.replace("my dem.TIF", "dem/d.tif"));
+        // Bytes that editors leave: a byte order mark, line ends of two bytes; tables in line.
+        let windows = format!("\u{feff}{}", text.replace('\n', "\r\n"));
+        let loaded = load_text(&windows, "study", folder.path()).unwrap();
+        assert_eq!(loaded.released, windows.replace("my dem.TIF", "dem/d.tif"));
+        let inline =
+            "dem = [{ id = \"d\", file = 'my dem.TIF' }]\n[study]\nname = \"x\"\nseed = 1\ndate = \"2026-01-01\"\n";
+        let loaded = load_text(inline, "study", folder.path()).unwrap();
+        assert_eq!(loaded.released, inline.replace("'my dem.TIF'", "\"dem/d.tif\""));
     }
 
     proptest! {

@@ -7,8 +7,9 @@ use crate::output::{bytes, columns, print, seconds};
 use crate::progress::Teller;
 use sastrugi_stages::runner::execute::Limits;
 use sastrugi_stages::runner::shard::Part;
-use sastrugi_stages::studies::{self, Recompute, RunRequest, RunSummary};
+use sastrugi_stages::studies::{self, RunRequest, RunSummary};
 use sastrugi_stages::verbs::{parameters, traverse as drive};
+use sastrugi_stages::verification::{self, Recompute};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -104,9 +105,9 @@ pub fn plan(args: &Plan, common: &Common) -> Verdict {
 pub fn verify(args: &Verify, common: &Common) -> Verdict {
     let recompute = args.recompute.as_deref().map(parse_recompute).transpose()?;
     let teller = Teller::new(common.quiet);
-    let verification = studies::verify(&args.release, recompute, limits(MEMORY_GIB)?, &teller);
+    let found = verification::verify(&args.release, recompute, limits(MEMORY_GIB)?, &teller);
     teller.close();
-    let verification = verification?;
+    let verification = found?;
     let mut text = format!("{} files, {} checked", verification.files, bytes(verification.bytes as f64));
     if !verification.recomputed.is_empty() {
         text.push_str(&format!(", {} items computed again", verification.recomputed.len()));

@@ -1,15 +1,16 @@
 //! Stage `dem`: a measured DEM into metres, window applied.
 
+use super::original::{self, Original};
 use super::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work};
-use crate::registry::{BuildError, Builder, Heightfield, InputPlace, input_file};
+use crate::registry::{BuildError, Builder, Heightfield, InputPlace};
 use crate::revision::Room;
 use crate::runner::graph::Node;
 use sastrugi_numeric::{Grid, resample};
 use sastrugi_schemas::study::DemItem;
 use sastrugi_store::dem::{self, Crs, Dem, ReadOptions};
-use sastrugi_store::{atomic, digest};
+use sastrugi_store::digest;
 use serde_json::{Value, json};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Name of the stage.
 pub const STAGE: &str = "dem";
@@ -18,14 +19,10 @@ pub const HEIGHTS: &str = "heights.tif";
 
 struct DemJob {
     item: DemItem,
-    path: PathBuf,
-    extension: String,
-    bytes: u64,
-    sha256: String,
+    original: ItemRef,
     /// Path of the original in the release.
-    original: String,
-    /// Coordinate system beside an ESRI ASCII grid, when there is one.
-    sidecar: Option<PathBuf>,
+    release_path: String,
+    bytes: u64,
 }
 
 /// Adds the items of `[[dem]]`.
@@ -38,39 +35,24 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
         entry.check_keys::<DemItem>(&params, &json!({}))?;
         builder.claim(&entry, STAGE, &item.id)?;
         check(&item).map_err(|(key, message)| entry.error(key, format!("`{key}` {message}")))?;
-        let input = input_file(builder.study.folder.join(&item.file))?;
-        let extension = extension(&item.file);
-        let original = original_path(&item.id, &item.file, &extension);
-        builder.inputs.push(InputPlace { index, release_path: original.clone() });
-        let sidecar = sidecar(&input.path, &extension);
-        let side_input = sidecar.clone().map(input_file).transpose()?;
         let id = item.id.clone();
-        let bytes = std::fs::metadata(&input.path).map_or(0, |m| m.len());
+        let original = Original::of(&id, &builder.study.folder, &item.file)?;
+        builder.inputs.push(InputPlace { index, release_path: original.release_path().to_owned() });
         let field = Heightfield {
             item: ItemRef::new(STAGE, &id),
             group: item.group.clone(),
-            kind: extension.clone(),
+            kind: original::extension(&item.file),
             parameters: recipe(&item),
             stream: None,
             release_path: format!("dem/{id}.metric.tif"),
-            cells: bytes,
+            cells: original.bytes(),
         };
-        let job = DemJob {
-            item,
-            path: input.path.clone(),
-            extension,
-            bytes,
-            sha256: input.sha256.clone(),
-            original,
-            sidecar,
-        };
-        let node = Node {
-            item: field.item.clone(),
-            parents: Vec::new(),
-            inputs: [input].into_iter().chain(side_input).collect(),
-            stream: None,
-            job: Box::new(job),
-        };
+        let (bytes, release_path, inputs) = (original.bytes(), original.release_path().to_owned(), original.inputs());
+        let original = original.node(&id);
+        let job = DemJob { item, original: original.item.clone(), release_path, bytes };
+        let parents = vec![original.item.clone()];
+        let node = Node { item: field.item.clone(), parents, inputs, stream: None, job: Box::new(job) };
+        builder.node(&entry, original)?;
         builder.node(&entry, node)?;
         builder.heightfield(&entry, &id, field)?;
         builder.families.insert(id.clone(), vec![id]);
@@ -95,34 +77,14 @@ fn check(item: &DemItem) -> Result<(), (&'static str, String)> {
     }
 }
 
-/// The file's ending in lower case, `dat` where it has none that a release path can hold.
-fn extension(file: &str) -> String {
-    let ending = Path::new(file).extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
-    let plain = !ending.is_empty() && ending.len() <= 8 && ending.bytes().all(|b| b.is_ascii_alphanumeric());
-    if plain { ending } else { "dat".to_owned() }
-}
-
-/// Where the original goes in the release: an .hgt tile keeps its name, which says where it lies.
-fn original_path(id: &str, file: &str, extension: &str) -> String {
-    match Path::new(file).file_name().and_then(|n| n.to_str()) {
-        Some(name) if extension == "hgt" => format!("dem/{id}/{name}"),
-        _ => format!("dem/{id}.{extension}"),
-    }
-}
-
-/// The .prj file beside an ESRI ASCII grid, which says whether it is geographic.
-fn sidecar(path: &Path, extension: &str) -> Option<PathBuf> {
-    Some(path.with_extension("prj")).filter(|prj| extension == "asc" && prj.is_file())
-}
-
-/// What decides the result beside the bytes of the files. The name counts for .hgt alone (see [`DemJob::recipe`]).
+/// What decides the result beside the original, whose item is a parent.
 fn recipe(item: &DemItem) -> Value {
     json!({ "window": item.window, "cell_m": item.cell_m, "license": item.license, "attribution": item.attribution })
 }
 
 impl Job for DemJob {
     fn recipe(&self) -> Value {
-        json!({ "original": self.original, "item": recipe(&self.item) })
+        recipe(&self.item)
     }
 
     fn rooms(&self) -> &'static [Room] {
@@ -135,30 +97,20 @@ impl Job for DemJob {
     }
 
     fn estimate(&self) -> Estimate {
-        Estimate { seconds: 0.05 + self.bytes as f64 / 50e6, bytes: 3.0 * self.bytes as f64 }
+        Estimate { seconds: 0.05 + self.bytes as f64 / 50e6, bytes: 2.0 * self.bytes as f64 }
     }
 
     fn run(&self, work: &Work<'_>) -> Result<Outcome, JobError> {
-        let (metric, notes) = import(&self.path, &self.item)?;
+        let copy = work.parent(&self.original, original::name(&self.release_path))?;
+        // Messages are part of the release: they name the file as it is called there, wherever it lies now.
+        let name_it =
+            |e: JobError| JobError { message: e.message.replace(&copy.display().to_string(), &self.release_path), ..e };
+        let (metric, notes) = import(&copy, &self.item).map_err(name_it)?;
         dem::write(&work.output(HEIGHTS), &metric.grid, &metric.info.crs, &Default::default())
             .map_err(JobError::new)?;
-        let original = format!("original.{}", self.extension);
-        let bytes = std::fs::read(&self.path).map_err(|e| JobError::input(format!("{}: {e}", self.path.display())))?;
-        if digest::of_bytes(&bytes) != self.sha256 {
-            return Err(JobError::input(format!("{}: the file changed during the run", self.path.display())));
-        }
-        atomic::write(&work.output(&original), &bytes).map_err(JobError::new)?;
-        let id = &self.item.id;
         let content = digest::heights(&metric.grid);
-        let mut products = vec![
-            Product::released(HEIGHTS, format!("dem/{id}.metric.tif"), Some(content)),
-            Product::released(&original, self.original.clone(), None),
-        ];
-        if let Some(prj) = &self.sidecar {
-            let text = std::fs::read(prj).map_err(|e| JobError::input(format!("{}: {e}", prj.display())))?;
-            atomic::write(&work.output("original.prj"), &text).map_err(JobError::new)?;
-            products.push(Product::released("original.prj", format!("dem/{id}.prj"), None));
-        }
+        let path = format!("dem/{}.metric.tif", self.item.id);
+        let products = vec![Product::released(HEIGHTS, path, Some(content))];
         Ok(Outcome { products, notes, ..Outcome::default() })
     }
 }

@@ -3,6 +3,7 @@
 pub mod dem;
 pub mod fit;
 pub mod missions;
+pub mod original;
 pub mod roughness;
 pub mod terrain;
 pub mod texture;

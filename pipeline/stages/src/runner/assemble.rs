@@ -252,3 +252,20 @@ fn files_below(root: &Path, folder: &Path) -> Result<Vec<String>, Error> {
     paths.sort();
     Ok(paths)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn val_one_writer_per_destination() {
+        let folder = tempfile::tempdir().unwrap();
+        let dest = folder.path().join("release");
+        let first = DestinationLock::take(&dest).unwrap();
+        let second = DestinationLock::take(&dest).err().unwrap();
+        assert!(matches!(second, Error::Retry(_)) && second.to_string().contains("another run"));
+        drop(first);
+        drop(DestinationLock::take(&dest).unwrap());
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+    }
+}

@@ -13,6 +13,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 const RECORD: &str = "record.json";
+const FAILURE: &str = "failure.json";
 const UNFINISHED: &str = "unfinished-";
 
 /// A finished item.
@@ -30,6 +31,13 @@ pub struct Record {
     pub rows: Rows,
     /// Sentences that a reader must know.
     pub notes: Vec<String>,
+}
+
+/// The last failure of an item.
+#[derive(Debug, Serialize, Deserialize)]
+struct Failed {
+    key: String,
+    message: String,
 }
 
 /// A file of a finished item.
@@ -66,11 +74,11 @@ fn io_error<'a>(action: &'static str, path: &'a Path) -> impl FnOnce(io::Error) 
     move |source| CacheError::Io { action, path: path.to_owned(), source }
 }
 
-/// An open work area; one process at a time.
+/// An open work area; one process at a time may write to it.
 #[derive(Debug)]
 pub struct Cache {
     folder: PathBuf,
-    _lock: File,
+    _lock: Option<File>,
 }
 
 impl Cache {
@@ -87,11 +95,16 @@ impl Cache {
             Err(TryLockError::WouldBlock) => return Err(CacheError::Busy(folder.to_owned())),
             Err(TryLockError::Error(e)) => return Err(io_error("cannot lock", &path)(e)),
         }
-        let cache = Self { folder: folder.to_owned(), _lock: lock };
+        let cache = Self { folder: folder.to_owned(), _lock: Some(lock) };
         cache.for_each_result(
             |path, name| if name.starts_with(UNFINISHED) { fs::remove_dir_all(path) } else { Ok(()) },
         )?;
         Ok(cache)
+    }
+
+    /// A work area to look at, whoever is writing to it; nothing in it changes.
+    pub fn look(folder: &Path) -> Self {
+        Self { folder: folder.to_owned(), _lock: None }
     }
 
     /// The work area's folder.
@@ -119,6 +132,24 @@ impl Cache {
             fs::read_dir(self.item_folder(item)).ok()?.flatten().map(|e| e.path()).collect();
         folders.sort();
         folders.iter().find_map(|folder| load_record(folder)).map(|record| record.ingredients)
+    }
+
+    /// Why an item failed when it was last tried with this key.
+    pub fn failure(&self, item: &ItemRef, key: &str) -> Option<String> {
+        let text = fs::read(self.item_folder(item).join(FAILURE)).ok()?;
+        let failed: Failed = serde_json::from_slice(&text).ok()?;
+        (failed.key == key).then_some(failed.message)
+    }
+
+    /// Keeps the reason of a failure for the next plan.
+    ///
+    /// # Errors
+    /// When the file system refuses.
+    pub fn keep_failure(&self, item: &ItemRef, key: &str, message: &str) -> Result<(), CacheError> {
+        let path = self.item_folder(item).join(FAILURE);
+        let failed = Failed { key: key.to_owned(), message: message.to_owned() };
+        let text = serde_json::to_vec(&failed).map_err(|e| io_error("cannot encode", &path)(e.into()))?;
+        atomic::write(&path, &text).map_err(io_error("cannot write", &path))
     }
 
     /// A fresh folder for a job to write into.

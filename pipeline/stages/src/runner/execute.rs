@@ -166,9 +166,10 @@ impl Run<'_> {
         // A panic is a bug; it must cost one item, not the run.
         let outcome = catch_unwind(AssertUnwindSafe(|| node.job.run(&work)))
             .unwrap_or_else(|panic| Err(JobError::new(format!("internal error: {}", panic_text(&*panic)))));
-        let outcome = outcome.inspect_err(|_| {
-            // The reason for the failure matters more than a folder that stays behind; the next run clears it.
+        let outcome = outcome.inspect_err(|error| {
+            // The reason for the failure matters more than what stays behind: the next run clears it and finds out again.
             let _ = std::fs::remove_dir_all(&folder);
+            let _ = self.cache.keep_failure(&node.item, key, &error.message);
         })?;
         let record = self.cache.finish(self.graph, position, &folder, outcome).map_err(JobError::new)?;
         Ok(record.notes)

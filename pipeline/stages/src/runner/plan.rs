@@ -29,20 +29,31 @@ pub struct PlanSummary {
     pub stale: Vec<Stale>,
 }
 
-/// Compares a graph with a work area; without one everything is new.
-pub fn plan(graph: &Graph, cache: Option<&Cache>) -> PlanSummary {
+/// Compares a graph with a work area; in an empty one everything is new.
+pub fn plan(graph: &Graph, cache: &Cache) -> PlanSummary {
     let mut stale = Vec::new();
     for position in 0..graph.len() {
         let node = graph.node(position);
-        if cache.is_some_and(|c| c.load(&node.item, graph.key(position)).is_some()) {
+        if cache.load(&node.item, graph.key(position)).is_some() {
             continue;
         }
-        let earlier = cache.and_then(|c| c.earlier(&node.item));
-        let reason = earlier.map_or_else(|| "new".to_owned(), |e| difference(&e, graph.ingredients(position)));
+        let reason = reason(graph, cache, position);
         let estimate = node.job.estimate();
         stale.push(Stale { item: node.item.to_string(), reason, seconds: estimate.seconds, bytes: estimate.bytes });
     }
     PlanSummary { items: graph.len(), ready: graph.len() - stale.len(), stale }
+}
+
+/// Why an item has no result.
+fn reason(graph: &Graph, cache: &Cache, position: usize) -> String {
+    let item = &graph.node(position).item;
+    if let Some(message) = cache.failure(item, graph.key(position)) {
+        return format!("failed before: {message}");
+    }
+    match cache.earlier(item) {
+        Some(earlier) => difference(&earlier, graph.ingredients(position)),
+        None => "new".to_owned(),
+    }
 }
 
 /// What changed between two lists of ingredients, in words.

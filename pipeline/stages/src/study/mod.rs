@@ -11,6 +11,7 @@ use sastrugi_schemas::ParameterError;
 use sastrugi_schemas::kind::{read_parameters, schema_of};
 use sastrugi_schemas::study::{RoughnessSection, StudyHead};
 use serde_json::{Map, Value};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 /// A study as read: the head checked, the items still tables.
@@ -23,7 +24,6 @@ pub struct Study {
     pub folder: PathBuf,
     text: StudyText,
     root: Map<String, Value>,
-    raw: String,
 }
 
 impl Study {
@@ -39,14 +39,9 @@ impl Study {
         let head = read_head(&root, &text)?;
         let roughness = read_section::<RoughnessSection>(&root, &text, "roughness")?.unwrap_or_default();
         check_roughness(&roughness).map_err(|e| section_error(&text, "roughness", e))?;
-        let study = Self { head, roughness, folder: folder.to_owned(), text, root, raw: raw.to_owned() };
+        let study = Self { head, roughness, folder: folder.to_owned(), text, root };
         study.check_sections(sections)?;
         Ok(study)
-    }
-
-    /// The study's text as given.
-    pub fn raw(&self) -> &str {
-        &self.raw
     }
 
     /// The tables of `[[section]]`, in order.
@@ -61,6 +56,12 @@ impl Study {
             return Err(StudyError::at(self.text.span(&[section.to_owned()], true), message));
         };
         Ok(tables.into_iter().enumerate().map(|(index, table)| Entry::new(section, index, table, &self.text)).collect())
+    }
+
+    /// Bytes of the value at a path (array positions as numbers) in the study's text; `None` when it is not there.
+    pub fn span_of(&self, path: &[&str]) -> Option<Range<usize>> {
+        let path: Vec<String> = path.iter().map(|s| (*s).to_owned()).collect();
+        self.text.exact_span(&path)
     }
 
     fn check_sections(&self, sections: &[&'static str]) -> Result<(), StudyError> {

@@ -56,32 +56,66 @@ impl StudyText {
     /// Place of the value at a path (array positions as numbers), or of its nearest parent that has one. `key` asks for the
     /// key's own place instead of its value's.
     pub fn span(&self, path: &[String], key: bool) -> Option<Range<usize>> {
-        let mut item: &Item = self.document.as_item();
+        self.walk(path, key).last().flatten()
+    }
+
+    /// Place of the value at a path; `None` when it is not there.
+    pub fn exact_span(&self, path: &[String]) -> Option<Range<usize>> {
+        self.walk(path, false).nth(path.len().checked_sub(1)?).flatten()
+    }
+
+    /// The best place known after each step along a path, as far as the path goes.
+    fn walk(&self, path: &[String], key: bool) -> impl Iterator<Item = Option<Range<usize>>> {
+        let mut at = Some(Node::Item(self.document.as_item()));
         let mut best = None;
-        for segment in path {
-            let Some((span, next)) = step(item, segment, key) else { break };
-            best = span.or(best);
-            let Some(next) = next else { break };
-            item = next;
-        }
-        best
+        path.iter().map_while(move |segment| {
+            let (span, next) = at?.step(segment, key)?;
+            best = span.or(best.take());
+            at = Some(next);
+            Some(best.clone())
+        })
     }
 }
 
-/// The place of `segment` below `item`, and the item there. Values inside arrays have a place but no item.
-fn step<'a>(item: &'a Item, segment: &str, key: bool) -> Option<(Option<Range<usize>>, Option<&'a Item>)> {
-    if let Some(table) = item.as_table_like() {
-        let (name, value) = table.get_key_value(segment)?;
-        let span = if key { name.span() } else { value.span() };
-        return Some((span.or(name.span()), Some(value)));
+/// A place in the document: values inside of arrays are no items of their own.
+#[derive(Clone, Copy)]
+enum Node<'a> {
+    Item(&'a Item),
+    Value(&'a toml_edit::Value),
+}
+
+impl<'a> Node<'a> {
+    fn table(self) -> Option<&'a dyn TableLike> {
+        match self {
+            Self::Item(item) => item.as_table_like(),
+            Self::Value(value) => value.as_inline_table().map(|t| t as &dyn TableLike),
+        }
     }
-    let index: usize = segment.parse().ok()?;
-    if let Some(array) = item.as_array() {
-        return Some((array.get(index)?.span(), None));
+
+    fn array(self) -> Option<&'a toml_edit::Array> {
+        match self {
+            Self::Item(item) => item.as_array(),
+            Self::Value(value) => value.as_array(),
+        }
     }
-    // One table of an array of tables is not an `Item`; descend through the array's own index.
-    item.as_array_of_tables()?.get(index)?;
-    Some((item.get(index).and_then(Item::span), item.get(index)))
+
+    /// The place of `segment` below, and what is there.
+    fn step(self, segment: &str, key: bool) -> Option<(Option<Range<usize>>, Self)> {
+        if let Some(table) = self.table() {
+            let (name, value) = table.get_key_value(segment)?;
+            let span = if key { name.span() } else { value.span() };
+            return Some((span.or(name.span()), Self::Item(value)));
+        }
+        let index: usize = segment.parse().ok()?;
+        if let Some(array) = self.array() {
+            let value = array.get(index)?;
+            return Some((value.span(), Self::Value(value)));
+        }
+        // One table of an array of tables is not an `Item`; descend through the array's own index.
+        let Self::Item(item) = self else { return None };
+        let table = item.as_array_of_tables().and_then(|_| item.get(index))?;
+        Some((table.span(), Self::Item(table)))
+    }
 }
 
 fn table_to_json(table: &dyn TableLike) -> Result<Value, StudyError> {
@@ -140,6 +174,8 @@ mod tests {
         assert_eq!(at(&["terrain", "1", "id"], false), Some("\"b\""));
         assert_eq!(at(&["terrain", "1", "list", "1"], false), Some("2"));
         assert_eq!(at(&["terrain", "1", "nothing"], false), Some("[[terrain]]"));
+        assert_eq!(text.exact_span(&path(&["terrain", "1", "nothing"])), None);
+        assert_eq!(text.exact_span(&path(&["terrain", "0", "id"])).map(|s| &TEXT[s]), Some("\"a\""));
     }
 
     #[test]

@@ -1,0 +1,171 @@
+//! Stage `original`: the bytes of a measured file, taken into the release as they are.
+//!
+//! An item of its own, so that a release whose import failed still holds what it was made from.
+
+use super::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work};
+use crate::registry::{BuildError, input_file};
+use crate::revision::Room;
+use crate::runner::graph::{InputFile, Node};
+use sastrugi_store::{atomic, digest};
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+
+/// Name of the stage.
+pub const STAGE: &str = "original";
+
+/// A measured file with what lies beside it.
+pub struct Original {
+    files: Vec<Copied>,
+}
+
+struct Copied {
+    input: InputFile,
+    bytes: u64,
+    /// Path in the release.
+    release_path: String,
+}
+
+impl Original {
+    /// The file of the item `id` in `folder`.
+    ///
+    /// # Errors
+    /// A file that is missing or cannot be read.
+    pub fn of(id: &str, folder: &Path, file: &str) -> Result<Self, BuildError> {
+        let path = folder.join(file);
+        let extension = extension(file);
+        let mut files = vec![Copied::of(path.clone(), release_path(id, file, &extension))?];
+        if let Some(prj) = sidecar(&path, &extension) {
+            files.push(Copied::of(prj, format!("dem/{id}.prj"))?);
+        }
+        Ok(Self { files })
+    }
+
+    /// Length of the measured file, bytes.
+    pub fn bytes(&self) -> u64 {
+        self.files[0].bytes
+    }
+
+    /// Its path in the release.
+    pub fn release_path(&self) -> &str {
+        &self.files[0].release_path
+    }
+
+    /// All files with their hashes.
+    pub fn inputs(&self) -> Vec<InputFile> {
+        self.files.iter().map(|f| f.input.clone()).collect()
+    }
+
+    /// The item that takes the files into the release.
+    pub fn node(self, id: &str) -> Node {
+        let inputs = self.inputs();
+        Node { item: ItemRef::new(STAGE, id), parents: Vec::new(), inputs, stream: None, job: Box::new(self) }
+    }
+}
+
+impl Copied {
+    fn of(path: PathBuf, release_path: String) -> Result<Self, BuildError> {
+        let (bytes, input) = input_file(path)?;
+        Ok(Self { input, bytes, release_path })
+    }
+
+    /// Name in the item's folder.
+    fn name(&self) -> &str {
+        name(&self.release_path)
+    }
+}
+
+/// Name in the item's folder of what has this path in the release.
+pub fn name(release_path: &str) -> &str {
+    release_path.rsplit('/').next().unwrap_or_default()
+}
+
+/// The file's ending in lower case, `dat` where it has none that a release path can hold.
+pub fn extension(file: &str) -> String {
+    let ending = Path::new(file).extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
+    let plain = !ending.is_empty() && ending.len() <= 8 && ending.bytes().all(|b| b.is_ascii_alphanumeric());
+    if plain { ending } else { "dat".to_owned() }
+}
+
+/// Where a file goes in the release: an .hgt tile keeps its name, which says where it lies.
+fn release_path(id: &str, file: &str, extension: &str) -> String {
+    match Path::new(file).file_name().and_then(|n| n.to_str()) {
+        Some(name) if extension == "hgt" => format!("dem/{id}/{name}"),
+        _ => format!("dem/{id}.{extension}"),
+    }
+}
+
+/// The .prj file beside an ESRI ASCII grid, which says whether it is geographic.
+fn sidecar(path: &Path, extension: &str) -> Option<PathBuf> {
+    Some(path.with_extension("prj")).filter(|prj| extension == "asc" && prj.is_file())
+}
+
+impl Job for Original {
+    fn recipe(&self) -> Value {
+        json!({ "files": self.files.iter().map(|f| &f.release_path).collect::<Vec<_>>() })
+    }
+
+    fn rooms(&self) -> &'static [Room] {
+        &[]
+    }
+
+    fn memory_bytes(&self) -> u64 {
+        // The copy goes through a buffer.
+        1 << 20
+    }
+
+    fn estimate(&self) -> Estimate {
+        let bytes = self.files.iter().map(|f| f.bytes as f64).sum();
+        Estimate { seconds: 0.01 + bytes / 500e6, bytes }
+    }
+
+    fn run(&self, work: &Work<'_>) -> Result<Outcome, JobError> {
+        let mut products = Vec::new();
+        for file in &self.files {
+            copy(&file.input, &work.output(file.name()))?;
+            products.push(Product::released(file.name(), file.release_path.clone(), None));
+        }
+        Ok(Outcome { products, ..Outcome::default() })
+    }
+}
+
+fn copy(input: &InputFile, target: &Path) -> Result<(), JobError> {
+    let unreadable = |e: std::io::Error| JobError::input(format!("{}: {e}", input.path.display()));
+    let mut from = std::fs::File::open(&input.path).map_err(unreadable)?;
+    let mut to = atomic::AtomicFile::create(target).map_err(JobError::new)?;
+    let (_, sha256) = digest::copy(&mut from, &mut to).map_err(JobError::new)?;
+    if sha256 != input.sha256 {
+        return Err(JobError::input(format!("{}: the file changed during the run", input.path.display())));
+    }
+    to.commit().map_err(JobError::new)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn val_places_in_the_release() {
+        let place = |file: &str| release_path("site", file, &extension(file));
+        assert_eq!(place("a/Snow.TIF"), "dem/site.tif");
+        assert_eq!(place("tiles/N44W072.hgt"), "dem/site/N44W072.hgt");
+        assert_eq!(place("no-ending"), "dem/site.dat");
+        assert_eq!(place("odd.e n d"), "dem/site.dat");
+    }
+
+    /// The name of a tile says where it lies, so it belongs to the key; that of any other file does not.
+    #[test]
+    fn prop_the_key_follows_what_decides_the_result() {
+        let folder = tempfile::tempdir().unwrap();
+        let recipe = |file: &str| {
+            std::fs::write(folder.path().join(file), b"x").unwrap();
+            Original::of("site", folder.path(), file).unwrap().recipe()
+        };
+        assert_eq!(recipe("a.tif"), recipe("b.tif"));
+        assert_ne!(recipe("N44W072.hgt"), recipe("N45W072.hgt"));
+        let inputs = |file: &str| Original::of("site", folder.path(), file).unwrap().inputs();
+        std::fs::write(folder.path().join("c.asc"), b"x").unwrap();
+        let bare = inputs("c.asc");
+        std::fs::write(folder.path().join("c.prj"), b"geographic").unwrap();
+        assert_eq!((bare.len(), inputs("c.asc").len()), (1, 2));
+    }
+}
