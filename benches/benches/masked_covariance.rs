@@ -73,6 +73,8 @@ fn fit_2048(bencher: Bencher) {
     let made = sastrugi_texture::prepare("fft_ma", &texture, &truth).expect("the bench's own parameters are valid");
     let made = made.generate(&Streams::for_seed(1, "texture")).expect("the tile is wide enough");
     let dem = Grid::new(Geometry::square(N, N, 0.06), made.grid.values);
-    let settings = FitSettings::try_from(FitParameters::default()).expect("the defaults are valid");
-    bencher.counter(ItemsCount::new(N * N)).bench(|| sastrugi_texture::fit(&dem, &settings));
+    let parameters = FitParameters { bootstrap: 0, ..FitParameters::default() };
+    let settings = FitSettings::try_from(parameters).expect("the defaults are valid");
+    let streams = Streams::for_seed(1, "fit");
+    bencher.counter(ItemsCount::new(N * N)).bench(|| sastrugi_texture::fit(&dem, &settings, &streams));
 }

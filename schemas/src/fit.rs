@@ -32,6 +32,22 @@ pub struct FitFile {
     pub surface_model_m2: Vec<f64>,
     /// Named figures about the fit.
     pub diagnostics: BTreeMap<String, Value>,
+    /// 95 % intervals by parametric bootstrap; absent when none were asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub intervals: Option<Intervals>,
+    /// The same by block bootstrap, where the DEM has enough blocks.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub block_intervals: Option<Intervals>,
+    /// Every model tried, the best first.
+    pub candidates: Vec<Candidate>,
+    /// How the likelihood falls away from the fitted range.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub profile: Option<Profile>,
+    /// Covariance by direction.
+    pub directions: Vec<DirectionBin>,
+    /// The model as GSTools' classes take it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gstools: Option<GsTools>,
     /// Sentences a reader must know.
     pub warnings: Vec<String>,
     /// Where the DEM came from.
@@ -58,4 +74,75 @@ pub struct Source {
     pub sha256: String,
     /// Window of the DEM `[x0, y0, x1, y1]` in its own coordinates, when one was asked for.
     pub window: Option<[f64; 4]>,
+}
+
+/// Intervals of a fit's parameters.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Intervals {
+    /// Level, as 0.95.
+    pub level: f64,
+    /// Number of replicates.
+    pub replicates: u32,
+    /// Lower and upper end by the parameter's name.
+    #[serde(flatten)]
+    pub values: BTreeMap<String, [f64; 2]>,
+}
+
+/// A model that was tried.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Candidate {
+    /// Covariance model.
+    pub model: String,
+    /// Its fitted parameters.
+    pub parameters: BTreeMap<String, f64>,
+    /// Number of free parameters.
+    pub free: u32,
+    /// Generalised sum of squares; absent when its weights could not be made.
+    pub chi2: Option<f64>,
+    /// Akaike's corrected criterion above the least of all candidates.
+    pub aicc_above_best: Option<f64>,
+}
+
+/// The generalised sum of squares along the range, everything else fitted anew.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Profile {
+    /// Range held, m.
+    pub range_m: Vec<f64>,
+    /// Rise above the minimum; 3.84 is the edge of a 95 % interval.
+    pub chi2_rise: Vec<f64>,
+}
+
+/// Covariance at one distance in one direction.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct DirectionBin {
+    /// Mean lag, m.
+    pub lag_m: f64,
+    /// Direction, degrees clockwise from north, in [0, 180).
+    pub azimuth_deg: f64,
+    /// Empirical covariance, m2.
+    pub covariance_m2: f64,
+    /// Number of pairs.
+    pub pairs: u64,
+    /// Fitted model as the estimator sees it, m2.
+    pub model_m2: f64,
+}
+
+/// A covariance model in the words of GSTools: `getattr(gstools, model)(dim=2, var=var, ...)`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct GsTools {
+    /// Class.
+    pub model: String,
+    /// Variance without nugget, m2.
+    pub var: f64,
+    /// Length scale along the main axis, m.
+    pub len_scale: f64,
+    /// Nugget, m2.
+    pub nugget: f64,
+    /// Length across over length along.
+    pub anis: f64,
+    /// Main axis, rad counter-clockwise from east.
+    pub angles: f64,
+    /// Other arguments: `rescale`, `nu`.
+    #[serde(flatten)]
+    pub more: BTreeMap<String, f64>,
 }

@@ -110,6 +110,9 @@ pub struct FitItem {
     pub id: String,
     /// Id of the DEM to fit.
     pub dem: String,
+    /// Seed of the replicates' random streams; follows from the study's seed and the id when absent.
+    #[serde(default)]
+    pub seed: Option<u64>,
     /// One fit per value of a parameter: `sweep.<parameter> = [...]`.
     #[serde(default)]
     pub sweep: BTreeMap<String, Vec<serde_json::Value>>,

@@ -56,7 +56,8 @@ pub enum Verb {
         sastrugi terrain weierstrass_mandelbrot --set fractal_dimension=2.4 --set size_px='[512, 512]' -o wm.png")]
     Terrain(Terrain),
     /// Fit the covariance of a measured DEM.
-    #[command(after_help = "Example:\n  sastrugi fit snow.tif --outer-scale 2 -o fit.json")]
+    #[command(after_help = "Examples:\n  sastrugi fit snow.tif --outer-scale 2 -o fit.json\n  \
+        sastrugi fit snow.tif --outer-scale 2 --model auto --bootstrap 199 -o fit.json")]
     Fit(Fit),
     /// Synthesise a texture that matches a fit.
     #[command(
@@ -213,9 +214,21 @@ pub struct Fit {
     /// Share of residuals trimmed as outliers.
     #[arg(long, value_name = "SHARE", allow_negative_numbers = true)]
     pub trim: Option<f64>,
-    /// Covariance model.
-    #[arg(long, value_name = "MODEL")]
+    /// Covariance model, or several with commas, or `auto`: the best by AICc is taken.
+    #[arg(long, value_name = "MODEL,...")]
     pub model: Option<String>,
+    /// Replicates of the bootstrap that gives intervals; 0 for none.
+    #[arg(long, value_name = "N")]
+    pub bootstrap: Option<u32>,
+    /// Standard deviation of the DEM's white noise, m.
+    #[arg(long, value_name = "M", allow_negative_numbers = true)]
+    pub noise_sigma: Option<f64>,
+    /// Standard deviation of the point spread that blurred the DEM, m.
+    #[arg(long, value_name = "M", allow_negative_numbers = true)]
+    pub inner_scale: Option<f64>,
+    /// Seed of the replicates' random streams.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u64,
     /// Part of the DEM, x0,y0,x1,y1 in its own coordinates.
     #[arg(long, value_name = "X0,Y0,X1,Y1", allow_hyphen_values = true)]
     pub window: Option<String>,

@@ -78,11 +78,29 @@ pub fn fit(args: &Fit, common: &Common) -> Verdict {
     put("mode", args.mode.as_ref().map(|v| json!(v)));
     put("trim", args.trim.map(|v| json!(v)));
     put("model", args.model.as_ref().map(|v| json!(v)));
+    put("bootstrap", args.bootstrap.map(|v| json!(v)));
+    put("noise_sigma_m", args.noise_sigma.map(|v| json!(v)));
+    put("inner_scale_m", args.inner_scale.map(|v| json!(v)));
     let window = args.window.as_deref().map(|w| numbers::<4>("--window", w)).transpose()?;
     let cell_m = cell(args.cell.as_deref())?;
-    let request = verbs::fit::Request { dem: &args.dem, output: &args.output, parameters: params, window, cell_m };
+    let request = verbs::fit::Request {
+        dem: &args.dem,
+        output: &args.output,
+        parameters: params,
+        seed: args.seed,
+        window,
+        cell_m,
+    };
     let (fit, read_notes) = verbs::fit::fit(&request)?;
-    let parameters: Vec<String> = fit.parameters.iter().map(|(name, value)| format!("{name} = {value:.6}")).collect();
+    let interval = |name: &str| {
+        let [low, high] = fit.intervals.as_ref()?.values.get(name)?;
+        Some(format!(" [{low:.6}, {high:.6}]"))
+    };
+    let parameters: Vec<String> = fit
+        .parameters
+        .iter()
+        .map(|(name, value)| format!("{name} = {value:.6}{}", interval(name).unwrap_or_default()))
+        .collect();
     let mut text = format!("{}: {} ({}), {}", args.output.display(), fit.model, fit.mode, parameters.join(", "));
     read_notes.iter().for_each(|note| text.push_str(&format!("\n  note: {note}")));
     fit.warnings.iter().for_each(|warning| text.push_str(&format!("\n  warning: {warning}")));

@@ -6,6 +6,7 @@ use super::{Estimate, ItemRef, Job, JobError, Outcome, Product, Rows, Work};
 use crate::registry::{BuildError, Builder, unknown_id};
 use crate::revision::Room;
 use crate::runner::graph::Node;
+use sastrugi_numeric::Streams;
 use sastrugi_roughness::{histogram, power_spectrum};
 use sastrugi_schemas::Kind;
 use sastrugi_schemas::fit::{FitFile, Source};
@@ -42,6 +43,7 @@ struct FitJob {
     dem: ItemRef,
     source: Source,
     settings: FitSettings,
+    streams: Streams,
     cells: u64,
 }
 
@@ -67,11 +69,16 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
                 dem: field.item.clone(),
                 source: source.clone(),
                 settings,
+                streams: builder.streams(STAGE, &one.id, item.seed, 0),
                 cells: field.cells,
             };
-            let item = ItemRef::new(STAGE, &one.id);
-            let node =
-                Node { item, parents: vec![field.item.clone()], inputs: Vec::new(), stream: None, job: Box::new(job) };
+            let node = Node {
+                item: ItemRef::new(STAGE, &one.id),
+                parents: vec![field.item.clone()],
+                inputs: Vec::new(),
+                stream: Some(job.streams.label()),
+                job: Box::new(job),
+            };
             builder.node(&entry, node)?;
             builder.fits.push(one.id);
         }
@@ -94,12 +101,15 @@ impl Job for FitJob {
     }
 
     fn estimate(&self) -> Estimate {
-        Estimate { seconds: 0.5, bytes: 1e6 }
+        // Of a measured DEM the cells are known when it is read; each replicate fits a surface of at most a million.
+        let replicate = 1.5e-6 * self.cells.min(1 << 20) as f64;
+        let replicates = f64::from(self.settings.parameters().bootstrap);
+        Estimate { seconds: 0.5 + replicate * replicates, bytes: 1e6 }
     }
 
     fn run(&self, work: &Work<'_>) -> Result<Outcome, JobError> {
         let read = dem::read(&work.parent(&self.dem, HEIGHTS)?).map_err(|e| input_error(&e))?;
-        let outcome = sastrugi_texture::fit(&read.grid, &self.settings).map_err(JobError::new)?;
+        let outcome = sastrugi_texture::fit(&read.grid, &self.settings, &self.streams).map_err(JobError::new)?;
         let fit = FitFile { source: Some(self.source.clone()), ..outcome.fit };
         atomic::write(&work.output(FIT), to_json(&fit)?.as_bytes()).map_err(JobError::new)?;
         let id = &self.id;

@@ -3,7 +3,8 @@
 use super::parameters;
 use crate::error::Error;
 use crate::jobs::dem::{input_error, to_metres, window_of};
-use crate::jobs::fit::to_json;
+use crate::jobs::fit::{STAGE, to_json};
+use sastrugi_numeric::Streams;
 use sastrugi_schemas::fit::{FitFile, Source};
 use sastrugi_schemas::kind::{read_parameters, schema_of};
 use sastrugi_store::dem::{self, Dem, ReadOptions};
@@ -20,6 +21,8 @@ pub struct Request<'a> {
     pub output: &'a Path,
     /// Parameters of the fit.
     pub parameters: Value,
+    /// Seed of the replicates' random streams.
+    pub seed: u64,
     /// Part of the DEM in its own coordinates.
     pub window: Option<[f64; 4]>,
     /// Cell size for files that carry none, m.
@@ -35,7 +38,8 @@ pub fn fit(request: &Request<'_>) -> Result<(FitFile, Vec<String>), Error> {
     let raw: FitParameters = read_parameters(&request.parameters)?;
     let settings = FitSettings::try_from(raw)?;
     let (read, notes) = read_metric(request.dem, request.window, request.cell_m)?;
-    let outcome = sastrugi_texture::fit(&read.grid, &settings).map_err(refused)?;
+    let outcome =
+        sastrugi_texture::fit(&read.grid, &settings, &Streams::for_seed(request.seed, STAGE)).map_err(refused)?;
     let (_, sha256) =
         digest::of_file(request.dem).map_err(|e| Error::Input(format!("{}: {e}", request.dem.display())))?;
     let file = request.dem.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());

@@ -1,19 +1,34 @@
-//! Isotropic lag bins.
+//! Lag bins: rings, and rings cut into sectors.
 //!
-//! Bin k holds the lags whose length rounds to k bin widths; bin 0 is lag zero alone. A bin's covariance is the sum of
+//! Ring k holds the lags whose length rounds to k ring widths; bin 0 is lag zero alone. A bin's covariance is the sum of
 //! all products over the number of all pairs, and a model is brought to the bins in the same way, so that the width of a
 //! bin biases nothing.
 
 use super::masked::MaskedCovariance;
 
-/// Most bins beside lag zero; more only slow the fit down.
-pub const BINS_MAX: usize = 32;
+/// How lags are put into bins.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Layout {
+    /// Most rings beside lag zero; more only slow a fit down.
+    pub rings_max: usize,
+    /// Sectors of each ring over half a turn; the first is centred north-south.
+    pub sectors: usize,
+}
+
+impl Layout {
+    /// Rings.
+    pub const ISOTROPIC: Self = Self { rings_max: 32, sectors: 1 };
+    /// Rings in sectors of 30 degrees.
+    pub const DIRECTIONAL: Self = Self { rings_max: 8, sectors: 6 };
+}
 
 /// Bins of an estimate.
 #[derive(Clone, Debug, Default)]
 pub struct LagBins {
     /// Mean lag of the pairs in each bin, m.
     pub lag_m: Vec<f64>,
+    /// Direction of the centre of each bin's sector, degrees clockwise from north; `None` for whole rings.
+    pub azimuth_deg: Vec<Option<f64>>,
     /// Covariance of each bin, m2.
     pub covariance_m2: Vec<f64>,
     /// Pairs in each bin.
@@ -34,29 +49,48 @@ pub struct Member {
 }
 
 impl LagBins {
-    /// Bins of `estimate` up to `max_lag_m`, for cells of `cell_m = [east-west, north-south]`. The bin width is the
-    /// larger cell size, or the maximum lag over [`BINS_MAX`] where that is more. Bins without pairs are left out.
-    pub fn of(estimate: &MaskedCovariance, cell_m: [f64; 2], max_lag_m: f64) -> Self {
-        let width = cell_m[0].max(cell_m[1]).max(max_lag_m / BINS_MAX as f64);
+    /// Bins of `estimate` up to `max_lag_m`, for cells of `cell_m = [east-west, north-south]`. The ring width is the larger
+    /// cell size, or the maximum lag over the most rings where that is more. Bins without pairs are left out.
+    pub fn of(estimate: &MaskedCovariance, cell_m: [f64; 2], max_lag_m: f64, layout: Layout) -> Self {
+        let width = cell_m[0].max(cell_m[1]).max(max_lag_m / layout.rings_max as f64);
         let mut lags: Vec<Lag> = estimate
             .lags()
             .filter_map(|(drow, dcol)| Lag::of(estimate, cell_m, [drow, dcol]))
             .filter(|l| l.length <= max_lag_m * (1.0 + 1e-9))
             .collect();
-        let bin = |l: &Lag| (l.length / width).round() as usize;
-        lags.sort_by_key(bin);
-        lags.chunk_by(|a, b| bin(a) == bin(b)).fold(Self::default(), Self::with_bin)
+        let place = |l: &Lag| {
+            let ring = (l.length / width).round() as usize;
+            (ring, if ring == 0 { 0 } else { sector(l.lag, cell_m, layout.sectors) })
+        };
+        lags.sort_by_key(place);
+        lags.chunk_by(|a, b| place(a) == place(b)).fold(Self::default(), |bins, lags| {
+            let (ring, sector) = place(&lags[0]);
+            let azimuth = 180.0 * sector as f64 / layout.sectors as f64;
+            bins.with_bin(lags, (layout.sectors > 1 && ring > 0).then_some(azimuth))
+        })
     }
 
-    fn with_bin(mut self, lags: &[Lag]) -> Self {
+    fn with_bin(mut self, lags: &[Lag], azimuth_deg: Option<f64>) -> Self {
         let pairs: u64 = lags.iter().map(|l| l.pairs).sum();
         let share = |l: &Lag| l.pairs as f64 / pairs as f64;
         let bin = self.lag_m.len();
         self.lag_m.push(lags.iter().map(|l| l.length * share(l)).sum());
+        self.azimuth_deg.push(azimuth_deg);
         self.covariance_m2.push(lags.iter().map(|l| l.sum).sum::<f64>() / pairs as f64);
         self.pairs.push(pairs);
         self.members.extend(lags.iter().map(|l| Member { lag: l.lag, bin, weight: share(l) }));
         self
+    }
+
+    /// Covariance and pairs in these bins of another estimate of the same surface.
+    pub fn bin_sums(&self, estimate: &MaskedCovariance) -> Vec<(f64, u64)> {
+        let mut sums = vec![(0.0, 0); self.len()];
+        for m in &self.members {
+            let (pairs, sum) = estimate.at(m.lag[0], m.lag[1]).unwrap_or_default();
+            sums[m.bin].0 += sum;
+            sums[m.bin].1 += pairs;
+        }
+        sums
     }
 
     /// Number of bins.
@@ -90,6 +124,19 @@ impl Lag {
         let (pairs, sum) = estimate.at(lag[0], lag[1])?;
         (pairs > 0).then(|| Self { lag, length: length_m(lag, cell_m), pairs, sum })
     }
+}
+
+/// Sector of a lag's direction among `sectors` of half a turn.
+fn sector([row, col]: [isize; 2], cell_m: [f64; 2], sectors: usize) -> usize {
+    let turn = libm::atan2(col as f64 * cell_m[0], -(row as f64) * cell_m[1]) / std::f64::consts::PI;
+    // A direction and its opposite are one; a lag on the edge of two sectors goes to the second, as its mirror image does.
+    let place = (turn - turn.floor()) * sectors as f64 + 0.5;
+    place as usize % sectors
+}
+
+/// A lag in cells as `[east, north]` in m: rows count southwards.
+pub fn lag_m([row, col]: [isize; 2], cell_m: [f64; 2]) -> [f64; 2] {
+    [col as f64 * cell_m[0], -(row as f64) * cell_m[1]]
 }
 
 /// Length in m of a lag in cells.

@@ -14,14 +14,25 @@
 //!   ratio: Roberts, 2018) and kept as weights of C by distance, so that it is made once and applied to any model.
 
 use super::Covariance;
-use super::bins::length_m;
+use super::bins::lag_m;
 use crate::detrend::BoxWindow;
 use sastrugi_numeric::fft::{Complex64, HalfSpectrum, RealFft2, smooth_length};
+use std::f64::consts::PI;
 
-/// A torus on which covariances are brought through the detrender.
+/// How a surface was measured.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Measurement {
+    /// Standard deviation of the Gaussian point spread that blurs the surface, m; 0 for a sharp one.
+    pub inner_scale_m: f64,
+    /// Standard deviation of white noise on each cell, m.
+    pub noise_sigma_m: f64,
+}
+
+/// A torus on which covariances are brought through measurement and detrender.
 pub struct DetrendFilter {
     shape: [usize; 2],
     cell_m: [f64; 2],
+    measurement: Measurement,
     fft: RealFft2,
     /// `(1 - D)^2` of complete windows, in the order of a half spectrum.
     response: Vec<f64>,
@@ -39,21 +50,38 @@ impl LagField {
         let [row, col] = [0, 1].map(|k| lag[k].rem_euclid(self.shape[k] as isize) as usize);
         self.values[row * self.shape[1] + col]
     }
+
+    /// The field with `f` applied to every value.
+    pub fn map(&self, f: impl Fn(f64) -> f64) -> Self {
+        Self { shape: self.shape, values: self.values.iter().map(|v| f(*v)).collect() }
+    }
 }
 
 impl DetrendFilter {
     /// The filter for lags up to `max_lag` cells.
-    pub fn new(window: BoxWindow, cell_m: [f64; 2], max_lag: [usize; 2]) -> Self {
+    pub fn new(window: BoxWindow, cell_m: [f64; 2], max_lag: [usize; 2], measurement: Measurement) -> Self {
         let width = window.cells();
         let shape = [0, 1].map(|k| smooth_length(2 * (max_lag[k] + width[k].max(max_lag[k]))));
         let fft = RealFft2::new(shape[0], shape[1]);
         let response = fft.forward(&complete_window(window, shape)).values.iter().map(|s| s.norm_sqr()).collect();
-        Self { shape, cell_m, fft, response }
+        Self { shape, cell_m, measurement, fft, response }
     }
 
-    /// Covariance of the residual of a field with covariance `model`, windows complete.
-    pub fn residual_covariance(&self, model: &Covariance) -> LagField {
-        let mut spectrum = self.fft.forward(&torus_covariance(self.shape, self.cell_m, model));
+    /// Covariance of the measured surface.
+    pub fn measured_covariance(&self, model: &Covariance) -> LagField {
+        let mut values = torus_covariance(self.shape, self.cell_m, model);
+        if self.measurement.inner_scale_m > 0.0 {
+            let mut spectrum = self.fft.forward(&values);
+            blur(&mut spectrum, self.cell_m, self.measurement.inner_scale_m);
+            values = self.fft.inverse(spectrum);
+        }
+        values[0] += self.measurement.noise_sigma_m * self.measurement.noise_sigma_m;
+        LagField { shape: self.shape, values }
+    }
+
+    /// Covariance of the residual of a field with the covariance `measured`, windows complete.
+    pub fn residual_covariance(&self, measured: &LagField) -> LagField {
+        let mut spectrum = self.fft.forward(&measured.values);
         spectrum.values.iter_mut().zip(&self.response).for_each(|(s, a)| *s = Complex64::new(s.re * a, 0.0));
         LagField { shape: self.shape, values: self.fft.inverse(spectrum) }
     }
@@ -66,23 +94,43 @@ impl DetrendFilter {
     }
 }
 
-impl LagField {
-    /// The field with `f` applied to every value.
-    pub fn map(&self, f: impl Fn(f64) -> f64) -> Self {
-        Self { shape: self.shape, values: self.values.iter().map(|v| f(*v)).collect() }
+/// What a Gaussian point spread of standard deviation `s` leaves of a power spectrum: `exp(-(2 pi f s)^2)`, f in cycles per
+/// m. The spectrum is that of a grid, so that spreads below half a cell blur a little less than this says.
+pub(crate) fn blur(spectrum: &mut HalfSpectrum, cell_m: [f64; 2], spread_m: f64) {
+    let (rows, cols) = (spectrum.rows, spectrum.cols);
+    let angle = |k: usize, n: usize, cell: f64| 2.0 * PI * k.min(n - k) as f64 / (n as f64 * cell) * spread_m;
+    for (k, value) in spectrum.values.iter_mut().enumerate() {
+        let (x, y) = (angle(k / rows, cols, cell_m[0]), angle(k % rows, rows, cell_m[1]));
+        *value *= libm::exp(-(x * x + y * y));
     }
 }
 
 /// A covariance on a torus of `shape` cells, each lag taken the short way round.
-fn torus_covariance(shape: [usize; 2], cell_m: [f64; 2], model: &Covariance) -> Vec<f64> {
-    let short = |k: usize, n: usize| k.min(n - k) as isize;
+pub(crate) fn torus_covariance(shape: [usize; 2], cell_m: [f64; 2], model: &Covariance) -> Vec<f64> {
     let [rows, cols] = shape;
     let mut field = vec![0.0; rows * cols];
     for row in 0..=rows / 2 {
-        let half: Vec<f64> = (0..=cols / 2).map(|c| model.at(length_m([row as isize, c as isize], cell_m))).collect();
-        for mirrored in [row, (rows - row) % rows] {
-            let line = &mut field[mirrored * cols..(mirrored + 1) * cols];
-            line.iter_mut().enumerate().for_each(|(c, v)| *v = half[short(c, cols) as usize]);
+        let at = |col: isize| model.at(lag_m([row as isize, col], cell_m));
+        let east: Vec<f64> = (0..=cols as isize / 2).map(at).collect();
+        let west: Vec<f64> = match model.is_isotropic() {
+            true => east.clone(),
+            false => (0..=cols as isize / 2).map(|c| at(-c)).collect(),
+        };
+        let line: Vec<f64> = (0..cols)
+            .map(|c| match (2 * c).cmp(&cols) {
+                std::cmp::Ordering::Less => east[c],
+                // Half way round is east as well as west.
+                std::cmp::Ordering::Equal => 0.5 * (east[c] + west[c]),
+                std::cmp::Ordering::Greater => west[cols - c],
+            })
+            .collect();
+        // The row as far north holds the opposite lags; a row half way round is both.
+        let opposite = (rows - row) % rows;
+        for c in 0..cols {
+            let mirrored = line[(cols - c) % cols];
+            let value = if opposite == row { 0.5 * (line[c] + mirrored) } else { line[c] };
+            field[row * cols + c] = value;
+            field[opposite * cols + c] = if opposite == row { value } else { mirrored };
         }
     }
     field

@@ -8,21 +8,21 @@
 //! for. Pairs and cells follow a low-discrepancy sequence (Kronecker with powers of the generalised golden ratio: Roberts,
 //! 2018): nothing is random.
 
-use super::Covariance;
-use super::bins::{LagBins, Member, length_m};
+use super::bins::{LagBins, Member};
+use super::filtered::LagField;
 use crate::detrend::BoxWindow;
 use rayon::prelude::*;
 
-/// Pairs with a partial window that are averaged over in each bin (about).
-const PARTIAL_PAIRS: f64 = 2048.0;
+/// Pairs with a partial window that are averaged over in each bin (about): the correction is good to 1e-4 of the variance.
+pub const PAIRS_FINE: f64 = 2048.0;
+/// The same where half that precision is enough.
+pub const PAIRS_ROUGH: f64 = 512.0;
 /// Most pairs looked at in each bin.
 const PAIRS_MAX: f64 = 32_768.0;
 /// Blocks along a window for its covariance with a cell.
 const FINE_BLOCKS: usize = 8;
 /// Blocks along a window for its covariance with another window, which is smoother.
 const COARSE_BLOCKS: usize = 4;
-/// Distances kept per cell; between them the covariance is taken as linear, with an error of 5e-4 (cell / b)^2.
-const DISTANCES_PER_CELL: f64 = 16.0;
 
 /// The raster's cells as the detrender saw them.
 pub struct DetrendedCells<'a> {
@@ -36,50 +36,53 @@ pub struct DetrendedCells<'a> {
     pub residual: &'a [f64],
 }
 
-/// What partial windows add to the covariance of the residual in each bin, as weights of the model by distance.
+/// What partial windows add to the covariance of the residual in each bin, as weights of the surface's covariance by lag.
+/// Memory: 8 bytes per bin and lag within the largest lag and two windows, one of two opposite lags.
 pub struct PartialWindows {
-    step_m: f64,
-    /// `weights[bin][k]`: weight of the covariance at `k * step_m`.
+    /// Largest lag with a weight, in cells.
+    reach: [isize; 2],
+    /// Weights of each bin; empty when all windows are complete.
     weights: Vec<Vec<f64>>,
 }
 
 impl PartialWindows {
-    /// The weights for the bins of a raster.
-    pub fn new(cells: &DetrendedCells, window: BoxWindow, cell_m: [f64; 2], bins: &LagBins) -> Self {
-        let step_m = cell_m[0].min(cell_m[1]) / DISTANCES_PER_CELL;
-        let centres = centres(cells, window.area() as u32);
+    /// The weights for the bins of a raster, from about `pairs` pairs with a partial window for each bin.
+    pub fn new(cells: &DetrendedCells, window: BoxWindow, bins: &LagBins, pairs: f64) -> Self {
+        let centres = centres(cells, window.area() as u32, pairs);
+        let largest = |axis: usize| bins.members.iter().map(|m| m.lag[axis].abs()).max().unwrap_or(0);
+        let reach = [0, 1].map(|axis| largest(axis) + 2 * window.half[axis] as isize);
         if centres.is_empty() {
-            return Self { step_m, weights: vec![Vec::new(); bins.len()] };
+            return Self { reach, weights: vec![Vec::new(); bins.len()] };
         }
-        let sampler = Sampler { cells, window, cell_m, data: DataCount::new(cells) };
-        let [rows, cols] = window.cells().map(|w| w as isize);
-        let lag_max_m = bins.members.iter().map(|m| length_m(m.lag, cell_m)).fold(0.0, f64::max);
-        let distances = ((lag_max_m + length_m([rows, cols], cell_m)) / step_m) as usize + 2;
+        let sampler = Sampler { cells, window, data: DataCount::new(cells) };
         let members: Vec<&[Member]> = bins.members.chunk_by(|a, b| a.bin == b.bin).collect();
         let weights = members.into_par_iter().enumerate().map(|(bin, members)| {
             let draws = centres.iter().enumerate().map(|(s, &cell)| (cell, Draw { index: s * bins.len() + bin }));
-            sampler.mean_weights(draws, members, Line { step_m, weights: vec![0.0; distances] })
+            sampler.mean_weights(draws, members, LagWeights::new(reach))
         });
-        Self { step_m, weights: weights.collect() }
+        Self { reach, weights: weights.collect() }
     }
 
-    /// What is added in each bin for a model, m2.
-    pub fn correction(&self, model: &Covariance) -> Vec<f64> {
-        let distances = self.weights.iter().map(Vec::len).max().unwrap_or(0);
-        let covariance: Vec<f64> = (0..distances).map(|k| model.at(k as f64 * self.step_m)).collect();
+    /// What is added in each bin for a surface with the covariance `measured`, m2.
+    pub fn correction(&self, measured: &LagField) -> Vec<f64> {
+        if self.weights.iter().all(Vec::is_empty) {
+            return vec![0.0; self.weights.len()];
+        }
+        let [rows, cols] = self.reach;
+        let covariance: Vec<f64> = (0..=rows).flat_map(|r| (-cols..=cols).map(move |c| measured.at([r, c]))).collect();
         self.weights.iter().map(|line| line.iter().zip(&covariance).map(|(w, c)| w * c).sum()).collect()
     }
 }
 
 /// First cells of the pairs, spread evenly over the cells used: the more, the fewer windows are partial; none when all
 /// are complete.
-fn centres(cells: &DetrendedCells, area: u32) -> Vec<usize> {
+fn centres(cells: &DetrendedCells, area: u32, pairs: f64) -> Vec<usize> {
     let used = || (0..cells.residual.len()).filter(|&k| !cells.residual[k].is_nan());
     let (total, partial) = (used().count(), used().filter(|&k| cells.count[k] < area).count());
     if partial == 0 {
         return Vec::new();
     }
-    let samples = (PARTIAL_PAIRS * total as f64 / partial as f64).min(PAIRS_MAX) as usize;
+    let samples = (pairs * total as f64 / partial as f64).min(PAIRS_MAX) as usize;
     let mut ranks: Vec<usize> = (0..samples).map(|index| Draw { index }.below(5, total)).collect();
     ranks.sort_unstable();
     let mut wanted = ranks.into_iter().peekable();
@@ -92,22 +95,20 @@ fn centres(cells: &DetrendedCells, area: u32) -> Vec<usize> {
     centres
 }
 
-/// Weights by distance.
-struct Line {
-    step_m: f64,
+/// Weights by lag, one of two opposite lags: `row` in `0..=reach[0]` (outer), `col` in `-reach[1]..=reach[1]` (inner).
+struct LagWeights {
+    reach: [isize; 2],
     weights: Vec<f64>,
 }
 
-impl Line {
-    /// Adds a weight at a distance, shared between the two neighbouring nodes.
-    fn add(&mut self, distance_m: f64, weight: f64) {
-        let position = distance_m / self.step_m;
-        let node = position as usize;
-        let part = position - node as f64;
-        if let [near, far] = &mut self.weights[node..node + 2] {
-            *near += weight * (1.0 - part);
-            *far += weight * part;
-        }
+impl LagWeights {
+    fn new(reach: [isize; 2]) -> Self {
+        Self { reach, weights: vec![0.0; ((reach[0] + 1) * (2 * reach[1] + 1)) as usize] }
+    }
+
+    fn add(&mut self, [row, col]: [isize; 2], weight: f64) {
+        let (row, col) = if row < 0 { (-row, -col) } else { (row, col) };
+        self.weights[(row * (2 * self.reach[1] + 1) + col + self.reach[1]) as usize] += weight;
     }
 }
 
@@ -124,8 +125,8 @@ struct Part {
     complete_offset: [isize; 2],
     /// Number of cells times the variance of `D_i` in them.
     scatter: f64,
-    /// Distance between two of its cells, m.
-    spread_m: f64,
+    /// Lag between two of its cells.
+    spread: [isize; 2],
 }
 
 impl Part {
@@ -138,13 +139,17 @@ impl Part {
 struct Sampler<'a> {
     cells: &'a DetrendedCells<'a>,
     window: BoxWindow,
-    cell_m: [f64; 2],
     data: DataCount,
 }
 
 impl Sampler<'_> {
     /// Mean over the pairs that start at the drawn cells.
-    fn mean_weights(&self, draws: impl Iterator<Item = (usize, Draw)>, members: &[Member], mut line: Line) -> Vec<f64> {
+    fn mean_weights(
+        &self,
+        draws: impl Iterator<Item = (usize, Draw)>,
+        members: &[Member],
+        mut line: LagWeights,
+    ) -> Vec<f64> {
         let mut pairs = 0;
         for (cell, draw) in draws {
             let lag = members[draw.below(0, members.len())].lag;
@@ -155,7 +160,7 @@ impl Sampler<'_> {
     }
 
     /// Adds the pair of `cell` and the cell a lag away; false when that one is not used.
-    fn add_pair(&self, cell: usize, lag: [isize; 2], draw: &Draw, line: &mut Line) -> bool {
+    fn add_pair(&self, cell: usize, lag: [isize; 2], draw: &Draw, line: &mut LagWeights) -> bool {
         let at = [cell / self.cells.cols, cell % self.cells.cols].map(|k| k as isize);
         let partner = [at[0] + lag[0], at[1] + lag[1]];
         let Some(second) = self.index(partner).filter(|&k| !self.cells.residual[k].is_nan()) else { return false };
@@ -176,34 +181,33 @@ impl Sampler<'_> {
     }
 
     /// `- D_i(j) C(h - j) - D_(i+h)(k) C(h + k)`, less the same of complete windows.
-    fn add_cell_window(&self, lag: [isize; 2], [near, far]: &[Vec<Part>; 2], line: &mut Line) {
+    fn add_cell_window(&self, lag: [isize; 2], [near, far]: &[Vec<Part>; 2], line: &mut LagWeights) {
         for (parts, sign) in [(near, -1), (far, 1)] {
             for p in parts {
-                let distance = |o: [isize; 2]| length_m([lag[0] + sign * o[0], lag[1] + sign * o[1]], self.cell_m);
-                line.add(distance(p.offset), -p.share);
-                line.add(distance(p.complete_offset), p.complete_share);
+                let moved = |o: [isize; 2]| [lag[0] + sign * o[0], lag[1] + sign * o[1]];
+                line.add(moved(p.offset), -p.share);
+                line.add(moved(p.complete_offset), p.complete_share);
             }
         }
     }
 
     /// `D_i(j) D_(i+h)(k) C(h + k - j)`, less the same of complete windows.
-    fn add_window_window(&self, lag: [isize; 2], [near, far]: &[Vec<Part>; 2], line: &mut Line) {
+    fn add_window_window(&self, lag: [isize; 2], [near, far]: &[Vec<Part>; 2], line: &mut LagWeights) {
         let half = self.window.half.map(|h| h as isize);
-        let distance =
-            |n: [isize; 2], f: [isize; 2]| length_m([lag[0] + f[0] - n[0], lag[1] + f[1] - n[1]], self.cell_m);
+        let apart = |n: [isize; 2], f: [isize; 2]| [lag[0] + f[0] - n[0], lag[1] + f[1] - n[1]];
         for n in near {
             for f in far {
                 let (share, complete) = (n.share * f.share, n.complete_share * f.complete_share);
                 if n.in_place() && f.in_place() {
-                    line.add(distance(n.offset, f.offset), share - complete);
+                    line.add(apart(n.offset, f.offset), share - complete);
                 } else {
-                    line.add(distance(n.offset, f.offset), share);
-                    line.add(distance(n.complete_offset, f.complete_offset), -complete);
+                    line.add(apart(n.offset, f.offset), share);
+                    line.add(apart(n.complete_offset, f.complete_offset), -complete);
                 }
             }
             if (0..2).all(|k| (n.offset[k] - lag[k]).abs() <= half[k]) {
-                line.add(0.0, n.scatter);
-                line.add(n.spread_m, -n.scatter);
+                line.add([0, 0], n.scatter);
+                line.add(n.spread, -n.scatter);
             }
         }
     }
@@ -231,7 +235,7 @@ impl Sampler<'_> {
                 complete_share: cells(whole) / self.window.area() as f64,
                 complete_offset: [0, 1].map(|k| point(whole[k], place[k])),
                 scatter: scatter(density, cells(filled)) * cell_share * cell_share,
-                spread_m: length_m([offset[0] - mate[0], offset[1] - mate[1]], self.cell_m),
+                spread: [offset[0] - mate[0], offset[1] - mate[1]],
             });
             let share = (1.0 - density) * cell_share;
             parts.extend(here.map(|&offset| Part {
@@ -240,7 +244,7 @@ impl Sampler<'_> {
                 complete_share: 0.0,
                 complete_offset: offset,
                 scatter: 0.0,
-                spread_m: 0.0,
+                spread: [0, 0],
             }));
         }
         parts

@@ -34,19 +34,18 @@ pub struct Expectation<'a> {
     pub partial: PartialWindows,
     /// The bins of the data.
     pub bins: &'a LagBins,
-    /// Residuals beyond this were trimmed, m.
-    pub threshold_m: f64,
     /// Number of residuals before trimming.
     pub cells: usize,
 }
 
 impl Expectation<'_> {
-    /// Expected covariance of each bin, m2.
-    pub fn mean(&self, model: &Covariance) -> Vec<f64> {
-        let residual = self.filter.residual_covariance(model);
-        let partial = self.partial.correction(model);
+    /// Expected covariance of each bin when residuals beyond `threshold_m` are trimmed, m2.
+    pub fn mean(&self, model: &Covariance, threshold_m: f64) -> Vec<f64> {
+        let measured = self.filter.measured_covariance(model);
+        let residual = self.filter.residual_covariance(&measured);
+        let partial = self.partial.correction(&measured);
         let variance = residual.at([0, 0]) + partial[0];
-        let trimmed = self.trimmed(variance);
+        let trimmed = trimmed(variance, threshold_m);
         let mut mean = vec![0.0; self.bins.len()];
         for m in &self.bins.members {
             mean[m.bin] += m.weight * variance * trimmed.covariance((residual.at(m.lag) + partial[m.bin]) / variance);
@@ -55,10 +54,10 @@ impl Expectation<'_> {
     }
 
     /// Covariance of the bins' estimates, row-major, m4.
-    pub fn covariance(&self, model: &Covariance) -> Vec<f64> {
-        let residual = self.filter.residual_covariance(model);
+    pub fn covariance(&self, model: &Covariance, threshold_m: f64) -> Vec<f64> {
+        let residual = self.filter.residual_covariance(&self.filter.measured_covariance(model));
         let variance = residual.at([0, 0]);
-        let trimmed = self.trimmed(variance);
+        let trimmed = trimmed(variance, threshold_m);
         let products = residual.map(|c| variance * trimmed.moments(c / variance).0);
         let linear = residual.map(|c| trimmed.linear_share() * c);
         let [second, product_orders, linear_order] =
@@ -66,7 +65,7 @@ impl Expectation<'_> {
 
         let bin_covariance = self.bins.average(|lag| residual.at(lag));
         let answers: Vec<[f64; 2]> =
-            (0..self.bins.len()).map(|k| self.answer(k, bin_covariance[k], variance)).collect();
+            (0..self.bins.len()).map(|k| answer(k, bin_covariance[k], variance, threshold_m)).collect();
         let pairs: Vec<f64> = bin_covariance.iter().map(|c| trimmed.moments(c / variance).1).collect();
         let n = self.bins.len();
         let mut matrix = vec![0.0; n * n];
@@ -81,24 +80,6 @@ impl Expectation<'_> {
         }
         (0..n).for_each(|k| matrix[k * n + k] *= 1.0 + RIDGE);
         matrix
-    }
-
-    fn trimmed(&self, variance: f64) -> TrimmedNormal {
-        TrimmedNormal::new(self.threshold_m / variance.sqrt())
-    }
-
-    /// Derivatives of a bin's mean with respect to its own untrimmed covariance `c` and to the variance.
-    fn answer(&self, bin: usize, c: f64, variance: f64) -> [f64; 2] {
-        let mean = |c: f64, variance: f64| variance * self.trimmed(variance).covariance(c / variance);
-        let step = DIFFERENCE * variance;
-        if bin == 0 {
-            return [
-                0.0,
-                (mean(variance + step, variance + step) - mean(variance - step, variance - step)) / (2.0 * step),
-            ];
-        }
-        let own = (mean(c, variance) - mean(c - step, variance)) / step;
-        [own, (mean(c, variance + step) - mean(c, variance)) / step]
     }
 
     /// `B` between all bins from `Q`.
@@ -118,6 +99,22 @@ impl Expectation<'_> {
         }
         matrix
     }
+}
+
+fn trimmed(variance: f64, threshold_m: f64) -> TrimmedNormal {
+    TrimmedNormal::new(threshold_m / variance.sqrt())
+}
+
+/// Derivatives of a bin's mean with respect to its own untrimmed covariance `c` and to the variance.
+fn answer(bin: usize, c: f64, variance: f64, threshold_m: f64) -> [f64; 2] {
+    let mean = |c: f64, variance: f64| variance * trimmed(variance, threshold_m).covariance(c / variance);
+    let step = DIFFERENCE * variance;
+    if bin == 0 {
+        let [above, below] = [variance + step, variance - step].map(|v| mean(v, v));
+        return [0.0, (above - below) / (2.0 * step)];
+    }
+    let own = (mean(c, variance) - mean(c - step, variance)) / step;
+    [own, (mean(c, variance + step) - mean(c, variance)) / step]
 }
 
 /// At most [`BIN_LAGS`] lags of a bin, evenly spread.

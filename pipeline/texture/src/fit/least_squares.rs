@@ -49,6 +49,12 @@ pub fn minimise(start: &[f64], bounds: &[(f64, f64)], residuals: impl Fn(&[f64])
     Minimum { value: squares(&current), at, steps }
 }
 
+/// `J'J` of the residuals at a point, row-major: half the curvature of the sum of squares.
+pub fn curvature(at: &[f64], residuals: impl Fn(&[f64]) -> Vec<f64>) -> Vec<f64> {
+    let here = residuals(at);
+    normal_equations(at, &here, residuals).0
+}
+
 /// `J'J` (row-major) and `J'r`.
 fn normal_equations(at: &[f64], r: &[f64], residuals: impl Fn(&[f64]) -> Vec<f64>) -> (Vec<f64>, Vec<f64>) {
     let slope = |k: usize| -> Vec<f64> {
@@ -117,5 +123,17 @@ impl Cholesky {
             out[i] = (out[i] - known) / self.lower[i * n + i];
         }
         out
+    }
+
+    /// Logarithm of the determinant of `L L'`.
+    pub fn log_determinant(&self) -> f64 {
+        2.0 * (0..self.n).map(|k| libm::log(self.lower[k * (self.n + 1)])).sum::<f64>()
+    }
+
+    /// Inverse of `L L'`, row-major.
+    pub fn inverse(&self) -> Vec<f64> {
+        let unit = |k: usize| (0..self.n).map(|i| f64::from(u8::from(i == k))).collect::<Vec<f64>>();
+        // Symmetric: columns are rows.
+        (0..self.n).flat_map(|k| self.solve(&unit(k))).collect()
     }
 }

@@ -1,6 +1,7 @@
 //! Parameters of a fit.
 
-use crate::covariance::{self, Model};
+use crate::covariance::Form;
+use crate::covariance::filtered::Measurement;
 use crate::detrend::BoxWindow;
 use sastrugi_numeric::Geometry;
 use sastrugi_schemas::ParameterError;
@@ -43,14 +44,28 @@ pub struct FitParameters {
     /// Significance level at which residuals are trimmed on both sides, in (0, 0.5). Default 0.05 (Vecherin et al.
     /// 2022, section 2).
     pub trim: f64,
-    /// Covariance model. Default `exponential` (Vecherin et al. 2022, Eq. 9).
+    /// Covariance model, or several with commas, or `auto` for the usual ones: the best by AICc is taken, all are listed. A
+    /// model is `exponential`, `gaussian`, `spherical`, `matern` or `self_affine`, a sum of two (`exponential+gaussian`),
+    /// with `+nugget` after it or `anisotropic:` before it where wanted. Default `exponential` (Vecherin et al. 2022,
+    /// Eq. 9).
     pub model: String,
     /// Largest lag of the covariance, m. Default: half the outer scale, at least 3 cells.
     pub max_lag_m: Option<f64>,
     /// Cells count when more than this share of their window has data. Default 0.5; 0.9 in `paper` mode.
     pub min_valid_share: Option<f64>,
+    /// Replicates of the parametric bootstrap that gives intervals; 0 for none. Default 99. `paper` mode has none.
+    pub bootstrap: u32,
+    /// Standard deviation of the Gaussian point spread that blurred the DEM (photogrammetry's smoothing), m. Default 0.
+    pub inner_scale_m: f64,
+    /// Standard deviation of the DEM's white noise per cell, m. Default 0: where it is not known, a `+nugget` model finds it.
+    pub noise_sigma_m: f64,
 }
 
+/// What `auto` tries.
+const AUTO: [&str; 7] =
+    ["exponential", "gaussian", "spherical", "matern", "self_affine", "exponential+nugget", "exponential+gaussian"];
+/// Most replicates.
+const BOOTSTRAP_MAX: u32 = 100_000;
 /// Outer scale of the paper, m.
 const OUTER_SCALE_M: f64 = 2.0;
 /// Significance level of the paper.
@@ -69,6 +84,9 @@ impl Default for FitParameters {
             model: "exponential".to_owned(),
             max_lag_m: None,
             min_valid_share: None,
+            bootstrap: 99,
+            inner_scale_m: 0.0,
+            noise_sigma_m: 0.0,
         }
     }
 }
@@ -77,7 +95,7 @@ impl Default for FitParameters {
 #[derive(Clone)]
 pub struct FitSettings {
     parameters: FitParameters,
-    pub(super) model: &'static dyn Model,
+    pub(super) forms: Vec<Form>,
     pub(super) min_valid_share: f64,
 }
 
@@ -95,8 +113,26 @@ impl TryFrom<FitParameters> for FitSettings {
         if !(0.0..1.0).contains(&share) {
             return Err(ParameterError::new("min_valid_share", format!("is {share}; it must lie in [0, 1)")));
         }
-        let model = covariance::model(&parameters.model)?;
-        Ok(Self { parameters, model, min_valid_share: share })
+        ParameterError::not_negative("inner_scale_m", parameters.inner_scale_m)?;
+        ParameterError::not_negative("noise_sigma_m", parameters.noise_sigma_m)?;
+        if parameters.bootstrap > BOOTSTRAP_MAX {
+            let message = format!("is {}; at most {BOOTSTRAP_MAX} replicates are made", parameters.bootstrap);
+            return Err(ParameterError::new("bootstrap", message));
+        }
+        let forms = forms(&parameters.model)?;
+        if parameters.mode == Mode::Paper && (forms.len() > 1 || forms[0].is_anisotropic()) {
+            let message = format!("is `{}`; the published procedure fits one isotropic model", parameters.model);
+            return Err(ParameterError::new("model", message));
+        }
+        Ok(Self { parameters, forms, min_valid_share: share })
+    }
+}
+
+/// The forms that a `model` parameter names.
+fn forms(text: &str) -> Result<Vec<Form>, ParameterError> {
+    match text.trim() {
+        "auto" => AUTO.into_iter().map(Form::parse).collect(),
+        list => list.split(',').map(|name| Form::parse(name.trim())).collect(),
     }
 }
 
@@ -108,6 +144,25 @@ impl FitSettings {
 
     pub(super) fn mode(&self) -> Mode {
         self.parameters.mode
+    }
+
+    pub(super) fn outer_scale_m(&self) -> f64 {
+        self.parameters.outer_scale_m
+    }
+
+    pub(super) fn bootstrap(&self) -> usize {
+        self.parameters.bootstrap as usize
+    }
+
+    pub(super) fn measurement(&self) -> Measurement {
+        let FitParameters { inner_scale_m, noise_sigma_m, .. } = self.parameters;
+        Measurement { inner_scale_m, noise_sigma_m }
+    }
+
+    /// The same fit at another outer scale.
+    pub(super) fn at_outer_scale(&self, outer_scale_m: f64) -> Self {
+        let parameters = FitParameters { outer_scale_m, max_lag_m: None, ..self.parameters.clone() };
+        Self { parameters, ..self.clone() }
     }
 
     pub(super) fn trim(&self) -> f64 {

@@ -1,43 +1,115 @@
 //! The fit file: figures, diagnostics and warnings.
 
-use super::{Case, Estimate, Mode};
-use crate::covariance::bins::length_m;
-use sastrugi_schemas::fit::{FitFile, Trim};
+use super::Mode;
+use super::case::Case;
+use super::estimator::{Estimate, Estimator, difference, on_surface};
+use super::resampling::sill_over_range;
+use super::verdicts::{Isotropy, Stationarity, no_scale_separation};
+use crate::covariance::{Covariance, Form};
+use sastrugi_schemas::fit::{Candidate, DirectionBin, FitFile, GsTools, Intervals, Profile, Trim};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
+use std::f64::consts::FRAC_PI_2;
 
 /// Naive range over window above which the true range cannot be told (its ceiling for a pure exponential is 0.135).
 const NAIVE_RANGE_MAX: f64 = 0.12;
 /// Rise of twice the log-likelihood that rules a parameter out at 95 % (chi-squared, one degree of freedom).
 const LIKELIHOOD_RISE: f64 = 3.84;
-/// Misfit over variance above which the model is called wrong.
+/// Misfit over variance above which the model is called wrong whatever the p-value.
 const MISFIT_MAX: f64 = 0.05;
 /// Share of measured cells taken for outliers above which the site is called cluttered.
 const OUTLIER_SHARE_MAX: f64 = 0.1;
+/// Level of every warning that comes from a test.
+const TEST_LEVEL: f64 = 0.01;
+/// Least elongation that is worth a warning, as a ratio of ranges.
+const RATIO_WORTH_A_WARNING: f64 = 0.9;
+/// Least spread of block sigmas that is worth a warning.
+const SIGMAS_WORTH_A_WARNING: f64 = 1.2;
 
-pub(super) fn fit_file(case: &Case, naive: &Estimate, estimate: &Estimate) -> FitFile {
-    let figures = Figures::of(case, naive, estimate);
-    let model = estimate.model;
+/// What was found beside the estimate.
+#[derive(Default)]
+pub struct Findings {
+    pub intervals: Option<Intervals>,
+    pub block_intervals: Option<Intervals>,
+    pub candidates: Vec<Candidate>,
+    pub profile: Option<Profile>,
+    /// Largest disagreement of fits at other windows, in standard errors.
+    pub disagreement: Option<f64>,
+    pub others: Vec<Value>,
+    pub isotropy: Option<Isotropy>,
+    pub stationarity: Option<Stationarity>,
+    pub misfit_p: Option<f64>,
+    pub normality_p: Option<f64>,
+    pub directions: Vec<DirectionBin>,
+}
+
+/// The fit file; `binned` is the model in the rings as the estimator sees it, m2.
+pub fn fit_file(case: &Case, naive: &Estimate, estimate: &Estimate, binned: Vec<f64>, findings: &Findings) -> FitFile {
+    let figures = Figures::of(case, naive, estimate, &binned);
     FitFile {
         mode: case.settings.mode().name().to_owned(),
-        model: case.settings.model.kind().kind.to_owned(),
-        parameters: [("sigma_m", model.sigma_m), ("range_m", model.range_m)].map(|(k, v)| (k.to_owned(), v)).into(),
-        window_m: Some(case.window.size_m(case.cell_m)),
+        model: estimate.form.name().to_owned(),
+        parameters: estimate.covariance.parameters(&estimate.form),
+        window_m: Some(case.window.size_m(case.geometry.cell)),
         trim: Some(Trim {
             level: case.settings.trim(),
             threshold_m: case.trimmed.threshold_m,
             masked_share: 1.0 - figures.share(case.trimmed.kept),
         }),
-        cell_m: Some(case.cell_m),
+        cell_m: Some(case.geometry.cell),
         lags_m: case.bins.lag_m.clone(),
         covariance_m2: case.bins.covariance_m2.clone(),
         pairs: case.bins.pairs.clone(),
-        model_m2: estimate.binned.clone(),
-        surface_model_m2: case.bins.average(|lag| model.at(length_m(lag, case.cell_m))),
-        diagnostics: figures.diagnostics(case, naive, estimate),
-        warnings: figures.warnings(case, naive, estimate),
+        model_m2: binned,
+        surface_model_m2: on_surface(case, &estimate.covariance),
+        diagnostics: figures.diagnostics(case, naive, estimate, findings),
+        intervals: findings.intervals.clone(),
+        block_intervals: findings.block_intervals.clone(),
+        candidates: findings.candidates.clone(),
+        profile: findings.profile.clone(),
+        directions: findings.directions.clone(),
+        gstools: gstools(&estimate.form, &estimate.covariance),
+        warnings: figures.warnings(case, naive, estimate, findings),
         source: None,
     }
+}
+
+/// The covariance by direction, and the model as an estimator on bins by direction sees it there.
+pub fn directions(estimator: &Estimator, estimate: &Estimate) -> Vec<DirectionBin> {
+    let bins = estimator.bins;
+    let model = estimator.mean(&estimate.covariance);
+    let bin = |k: usize| {
+        Some(DirectionBin {
+            lag_m: bins.lag_m[k],
+            azimuth_deg: bins.azimuth_deg[k]?,
+            covariance_m2: bins.covariance_m2[k],
+            pairs: bins.pairs[k],
+            model_m2: model[k],
+        })
+    };
+    (0..bins.len()).filter_map(bin).collect()
+}
+
+/// The model in the words of GSTools; `None` for sums and self-affine surfaces, which it has no class for.
+fn gstools(form: &Form, covariance: &Covariance) -> Option<GsTools> {
+    let [term] = covariance.structures.as_slice() else { return None };
+    let (model, len_scale, more) = match form.terms()[0].kind().kind {
+        "exponential" => ("Exponential", term.range_m, vec![("rescale", 1.0)]),
+        "gaussian" => ("Gaussian", term.range_m, vec![("rescale", 1.0)]),
+        "spherical" => ("Spherical", term.range_m, vec![("rescale", 1.0)]),
+        // GSTools' argument is sqrt(nu) h / len_scale.
+        "matern" => ("Matern", term.range_m * term.shape.sqrt(), vec![("rescale", 1.0), ("nu", term.shape)]),
+        _ => return None,
+    };
+    Some(GsTools {
+        model: model.to_owned(),
+        var: covariance.variance_m2(),
+        len_scale,
+        nugget: covariance.nugget_m2,
+        anis: covariance.ratio,
+        angles: FRAC_PI_2 - covariance.azimuth_deg.to_radians(),
+        more: more.into_iter().map(|(k, v)| (k.to_owned(), v)).collect(),
+    })
 }
 
 /// Figures that diagnostics and warnings share.
@@ -53,15 +125,14 @@ struct Figures {
 }
 
 impl Figures {
-    fn of(case: &Case, naive: &Estimate, estimate: &Estimate) -> Self {
-        let misfit = super::difference(&case.bins.covariance_m2, &estimate.binned);
-        let freedom = (misfit.len() - 2) as f64;
+    fn of(case: &Case, naive: &Estimate, estimate: &Estimate, binned: &[f64]) -> Self {
+        let misfit = difference(&case.bins.covariance_m2, binned);
         Self {
             cells: case.detrended.trusted.len(),
             trusted: case.detrended.trusted.iter().filter(|z| !z.is_nan()).count(),
             misfit_m2: (misfit.iter().map(|d| d * d).sum::<f64>() / misfit.len() as f64).sqrt(),
-            naive_range_windows: naive.model.range_m / case.window_m(),
-            misfit_ratio: estimate.objective.map(|o| o.value / freedom),
+            naive_range_windows: naive.covariance.range_m() / case.window_m(),
+            misfit_ratio: estimate.misfit_ratio(),
         }
     }
 
@@ -69,14 +140,19 @@ impl Figures {
         count as f64 / self.cells as f64
     }
 
-    fn diagnostics(&self, case: &Case, naive: &Estimate, estimate: &Estimate) -> BTreeMap<String, Value> {
-        let (model, detrended, trimmed) = (estimate.model, &case.detrended, &case.trimmed);
+    fn diagnostics(
+        &self,
+        case: &Case,
+        naive: &Estimate,
+        estimate: &Estimate,
+        findings: &Findings,
+    ) -> BTreeMap<String, Value> {
+        let (detrended, trimmed) = (&case.detrended, &case.trimmed);
         let mut entries = vec![
-            ("sigma2_over_range_m", json!(model.sigma_m * model.sigma_m / model.range_m)),
-            ("naive_sigma_m", json!(naive.model.sigma_m)),
-            ("naive_range_m", json!(naive.model.range_m)),
+            ("naive_sigma_m", json!(naive.covariance.sigma_m())),
+            ("naive_range_m", json!(naive.covariance.range_m())),
             ("naive_range_windows", json!(self.naive_range_windows)),
-            ("iterations", json!(estimate.iterations)),
+            ("iterations", json!(estimate.steps)),
             ("misfit_m2", json!(self.misfit_m2)),
             ("lag_max_m", json!(case.max_lag_m)),
             ("window_cells", json!([case.window.cells()[1], case.window.cells()[0]])),
@@ -86,53 +162,133 @@ impl Figures {
             ("window_lacks_data_share", json!(self.share(self.trusted - trimmed.detrended))),
             ("trimmed_share", json!(self.share(trimmed.detrended - trimmed.kept))),
         ];
-        if let Some(objective) = estimate.objective {
-            entries.push(("misfit_chi2_per_freedom", json!(self.misfit_ratio)));
-            entries.push(("chi2_rise_at_3b", json!(objective.rise_at_3b)));
+        let known = [
+            ("sigma2_over_range_m", sill_over_range(&estimate.covariance)),
+            ("misfit_chi2_per_freedom", self.misfit_ratio),
+            ("misfit_p", findings.misfit_p),
+            ("normality_p", findings.normality_p),
+            ("window_disagreement_z", findings.disagreement),
+            ("isotropy_p", findings.isotropy.as_ref().map(|i| i.p)),
+            ("isotropy_ratio", findings.isotropy.as_ref().map(|i| i.ratio)),
+            ("isotropy_azimuth_deg", findings.isotropy.as_ref().map(|i| i.azimuth_deg)),
+            ("stationarity_p", findings.stationarity.as_ref().map(|s| s.p)),
+            ("block_sigma_max_over_min", findings.stationarity.as_ref().map(|s| s.sigma_max_over_min)),
+            ("chi2_rise_at_3b", self.rise_at_3b(findings)),
+        ];
+        entries.extend(known.into_iter().filter_map(|(k, v)| Some((k, json!(v?)))));
+        if !findings.others.is_empty() {
+            entries.push(("other_windows", json!(findings.others)));
         }
         entries.into_iter().map(|(k, v)| (k.to_owned(), v)).collect()
     }
 
-    fn warnings(&self, case: &Case, naive: &Estimate, estimate: &Estimate) -> Vec<String> {
-        let (sigma, b) = (estimate.model.sigma_m, estimate.model.range_m);
-        let mut warnings = Vec::new();
-        if case.settings.mode() == Mode::Paper {
-            warnings.push(
-                "paper mode: the fit does not correct for the moving average and the trimming, which make sigma and b too \
-                 small (19 % and 42 % for an exponential of b = 0.14 windows, 43 % and 76 % at half a window)"
-                    .to_owned(),
-            );
-        }
-        if self.naive_range_windows > NAIVE_RANGE_MAX {
-            warnings.push(format!(
+    /// How much the sum of squares rises at three times the range, over what misfit there is.
+    fn rise_at_3b(&self, findings: &Findings) -> Option<f64> {
+        let profile = findings.profile.as_ref()?;
+        let own = profile.range_m.iter().zip(&profile.chi2_rise).min_by(|a, b| a.1.total_cmp(b.1))?.0;
+        let at = profile.range_m.iter().position(|r| *r > 2.9 * own)?;
+        Some(profile.chi2_rise[at] / self.misfit_ratio.unwrap_or(1.0).max(1.0))
+    }
+
+    fn warnings(&self, case: &Case, naive: &Estimate, estimate: &Estimate, findings: &Findings) -> Vec<String> {
+        let paper = (case.settings.mode() == Mode::Paper).then(|| {
+            "paper mode: the fit does not correct for the moving average and the trimming, which make sigma and b too \
+             small (19 % and 42 % for an exponential of b = 0.14 windows, 43 % and 76 % at half a window)"
+                .to_owned()
+        });
+        let all = [
+            paper,
+            self.range_warning(case, naive, estimate),
+            self.flat_warning(estimate, findings),
+            self.misfit_warning(case, estimate, findings),
+            separation_warning(findings),
+            isotropy_warning(estimate, findings),
+            stationarity_warning(findings),
+            normality_warning(findings),
+            self.clutter_warning(case),
+        ];
+        all.into_iter().flatten().collect()
+    }
+
+    fn range_warning(&self, case: &Case, naive: &Estimate, estimate: &Estimate) -> Option<String> {
+        let told = sill_over_range(&estimate.covariance)?;
+        (self.naive_range_windows > NAIVE_RANGE_MAX).then(|| {
+            format!(
                 "b is not identifiable from this window: the uncorrected fit gives {:.3} m, {:.2} of the window of {:.3} m, \
-                 where every exponential ends up near 0.135 or below; sigma^2 / b = {:.4e} m is what the data tells",
-                naive.model.range_m,
+                 where every exponential ends up near 0.135 or below; sigma^2 / b = {told:.4e} m is what the data tells",
+                naive.covariance.range_m(),
                 self.naive_range_windows,
                 case.window_m(),
-                sigma * sigma / b
-            ));
-        }
-        if let Some(rise) = estimate.objective.map(|o| o.rise_at_3b / self.misfit_ratio.unwrap_or(1.0).max(1.0))
-            && rise < LIKELIHOOD_RISE
-        {
-            warnings.push(format!("the likelihood is flat: b = {b:.3} m cannot be told from {:.3} m", 3.0 * b));
-        }
+            )
+        })
+    }
+
+    fn flat_warning(&self, estimate: &Estimate, findings: &Findings) -> Option<String> {
+        let b = estimate.covariance.structures[0].range_m;
+        let flat = self.rise_at_3b(findings)? < LIKELIHOOD_RISE;
+        flat.then(|| format!("the likelihood is flat: b = {b:.3} m cannot be told from {:.3} m", 3.0 * b))
+    }
+
+    fn misfit_warning(&self, case: &Case, estimate: &Estimate, findings: &Findings) -> Option<String> {
         let misfit = self.misfit_m2 / case.bins.covariance_m2[0];
-        if misfit > MISFIT_MAX {
-            warnings.push(format!(
-                "the {} model does not describe the residual: its root mean square misfit is {:.1} % of the variance",
-                case.settings.model.kind().kind,
+        let rejected = findings.misfit_p.is_some_and(|p| p <= TEST_LEVEL);
+        let how = findings.misfit_p.map_or_else(String::new, |p| format!(", p = {p:.3}"));
+        (misfit > MISFIT_MAX || rejected).then(|| {
+            format!(
+                "the {} model does not describe the residual: its root mean square misfit is {:.1} % of the variance{how}",
+                estimate.form.name(),
                 100.0 * misfit
-            ));
-        }
+            )
+        })
+    }
+
+    fn clutter_warning(&self, case: &Case) -> Option<String> {
         let outliers = (case.detrended.measured - self.trusted) as f64 / case.detrended.measured as f64;
-        if outliers > OUTLIER_SHARE_MAX {
-            warnings.push(format!(
+        (outliers > OUTLIER_SHARE_MAX).then(|| {
+            format!(
                 "{:.1} % of the measured cells were taken for outliers; a site with that many objects is better masked by hand",
                 100.0 * outliers
-            ));
-        }
-        warnings
+            )
+        })
     }
+}
+
+fn separation_warning(findings: &Findings) -> Option<String> {
+    let z = findings.disagreement.filter(|_| no_scale_separation(findings.disagreement))?;
+    Some(format!(
+        "no scale separation: fits at half and twice the outer scale disagree by {z:.1} standard errors; sigma and b belong \
+         to this window, not to the surface (see other_windows, and the structure function)"
+    ))
+}
+
+fn isotropy_warning(estimate: &Estimate, findings: &Findings) -> Option<String> {
+    let found = findings.isotropy.as_ref().filter(|_| !estimate.form.is_anisotropic())?;
+    (found.p <= TEST_LEVEL && found.ratio < RATIO_WORTH_A_WARNING).then(|| {
+        format!(
+            "the texture is not isotropic (p = {:.1e}): it is longer by {:.2} along azimuth {:.0} degrees; try \
+             anisotropic:{}",
+            found.p,
+            1.0 / found.ratio,
+            found.azimuth_deg,
+            estimate.form.name()
+        )
+    })
+}
+
+fn stationarity_warning(findings: &Findings) -> Option<String> {
+    let found = findings.stationarity.as_ref()?;
+    (found.p <= TEST_LEVEL && found.sigma_max_over_min > SIGMAS_WORTH_A_WARNING).then(|| {
+        format!(
+            "the site is not stationary (p = {:.1e}): sigma differs by a factor of {:.2} between its blocks; the parametric \
+             intervals are too narrow",
+            found.p, found.sigma_max_over_min
+        )
+    })
+}
+
+fn normality_warning(findings: &Findings) -> Option<String> {
+    let p = findings.normality_p.filter(|p| *p <= 2.0 * TEST_LEVEL)?;
+    Some(format!(
+        "the residual is not normal (p = {p:.3}): trimming took another share of its variance than the fit assumes"
+    ))
 }

@@ -1,8 +1,9 @@
 use super::*;
+use crate::covariance::Covariance;
 use crate::synth::Synthesis;
 use crate::synth::fft_ma::{FftMa, FftMaParameters, Phase};
 use rayon::prelude::*;
-use sastrugi_numeric::{Geometry, Streams};
+use sastrugi_numeric::{Geometry, sums};
 
 const CELL_M: f64 = 0.06;
 
@@ -14,13 +15,23 @@ fn field(range_m: f64, cells: usize, cell_m: f64, seed: u64) -> Grid {
     FftMa::new(parameters, covariance).unwrap().generate(&Streams::for_seed(seed, "fit-test")).unwrap().grid
 }
 
-fn settings(mode: Mode, outer_scale_m: f64, trim: f64) -> FitSettings {
-    FitParameters { mode, outer_scale_m, trim, ..FitParameters::default() }.try_into().unwrap()
+fn streams() -> Streams {
+    Streams::for_seed(0, "fit")
 }
 
+fn settings(mode: Mode, outer_scale_m: f64, trim: f64) -> FitSettings {
+    FitParameters { mode, outer_scale_m, trim, bootstrap: 0, ..FitParameters::default() }.try_into().unwrap()
+}
+
+/// The estimate alone, without intervals and verdicts.
 fn estimate(dem: &Grid, settings: &FitSettings) -> [f64; 2] {
-    let fit = fit(dem, settings).unwrap().fit;
-    ["sigma_m", "range_m"].map(|k| fit.parameters[k])
+    let case = Case::new(dem, settings).unwrap();
+    let naive = ordinary(&case, &Form::parse("exponential").unwrap());
+    let covariance = match settings.mode() {
+        Mode::Paper => naive.covariance,
+        Mode::Corrected => best(&Estimator::new(&case, &case.bins).candidates(&naive)).unwrap().covariance.clone(),
+    };
+    [covariance.sigma_m(), covariance.range_m()]
 }
 
 /// What is done to the field of a seed before it is fitted.
@@ -175,7 +186,7 @@ fn stat_cells_need_not_be_square() {
 }
 
 fn refused(dem: &Grid, parameters: FitParameters) -> FitError {
-    fit(dem, &parameters.try_into().unwrap()).err().unwrap()
+    fit(dem, &parameters.try_into().unwrap(), &streams()).err().unwrap()
 }
 
 /// Section 5 of the specification.
@@ -211,7 +222,7 @@ fn val_what_cannot_be_fitted_is_refused() {
 fn val_the_fit_file_is_complete() {
     let s = settings(Mode::Corrected, 2.0, 0.05);
     let dem = field(0.28, 256, CELL_M, 1);
-    let FitOutcome { fit, background, residual } = fit(&dem, &s).unwrap();
+    let FitOutcome { fit, background, residual } = fit(&dem, &s, &streams()).unwrap();
     assert_eq!((fit.mode.as_str(), fit.model.as_str(), fit.source.is_none()), ("corrected", "exponential", true));
     let bins = fit.lags_m.len();
     assert!(bins >= 17 && [&fit.covariance_m2, &fit.model_m2, &fit.surface_model_m2].iter().all(|v| v.len() == bins));
@@ -232,9 +243,10 @@ fn val_the_fit_file_is_complete() {
 /// A range of half the DEM: one window cannot tell it, and the fit says so.
 #[test]
 fn val_a_range_beyond_the_window_is_called_unidentifiable() {
-    let fit = fit(&field(6.0, 256, CELL_M, 1), &settings(Mode::Corrected, 2.0, 0.05)).unwrap().fit;
+    let s = settings(Mode::Corrected, 2.0, 0.05);
+    let fit = fit(&field(6.0, 256, CELL_M, 1), &s, &streams()).unwrap().fit;
     assert!(fit.warnings.iter().any(|w| w.starts_with("b is not identifiable")), "{:?}", fit.warnings);
-    let paper = super::fit(&field(0.28, 256, CELL_M, 1), &settings(Mode::Paper, 2.0, 0.05)).unwrap().fit;
+    let paper = super::fit(&field(0.28, 256, CELL_M, 1), &settings(Mode::Paper, 2.0, 0.05), &streams()).unwrap().fit;
     assert!(paper.warnings[0].starts_with("paper mode"));
 }
 
@@ -248,4 +260,141 @@ fn prop_threads_change_no_bit() {
         pool.install(|| estimate(&dem, &settings(Mode::Corrected, 2.0, 0.05)))
     };
     assert_eq!(run(1).map(f64::to_bits), run(3).map(f64::to_bits));
+}
+
+/// What is asked of a fit with intervals and verdicts.
+fn with_bootstrap(model: &str, bootstrap: u32) -> FitSettings {
+    FitParameters { model: model.to_owned(), bootstrap, ..FitParameters::default() }.try_into().unwrap()
+}
+
+/// A field of any covariance, as [`field`].
+fn field_of(covariance: &Covariance, cells: usize, seed: u64) -> Grid {
+    let shape = [cells; 2];
+    let simulator = simulate::Simulator::new(covariance, Default::default(), shape, [CELL_M; 2], 40.0);
+    let values = simulator.surface(&Streams::for_seed(seed, "fit-test-any"));
+    Grid::new(Geometry::square(cells, cells, CELL_M), values)
+}
+
+fn covariance(model: &str, parameters: &[(&str, f64)]) -> Covariance {
+    let values = parameters.iter().map(|(k, v)| ((*k).to_owned(), *v)).collect();
+    Form::parse(model).unwrap().covariance(&values).unwrap()
+}
+
+/// Acceptance 3: nominal 95 % intervals hold the truth in 95 +- 7 points of 200 fields (binomial standard deviation 1.5
+/// points; 99 replicates add 1: false alarm below 1e-3).
+#[test]
+#[ignore = "slow: ./test --full"]
+fn stat_intervals_cover() {
+    let s = with_bootstrap("exponential", 99);
+    let held: Vec<[bool; 3]> = (0..200u64)
+        .into_par_iter()
+        .map(|seed| {
+            let intervals =
+                fit(&field(0.28, 256, CELL_M, seed), &s, &Streams::for_seed(seed, "fit")).unwrap().fit.intervals;
+            let intervals = intervals.unwrap();
+            [("sigma_m", 1.0), ("range_m", 0.28), ("sigma2_over_range_m", 1.0 / 0.28)]
+                .map(|(name, truth)| (intervals.values[name][0]..=intervals.values[name][1]).contains(&truth))
+        })
+        .collect();
+    for (k, name) in ["sigma", "b", "sigma^2 / b"].into_iter().enumerate() {
+        let share = held.iter().filter(|h| h[k]).count() as f64 / held.len() as f64;
+        println!("coverage of {name}: {:.1} %", 100.0 * share);
+        assert!((share - 0.95).abs() <= 0.07, "{name}: {share}");
+    }
+}
+
+/// Share of fields whose fit as an exponential warns of anything but the window.
+fn warned(truth: &Covariance, count: u64) -> (f64, Vec<String>) {
+    let s = with_bootstrap("exponential", 99);
+    let all: Vec<Vec<String>> = (0..count)
+        .into_par_iter()
+        .map(|seed| match fit(&field_of(truth, 256, seed), &s, &Streams::for_seed(seed, "fit")) {
+            Ok(outcome) => outcome.fit.warnings,
+            Err(refused) => vec![refused.to_string()],
+        })
+        .collect();
+    let share = all.iter().filter(|w| !w.is_empty()).count() as f64 / count as f64;
+    let mut kinds: Vec<String> = all.into_iter().flatten().map(|w| w.chars().take(34).collect()).collect();
+    kinds.sort();
+    (share, kinds)
+}
+
+fn tally(kinds: &[String]) -> Vec<(String, usize)> {
+    kinds.chunk_by(|a, b| a == b).map(|c| (c[0].clone(), c.len())).collect()
+}
+
+/// Acceptance 9: what is no exponential is said to be none in 95 % of fields, an exponential in at most 5 % (here: at most
+/// 10 % of 50 fields, a threshold that a true 5 % passes with probability 0.9; the figure is in docs/papers/vecherin.md).
+#[test]
+#[ignore = "slow: ./test --full"]
+fn stat_misspecification_is_told() {
+    let truths = [
+        ("self-affine H 0.5", covariance("self_affine", &[("increment_1m_m", 0.1), ("hurst", 0.5)])),
+        ("self-affine H 0.7", covariance("self_affine", &[("increment_1m_m", 0.1), ("hurst", 0.7)])),
+        ("self-affine H 0.9", covariance("self_affine", &[("increment_1m_m", 0.1), ("hurst", 0.9)])),
+        ("von Karman 0.3", covariance("matern", &[("sigma_m", 0.1), ("range_m", 0.4), ("smoothness", 0.3)])),
+        ("von Karman 0.8", covariance("matern", &[("sigma_m", 0.1), ("range_m", 0.28), ("smoothness", 0.8)])),
+    ];
+    for (name, truth) in &truths {
+        let (share, kinds) = warned(truth, 50);
+        println!("{name}: {:.0} % warned {:?}", 100.0 * share, tally(&kinds));
+        assert!(share >= 0.95, "{name}: {share}");
+    }
+    let (share, kinds) = warned(&covariance("exponential", &[("sigma_m", 0.1), ("range_m", 0.15)]), 50);
+    println!("exponential: {:.0} % warned {:?}", 100.0 * share, tally(&kinds));
+    assert!(share <= 0.1, "exponential: {share}");
+}
+
+/// The model that made a field is chosen, and its parameters come back: one field each, tolerances about three times the
+/// scatter of one field.
+#[test]
+fn val_models_are_recovered() {
+    let cases = [
+        ("gaussian", vec![("sigma_m", 0.1), ("range_m", 0.28)], 0.05),
+        ("spherical", vec![("sigma_m", 0.1), ("range_m", 0.6)], 0.06),
+        ("matern", vec![("sigma_m", 0.1), ("range_m", 0.15), ("smoothness", 1.2)], 0.12),
+        ("self_affine", vec![("increment_1m_m", 0.1), ("hurst", 0.7)], 0.05),
+        ("exponential+nugget", vec![("sigma_m", 0.1), ("range_m", 0.28), ("nugget_m2", 0.002)], 0.1),
+        (
+            "anisotropic:exponential",
+            vec![("sigma_m", 0.1), ("range_m", 0.4), ("ratio", 0.5), ("azimuth_deg", 30.0)],
+            0.12,
+        ),
+    ];
+    for (model, parameters, tolerance) in cases {
+        let dem = field_of(&covariance(model, &parameters), 400, 3);
+        let s = with_bootstrap(model, 0);
+        let case = Case::new(&dem, &s).unwrap();
+        let naive = ordinary(&case, &Form::parse("exponential").unwrap());
+        let bins = case.bins_of(if model.starts_with("aniso") { Layout::DIRECTIONAL } else { Layout::ISOTROPIC });
+        let found = Estimator::new(&case, &bins).candidates(&naive).remove(0);
+        let values = found.covariance.parameters(&found.form);
+        println!("{model}: {values:?}");
+        for (name, truth) in parameters {
+            assert!(
+                (values[name] / truth - 1.0).abs() < tolerance,
+                "{model}: {name} = {}, truth {truth}",
+                values[name]
+            );
+        }
+    }
+}
+
+/// The whole file with intervals, on a field that is what it is fitted as.
+#[test]
+fn val_a_full_fit_has_intervals_and_verdicts() {
+    let dem = field(0.15, 256, CELL_M, 4);
+    let fit = fit(&dem, &with_bootstrap("auto", 39), &streams()).unwrap().fit;
+    assert_eq!(fit.candidates.len(), 7);
+    assert_eq!(fit.candidates[0].aicc_above_best, Some(0.0));
+    let exponential = fit.candidates.iter().find(|c| c.model == "exponential").unwrap();
+    assert!(exponential.aicc_above_best.unwrap() < 6.0, "{:?}", fit.candidates);
+    let intervals = fit.intervals.unwrap();
+    for (name, [low, high]) in &intervals.values {
+        assert!(low < high, "{name}: {low} {high}");
+    }
+    assert!(fit.block_intervals.is_some() && fit.profile.is_some() && !fit.directions.is_empty());
+    for key in ["misfit_p", "normality_p", "isotropy_p", "stationarity_p", "other_windows"] {
+        assert!(fit.diagnostics.contains_key(key), "{key}");
+    }
 }

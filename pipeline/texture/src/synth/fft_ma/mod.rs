@@ -121,7 +121,7 @@ impl FftMa {
         let tile = Geometry::square(rows, cols, cell_m);
         let torus = [rows, cols].map(|n| match parameters.periodic {
             true => n,
-            false => smooth_length((2 * n).max((TORUS_RANGES * covariance.range_m / cell_m).ceil() as usize)),
+            false => smooth_length((2 * n).max((TORUS_RANGES * covariance.range_m() / cell_m).ceil() as usize)),
         });
         let mut texture = Self { parameters, covariance, tile, torus, notes: Vec::new() };
         texture.notes = texture.remarks(cut_x || cut_y);
@@ -130,7 +130,7 @@ impl FftMa {
 
     fn remarks(&self, cut: bool) -> Vec<String> {
         let FftMaParameters { size_m, cell_m, phase, periodic } = &self.parameters;
-        let b = self.covariance.range_m;
+        let b = self.covariance.range_m();
         let [width_m, height_m] = self.tile.size();
         let mut notes = Vec::new();
         if cut {
@@ -155,25 +155,7 @@ impl FftMa {
 
     /// Side of a tile with a non-negative spectrum, m.
     fn enough_m(&self) -> f64 {
-        TORUS_RANGES * self.covariance.range_m
-    }
-
-    /// Spectrum of the field: `sqrt(lambda M) Q` on the stored half.
-    fn random_spectrum(&self, spectrum: &spectrum::EvenSpectrum, streams: &Streams) -> HalfSpectrum {
-        let [rows, cols] = self.torus;
-        let mut half = HalfSpectrum { rows, cols, values: vec![Complex64::default(); (cols / 2 + 1) * rows] };
-        let cells = (rows * cols) as f64;
-        half.values.par_chunks_mut(rows).enumerate().for_each(|(kx, column)| {
-            let mut stream = streams.stream(&format!("modes-{kx}"));
-            let amplitude = |ky: usize| (spectrum.at(kx, ky).max(0.0) * cells).sqrt();
-            match kx == 0 || 2 * kx == cols {
-                true => fill_conjugate_column(column, amplitude, self.parameters.phase, &mut stream),
-                false => column.iter_mut().enumerate().for_each(|(ky, v)| {
-                    *v = self.parameters.phase.draw(&mut stream) * amplitude(ky);
-                }),
-            }
-        });
-        half
+        TORUS_RANGES * self.covariance.range_m()
     }
 }
 
@@ -205,7 +187,10 @@ impl Synthesis for FftMa {
             let (limit, needed_m) = (CLIP_SHARE_MAX, self.enough_m());
             return Err(SynthesisError::NegativeSpectrum { width_m, height_m, clip_share, limit, needed_m });
         }
-        let field = RealFft2::new(rows, cols).inverse(self.random_spectrum(&spectrum, streams));
+        let cells = (rows * cols) as f64;
+        let amplitude = |kx: usize, ky: usize| (spectrum.at(kx, ky).max(0.0) * cells).sqrt();
+        let modes = random_spectrum(self.torus, amplitude, self.parameters.phase, streams);
+        let field = RealFft2::new(rows, cols).inverse(modes);
         let torus = Grid::new(Geometry::square(rows, cols, self.parameters.cell_m), field);
         let grid = match self.parameters.periodic {
             true => torus,
@@ -214,6 +199,26 @@ impl Synthesis for FftMa {
         let covariance_error_max_m2 = negative / (rows * cols) as f64;
         Ok(TextureOutcome { grid, covariance_error_max_m2, clip_share })
     }
+}
+
+/// Spectrum of a field on a torus of `[rows, cols]`: `amplitude(kx, ky) Q`, the amplitude being `sqrt(lambda M)`, on the
+/// stored half. One stream for each column of modes.
+pub(crate) fn random_spectrum(
+    [rows, cols]: [usize; 2],
+    amplitude: impl Fn(usize, usize) -> f64 + Sync,
+    phase: Phase,
+    streams: &Streams,
+) -> HalfSpectrum {
+    let mut half = HalfSpectrum { rows, cols, values: vec![Complex64::default(); (cols / 2 + 1) * rows] };
+    half.values.par_chunks_mut(rows).enumerate().for_each(|(kx, column)| {
+        let mut stream = streams.stream(&format!("modes-{kx}"));
+        let amplitude = |ky: usize| amplitude(kx, ky);
+        match kx == 0 || 2 * kx == cols {
+            true => fill_conjugate_column(column, amplitude, phase, &mut stream),
+            false => column.iter_mut().enumerate().for_each(|(ky, v)| *v = phase.draw(&mut stream) * amplitude(ky)),
+        }
+    });
+    half
 }
 
 /// A column of the half spectrum that is its own mirror image: `Q(-ky)` is the conjugate of `Q(ky)`.

@@ -17,7 +17,7 @@ impl EvenSpectrum {
     /// Spectrum of `covariance` on a torus of `[rows, cols]` square cells.
     pub fn of(covariance: &Covariance, [rows, cols]: [usize; 2], cell_m: f64) -> Self {
         let (half_rows, half_cols) = (rows / 2 + 1, cols / 2 + 1);
-        let quarter = |r: usize, c: usize| covariance.at(((r * r + c * c) as f64).sqrt() * cell_m);
+        let quarter = |r: usize, c: usize| covariance.at_distance(((r * r + c * c) as f64).sqrt() * cell_m);
         let mut by_row = vec![0.0; half_rows * half_cols];
         by_row.par_chunks_mut(half_cols).enumerate().for_each(|(r, line)| {
             line.iter_mut().enumerate().for_each(|(c, v)| *v = quarter(r, c));

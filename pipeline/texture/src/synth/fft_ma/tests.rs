@@ -5,8 +5,8 @@ fn exponential(sigma_m: f64, range_m: f64) -> Covariance {
     Covariance::new(model("exponential").unwrap(), sigma_m, range_m).unwrap()
 }
 
-fn texture(parameters: FftMaParameters, covariance: Covariance) -> FftMa {
-    FftMa::new(parameters, covariance).unwrap()
+fn texture(parameters: FftMaParameters, covariance: &Covariance) -> FftMa {
+    FftMa::new(parameters, covariance.clone()).unwrap()
 }
 
 fn tile(size_m: [f64; 2], phase: Phase, periodic: bool) -> FftMaParameters {
@@ -22,7 +22,7 @@ fn wanted(covariance: &Covariance, g: &Geometry) -> Vec<f64> {
     let short = |k: usize, n: usize| k.min(n - k) as f64;
     let at = |r: usize, c: usize| {
         let (y, x) = (short(r, g.rows) * g.cell[1], short(c, g.cols) * g.cell[0]);
-        covariance.at((x * x + y * y).sqrt())
+        covariance.at_distance((x * x + y * y).sqrt())
     };
     (0..g.rows).flat_map(|r| (0..g.cols).map(move |c| (r, c))).map(|(r, c)| at(r, c)).collect()
 }
@@ -36,7 +36,7 @@ fn worst(a: &[f64], b: &[f64]) -> f64 {
 fn val_unit_phases_have_the_exact_covariance() {
     let covariance = exponential(0.7, 0.28);
     for size_m in [[20.0, 20.0], [6.4, 3.2], [7.5, 8.1], [10.09, 5.0], [3.3, 20.0]] {
-        let texture = texture(tile(size_m, Phase::Unit, true), covariance);
+        let texture = texture(tile(size_m, Phase::Unit, true), &covariance);
         for seed in 1..=3 {
             let made = texture.generate(&streams(seed)).unwrap();
             let error = worst(&torus_covariance(&made.grid), &wanted(&covariance, &made.grid.geometry));
@@ -53,7 +53,7 @@ fn val_unit_phases_have_the_exact_covariance() {
 #[test]
 fn stat_no_seam() {
     let covariance = exponential(1.0, 0.28);
-    let texture = texture(tile([20.0; 2], Phase::Unit, true), covariance);
+    let texture = texture(tile([20.0; 2], Phase::Unit, true), &covariance);
     let (n, mut squares) = (200, Vec::new());
     for seed in 0..30 {
         let grid = texture.generate(&streams(seed)).unwrap().grid;
@@ -62,7 +62,7 @@ fn stat_no_seam() {
             squares.push((grid.at(0, k) - grid.at(n - 1, k)) * (grid.at(0, k) - grid.at(n - 1, k)));
         }
     }
-    let exact = 2.0 * (covariance.at(0.0) - covariance.at(0.1));
+    let exact = 2.0 * (covariance.at_distance(0.0) - covariance.at_distance(0.1));
     let ratio = sums::mean(&squares) / exact;
     assert!((ratio - 1.0).abs() < 0.25, "{ratio}");
 }
@@ -73,7 +73,7 @@ fn stat_no_seam() {
 #[test]
 fn stat_gaussian_phase_powers() {
     let covariance = exponential(1.0, 0.28);
-    let made = texture(tile([20.0; 2], Phase::Gaussian, true), covariance).generate(&streams(5)).unwrap();
+    let made = texture(tile([20.0; 2], Phase::Gaussian, true), &covariance).generate(&streams(5)).unwrap();
     let field = RealFft2::new(200, 200).forward(&made.grid.values);
     let spectrum = spectrum::EvenSpectrum::of(&covariance, [200, 200], 0.1);
     let mut classes = [0.0; 10];
@@ -93,7 +93,7 @@ fn stat_gaussian_phase_powers() {
 #[test]
 fn stat_crops_have_the_covariance_on_average() {
     let covariance = exponential(1.0, 0.28);
-    let texture = texture(tile([8.0; 2], Phase::Gaussian, false), covariance);
+    let texture = texture(tile([8.0; 2], Phase::Gaussian, false), &covariance);
     assert_eq!(texture.geometry().len(), 6400);
     for lag in [0, 1, 3] {
         let products: Vec<f64> = (0..60)
@@ -103,7 +103,7 @@ fn stat_crops_have_the_covariance_on_average() {
                 sums::mean(&pairs.map(|(r, c)| grid.at(r, c) * grid.at(r, c + lag)).collect::<Vec<_>>())
             })
             .collect();
-        let error = sums::mean(&products) - covariance.at(0.1 * lag as f64);
+        let error = sums::mean(&products) - covariance.at_distance(0.1 * lag as f64);
         assert!(error.abs() < 0.06, "lag {lag}: {error}");
     }
 }
@@ -125,9 +125,9 @@ fn val_clip_shares() {
 #[test]
 fn val_a_torus_too_small_is_refused_and_enlarged_when_not_periodic() {
     let covariance = exponential(1.0, 5.0);
-    let error = texture(tile([20.0; 2], Phase::Unit, true), covariance).generate(&streams(1)).err().unwrap();
+    let error = texture(tile([20.0; 2], Phase::Unit, true), &covariance).generate(&streams(1)).err().unwrap();
     assert!(matches!(error, SynthesisError::NegativeSpectrum { needed_m: 80.0, .. }), "{error}");
-    let cropped = texture(tile([20.0; 2], Phase::Unit, false), covariance);
+    let cropped = texture(tile([20.0; 2], Phase::Unit, false), &covariance);
     let made = cropped.generate(&streams(1)).unwrap();
     assert_eq!((made.grid.rows(), made.grid.cols()), (200, 200));
     assert!(made.clip_share <= CLIP_SHARE_MAX);
@@ -136,22 +136,22 @@ fn val_a_torus_too_small_is_refused_and_enlarged_when_not_periodic() {
 #[test]
 fn val_sizes_are_whole_cells() {
     let covariance = exponential(0.1, 0.3);
-    let sized = |size_m| texture(FftMaParameters { size_m, ..FftMaParameters::default() }, covariance);
+    let sized = |size_m| texture(FftMaParameters { size_m, ..FftMaParameters::default() }, &covariance);
     assert_eq!(sized([2.0, 3.0]).geometry(), Geometry::square(30, 20, 0.1));
     assert!(sized([2.0, 3.0]).notes().is_empty());
     let cut = sized([2.06, 3.0]);
     assert_eq!(cut.geometry().cols, 20);
     assert!(cut.notes()[0].contains("2.06 m x 3 m is no whole number"), "{:?}", cut.notes());
     for size_m in [[0.0, 1.0], [1.0, -1.0], [f64::NAN, 1.0], [0.01, 1.0], [1e9, 1.0]] {
-        assert!(FftMa::new(FftMaParameters { size_m, ..FftMaParameters::default() }, covariance).is_err());
+        assert!(FftMa::new(FftMaParameters { size_m, ..FftMaParameters::default() }, covariance.clone()).is_err());
     }
-    assert!(texture(tile([1.0; 2], Phase::Unit, true), covariance).notes()[0].contains("less than four ranges"));
+    assert!(texture(tile([1.0; 2], Phase::Unit, true), &covariance).notes()[0].contains("less than four ranges"));
 }
 
 /// One thread or many: the same bits.
 #[test]
 fn prop_threads_change_no_bit() {
-    let texture = texture(tile([10.0, 7.0], Phase::Unit, true), exponential(0.1, 0.3));
+    let texture = texture(tile([10.0, 7.0], Phase::Unit, true), &exponential(0.1, 0.3));
     let run = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| texture.generate(&streams(9)).unwrap().grid.values)

@@ -34,7 +34,7 @@ impl Model for Exponential {
         }
     }
 
-    fn correlation(&self, ratio: f64) -> f64 {
+    fn correlation(&self, ratio: f64, _shape: f64) -> f64 {
         libm::exp(-ratio)
     }
 }

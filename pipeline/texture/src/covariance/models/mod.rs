@@ -1,0 +1,62 @@
+//! Families of correlation functions, one file each.
+
+pub mod exponential;
+pub mod gaussian;
+pub mod matern;
+pub mod self_affine;
+pub mod spherical;
+
+use sastrugi_schemas::{Kind, ParameterError};
+
+/// A family of isotropic correlation functions.
+pub trait Model: Sync {
+    /// Name, source and parameters.
+    fn kind(&self) -> Kind;
+
+    /// Correlation at a distance of `ratio = rho / b >= 0`; 1 at 0 (self-affine: see there). `shape` is the value of
+    /// [`Model::shape`], and means nothing to a model without one.
+    fn correlation(&self, ratio: f64, shape: f64) -> f64;
+
+    /// The parameter beside sigma and b that bends the curve.
+    fn shape(&self) -> Option<Shape> {
+        None
+    }
+
+    /// Names of sigma and b in fit files; no b for a model without a scale of its own.
+    fn scale_names(&self) -> (&'static str, Option<&'static str>) {
+        ("sigma_m", Some("range_m"))
+    }
+}
+
+/// A shape parameter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Shape {
+    /// Name in fit files.
+    pub name: &'static str,
+    /// Smallest and largest value.
+    pub bounds: (f64, f64),
+    /// Where a search starts.
+    pub start: f64,
+}
+
+/// Every model.
+pub static MODELS: [&dyn Model; 5] =
+    [&exponential::Exponential, &gaussian::Gaussian, &spherical::Spherical, &matern::Matern, &self_affine::SelfAffine];
+
+/// The model of that name.
+///
+/// # Errors
+/// An unknown name, with the known ones.
+pub fn model(name: &str) -> Result<&'static dyn Model, ParameterError> {
+    MODELS.into_iter().find(|m| m.kind().kind == name).ok_or_else(|| {
+        let known: Vec<&str> = MODELS.iter().map(|m| m.kind().kind).collect();
+        let known = known.join(", ");
+        ParameterError::new(
+            "model",
+            format!(
+                "is `{name}`; it is one of {known}, a sum of two (`exponential+gaussian`), with `+nugget` after it or \
+                 `anisotropic:` before it where wanted"
+            ),
+        )
+    })
+}

@@ -1,0 +1,257 @@
+//! Least squares of covariance models: ordinary, and generalised with the model as the estimator sees it.
+
+use super::case::Case;
+use super::expectation::Expectation;
+use super::least_squares::{Cholesky, Minimum, curvature, minimise};
+use crate::covariance::bins::length_m;
+use crate::covariance::filtered::DetrendFilter;
+use crate::covariance::form::Role;
+use crate::covariance::partial::{DetrendedCells, PAIRS_FINE, PAIRS_ROUGH, PartialWindows};
+use crate::covariance::{Covariance, Form, LagBins};
+
+/// Rounds of weighting by the covariance of the bins.
+const WEIGHTING_ROUNDS: usize = 4;
+/// A search of more rounds than this moves less, in every coordinate.
+const CONVERGED: f64 = 1e-6;
+
+/// Fitted parameters and what they say about the bins.
+#[derive(Clone)]
+pub struct Estimate {
+    pub form: Form,
+    pub covariance: Covariance,
+    /// Search coordinates.
+    pub at: Vec<f64>,
+    pub steps: usize,
+    /// What generalised least squares know; absent after ordinary ones.
+    pub likelihood: Option<Likelihood>,
+}
+
+/// The Gaussian likelihood of the bins at an estimate.
+#[derive(Clone)]
+pub struct Likelihood {
+    /// Factor of the covariance of the bins.
+    pub weights: Cholesky,
+    /// Generalised sum of squares.
+    pub chi2: f64,
+    /// Number of bins.
+    pub bins: usize,
+    /// Covariance of the coordinates, row-major; absent when they cannot be told apart.
+    pub scatter: Option<Vec<f64>>,
+}
+
+impl Estimate {
+    /// Akaike's criterion with Hurvich and Tsai's (1989) correction: -2 ln L + 2 k + 2 k (k + 1) / (n - k - 1), less what
+    /// all models share. `None` without a likelihood, or with too many parameters.
+    pub fn aicc(&self) -> Option<f64> {
+        let likelihood = self.likelihood.as_ref()?;
+        let (n, k) = (likelihood.bins as f64, self.at.len() as f64);
+        let correction = 2.0 * k * (k + 1.0) / (n - k - 1.0);
+        (n > k + 1.0).then(|| likelihood.chi2 + likelihood.weights.log_determinant() + 2.0 * k + correction)
+    }
+
+    /// Generalised sum of squares per degree of freedom.
+    pub fn misfit_ratio(&self) -> Option<f64> {
+        let likelihood = self.likelihood.as_ref()?;
+        Some(likelihood.chi2 / (likelihood.bins.saturating_sub(self.at.len())).max(1) as f64)
+    }
+
+    /// Standard error of a coordinate by the curvature of the likelihood.
+    pub fn standard_error(&self, coordinate: usize) -> Option<f64> {
+        let scatter = self.likelihood.as_ref()?.scatter.as_ref()?;
+        Some(scatter[coordinate * (self.at.len() + 1)].sqrt())
+    }
+
+    /// Position of the coordinate with a role.
+    pub fn coordinate(&self, role: Role) -> Option<usize> {
+        self.form.parameters().iter().position(|p| p.role == role)
+    }
+}
+
+/// The estimator on one set of bins.
+pub struct Estimator<'a> {
+    pub case: &'a Case<'a>,
+    pub bins: &'a LagBins,
+    pub expectation: Expectation<'a>,
+}
+
+impl<'a> Estimator<'a> {
+    /// The estimator that parameters are taken from.
+    pub fn new(case: &'a Case<'a>, bins: &'a LagBins) -> Self {
+        Self::with_pairs(case, bins, PAIRS_FINE)
+    }
+
+    /// An estimator for verdicts and figures.
+    pub fn rough(case: &'a Case<'a>, bins: &'a LagBins) -> Self {
+        Self::with_pairs(case, bins, PAIRS_ROUGH)
+    }
+
+    fn with_pairs(case: &'a Case<'a>, bins: &'a LagBins, pairs: f64) -> Self {
+        let cells = DetrendedCells {
+            values: &case.detrended.trusted,
+            cols: case.geometry.cols,
+            count: &case.detrended.count,
+            residual: &case.detrended.residual,
+        };
+        let measurement = case.settings.measurement();
+        let expectation = Expectation {
+            filter: DetrendFilter::new(case.window, case.geometry.cell, case.max_lag, measurement),
+            partial: PartialWindows::new(&cells, case.window, bins, pairs),
+            bins,
+            cells: case.trimmed.detrended,
+        };
+        Self { case, bins, expectation }
+    }
+
+    /// The model in each bin as the estimator sees it, m2.
+    pub fn mean(&self, covariance: &Covariance) -> Vec<f64> {
+        self.expectation.mean(covariance, self.case.trimmed.threshold_m)
+    }
+
+    /// Generalised least squares of a form, from an exponential of the given sigma and b.
+    pub fn fit(&self, form: &Form, sigma_m: f64, range_m: f64) -> Estimate {
+        let coordinates = self.case.coordinates(form);
+        let ends = coordinates.starts(sigma_m, range_m).into_iter().map(|start| self.search(form, &start, None));
+        let mut end = least(ends);
+        let mut steps = end.steps;
+        let mut weights = None;
+        for _ in 0..WEIGHTING_ROUNDS {
+            weights = self.weights(&coordinates.decode(&end.at));
+            if weights.is_none() {
+                break;
+            }
+            let next = self.search(form, &end.at, weights.as_ref());
+            steps += next.steps;
+            let moved = difference(&next.at, &end.at).iter().fold(0.0, |m, d| f64::max(m, d.abs()));
+            end = next;
+            if moved < CONVERGED {
+                break;
+            }
+        }
+        let likelihood = weights.map(|weights| self.likelihood(form, &end, weights));
+        Estimate { form: form.clone(), covariance: coordinates.decode(&end.at), at: end.at, steps, likelihood }
+    }
+
+    fn likelihood(&self, form: &Form, end: &Minimum, weights: Cholesky) -> Likelihood {
+        let n = end.at.len();
+        let curvature = curvature(&end.at, |p| self.misfit(form, p, Some(&weights), &self.bins.covariance_m2));
+        let scatter = Cholesky::new(&curvature, n).map(|factor| factor.inverse());
+        Likelihood { weights, chi2: end.value, bins: self.bins.len(), scatter }
+    }
+
+    /// Factor of the covariance of the bins for a surface.
+    pub fn weights(&self, covariance: &Covariance) -> Option<Cholesky> {
+        let matrix = self.expectation.covariance(covariance, self.case.trimmed.threshold_m);
+        Cholesky::new(&matrix, self.bins.len())
+    }
+
+    fn search(&self, form: &Form, start: &[f64], weights: Option<&Cholesky>) -> Minimum {
+        let bounds = self.case.coordinates(form).bounds();
+        minimise(start, &bounds, |p| self.misfit(form, p, weights, &self.bins.covariance_m2))
+    }
+
+    /// Model less data in the bins, whitened, or in units of the variance.
+    fn misfit(&self, form: &Form, at: &[f64], weights: Option<&Cholesky>, data: &[f64]) -> Vec<f64> {
+        self.whitened(&self.mean(&self.case.coordinates(form).decode(at)), weights, data)
+    }
+
+    fn whitened(&self, model: &[f64], weights: Option<&Cholesky>, data: &[f64]) -> Vec<f64> {
+        let misfit = difference(model, data);
+        let scale = self.bins.covariance_m2[0];
+        match weights {
+            Some(w) => w.whiten(&misfit),
+            None => misfit.iter().map(|d| d / scale).collect(),
+        }
+    }
+
+    /// The fit to other data in the same bins, with the weights of an estimate and from it; for resampling.
+    pub fn refit(&self, estimate: &Estimate, data: &[f64], threshold_m: f64) -> Minimum {
+        let coordinates = self.case.coordinates(&estimate.form);
+        let weights = estimate.likelihood.as_ref().map(|l| &l.weights);
+        minimise(&estimate.at, &coordinates.bounds(), |p| {
+            self.whitened(&self.expectation.mean(&coordinates.decode(p), threshold_m), weights, data)
+        })
+    }
+
+    /// How much the sum of squares rises when the coordinate is held at `value` and the others are fitted again.
+    pub fn rise(&self, estimate: &Estimate, coordinate: usize, value: f64) -> Option<f64> {
+        let likelihood = estimate.likelihood.as_ref()?;
+        let bounds = self.case.coordinates(&estimate.form).bounds();
+        let (low, high) = bounds[coordinate];
+        let held = value.clamp(low, high);
+        let whole = |others: &[f64]| {
+            let mut all = others.to_vec();
+            all.insert(coordinate, held);
+            all
+        };
+        let without =
+            |all: &[(f64, f64)]| all.iter().enumerate().filter(|(k, _)| *k != coordinate).map(|(_, v)| *v).collect();
+        let open: Vec<(f64, f64)> = without(&bounds);
+        let pairs: Vec<(f64, f64)> = estimate.at.iter().map(|&v| (v, v)).collect();
+        let mut start: Vec<f64> = without(&pairs).iter().map(|p: &(f64, f64)| p.0).collect();
+        if let (Some(Role::Range(0)), Some(Role::Sigma(0))) = (
+            estimate.form.parameters().get(coordinate).map(|p| p.role),
+            estimate.form.parameters().first().map(|p| p.role),
+        ) {
+            // sigma^2 / b is what the data tells best.
+            start[0] += 0.5 * (held - estimate.at[coordinate]);
+        }
+        let end = minimise(&start, &open, |others| {
+            self.misfit(&estimate.form, &whole(others), Some(&likelihood.weights), &self.bins.covariance_m2)
+        });
+        Some((end.value - likelihood.chi2).max(0.0))
+    }
+}
+
+impl<'a> Estimator<'a> {
+    /// Every form fitted, from the uncorrected exponential of the same data.
+    pub fn candidates(&self, naive: &Estimate) -> Vec<Estimate> {
+        let (sigma_m, range_m) = (1.2 * naive.covariance.sigma_m(), 1.5 * naive.covariance.range_m());
+        self.case.settings.forms.iter().map(|form| self.fit(form, sigma_m, range_m)).collect()
+    }
+}
+
+/// The candidate with the least AICc; the first one where none has a likelihood.
+pub fn best(estimates: &[Estimate]) -> Option<&Estimate> {
+    let criterion = |e: &Estimate| e.aicc().unwrap_or(f64::INFINITY);
+    estimates.iter().min_by(|a, b| criterion(a).total_cmp(&criterion(b)))
+}
+
+/// Ordinary least squares of the model itself at the mean lags.
+pub fn ordinary(case: &Case, form: &Form) -> Estimate {
+    let coordinates = case.coordinates(form);
+    let scale = case.bins.covariance_m2[0];
+    let bounds = coordinates.bounds();
+    let ends = coordinates.starts(scale.sqrt(), 0.25 * case.max_lag_m).into_iter().map(|start| {
+        minimise(&start, &bounds, |p| {
+            let model = at_lags(case, &coordinates.decode(p));
+            difference(&model, &case.bins.covariance_m2).iter().map(|d| d / scale).collect()
+        })
+    });
+    let end = least(ends);
+    let covariance = coordinates.decode(&end.at);
+    Estimate { form: form.clone(), covariance, at: end.at, steps: end.steps, likelihood: None }
+}
+
+/// A model at the mean lags of the rings.
+pub fn at_lags(case: &Case, covariance: &Covariance) -> Vec<f64> {
+    case.bins.lag_m.iter().map(|&lag| covariance.at_distance(lag)).collect()
+}
+
+/// A model in the rings, before detrending and trimming, m2.
+pub fn on_surface(case: &Case, covariance: &Covariance) -> Vec<f64> {
+    match covariance.is_isotropic() {
+        true => case.bins.average(|lag| covariance.at_distance(length_m(lag, case.geometry.cell))),
+        false => case.bins.average(|lag| covariance.at(crate::covariance::bins::lag_m(lag, case.geometry.cell))),
+    }
+}
+
+/// The end with the smallest sum of squares.
+fn least(ends: impl Iterator<Item = Minimum>) -> Minimum {
+    let none = Minimum { at: Vec::new(), value: f64::INFINITY, steps: 0 };
+    ends.fold(none, |best, end| if end.value < best.value || best.at.is_empty() { end } else { best })
+}
+
+/// `a - b`.
+pub fn difference(a: &[f64], b: &[f64]) -> Vec<f64> {
+    a.iter().zip(b).map(|(x, y)| x - y).collect()
+}

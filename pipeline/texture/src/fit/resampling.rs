@@ -1,0 +1,260 @@
+//! Intervals: parametric bootstrap, with a spatial block bootstrap beside it.
+//!
+//! Parametric: surfaces of the fitted model on the same mask go through the same detrending, trimming, correlation and
+//! fit; how far their estimates fall from the model they come from is how far ours may be from the truth. It holds if the
+//! model is right. Blocks: the DEM's blocks are drawn with replacement and their pairs put together; it does not need the
+//! model, but blocks, and enough of them.
+//!
+//! Both give basic intervals `[2 e - q_high, 2 e - q_low]` in search coordinates (logarithms of sigma, b and shapes), e the
+//! estimate, q the quantiles of the replicates (Davison and Hinkley, 1997, section 5.2), which hold whatever the size of
+//! the bias.
+//!
+//! Rasters of more than [`CELLS_MAX`] cells are examined on a part of that size, and the deviations scaled by the square root
+//! of the share of residuals in it.
+
+use super::case::Case;
+use super::estimator::{Estimate, Estimator};
+use super::residual::Detrended;
+use super::simulate::Simulator;
+use crate::covariance::form::Role;
+use crate::covariance::{LagBins, masked_covariance};
+use rayon::prelude::*;
+use sastrugi_numeric::{Stream, Streams, sums};
+use sastrugi_schemas::fit::Intervals;
+use std::collections::BTreeMap;
+
+/// Level of every interval.
+pub const LEVEL: f64 = 0.95;
+/// Most cells of a replicate.
+pub const CELLS_MAX: usize = 1 << 20;
+/// Fewest blocks worth drawing from.
+const BLOCKS_MIN: usize = 9;
+/// Most blocks along a side.
+const BLOCKS_ALONG: usize = 8;
+/// Replicates of the block bootstrap for each one asked for: they cost little.
+const BLOCK_REPLICATES: usize = 4;
+
+/// What the fitted model's own surfaces look like to the estimator.
+pub struct Replicates {
+    /// Search coordinates of each.
+    pub at: Vec<Vec<f64>>,
+    /// Generalised sum of squares of each, per degree of freedom.
+    pub misfit_ratio: Vec<f64>,
+    /// Median absolute residual over the trimming threshold of each.
+    pub median_over_threshold: Vec<f64>,
+}
+
+/// Simulates and refits `count` surfaces.
+pub fn parametric(estimator: &Estimator, estimate: &Estimate, count: usize, streams: &Streams) -> Replicates {
+    let case = estimator.case;
+    let part = Part::of(case);
+    let shape = [part.rows, part.cols];
+    let outer_m = 8.0 * case.window_m();
+    let measurement = case.settings.measurement();
+    let simulator = Simulator::new(&estimate.covariance, measurement, shape, case.geometry.cell, outer_m);
+    let freedom = (estimator.bins.len() - estimate.at.len()).max(1) as f64;
+    let scale = part.scale;
+    let results: Vec<(Vec<f64>, f64, f64)> = (0..count)
+        .into_par_iter()
+        .map(|k| {
+            let mut surface = simulator.surface(&streams.child(&format!("bootstrap-{k}")));
+            surface.iter_mut().zip(&part.mask).for_each(|(z, keep)| *z = if *keep { *z } else { f64::NAN });
+            let split = Detrended::of_trusted(surface, part.cols, case.settings, case.window);
+            let trimmed = split.trimmed(case.settings);
+            let sums = estimator.bins.bin_sums(&masked_covariance(&trimmed.residual, part.cols, case.max_lag));
+            let end = estimator.refit(estimate, &means(&sums), trimmed.threshold_m);
+            let at = end.at.iter().zip(&estimate.at).map(|(a, e)| e + scale * (a - e)).collect();
+            // A smaller part scatters more: its sum of squares is larger by the square of the scale.
+            (at, end.value * scale * scale / freedom, trimmed.median_size_m / trimmed.threshold_m)
+        })
+        .collect();
+    Replicates {
+        misfit_ratio: results.iter().map(|r| r.1).collect(),
+        median_over_threshold: results.iter().map(|r| r.2).collect(),
+        at: results.into_iter().map(|r| r.0).collect(),
+    }
+}
+
+fn means(sums: &[(f64, u64)]) -> Vec<f64> {
+    sums.iter().map(|(sum, pairs)| sum / (*pairs).max(1) as f64).collect()
+}
+
+/// The part of a raster that is simulated.
+struct Part {
+    rows: usize,
+    cols: usize,
+    /// Cells with trusted data.
+    mask: Vec<bool>,
+    /// Scatter of the whole over scatter of the part.
+    scale: f64,
+}
+
+impl Part {
+    /// The whole, or a window about the middle with as much of it as may be.
+    fn of(case: &Case) -> Self {
+        let (rows, cols) = (case.geometry.rows, case.geometry.cols);
+        let data = |k: usize| !case.detrended.trusted[k].is_nan();
+        let shrink = (CELLS_MAX as f64 / (rows * cols) as f64).sqrt().min(1.0);
+        let part = [rows, cols].map(|n| ((n as f64 * shrink) as usize).max(3 * case.window.cells()[0]).min(n));
+        let counts = sums_by_tile(rows, cols, part, &|k| !case.detrended.residual[k].is_nan());
+        let (at, used) = counts.into_iter().fold(([0, 0], 0), |best, tile| if tile.1 > best.1 { tile } else { best });
+        let mask = (at[0]..at[0] + part[0]).flat_map(|r| (at[1]..at[1] + part[1]).map(move |c| data(r * cols + c)));
+        let scale = (used.max(1) as f64 / case.trimmed.detrended.max(1) as f64).sqrt().min(1.0);
+        Self { rows: part[0], cols: part[1], mask: mask.collect(), scale }
+    }
+}
+
+/// Cells that count in windows of `part` cells at up to 3 x 3 places.
+fn sums_by_tile(
+    rows: usize,
+    cols: usize,
+    part: [usize; 2],
+    counts: &dyn Fn(usize) -> bool,
+) -> Vec<([usize; 2], usize)> {
+    let places = |n: usize, part: usize| -> Vec<usize> {
+        let mut all: Vec<usize> = [1, 0, 2].map(|k| (n - part) * k / 2).to_vec();
+        all.dedup();
+        if n == part { vec![0] } else { all }
+    };
+    let across = places(cols, part[1]);
+    let tiles = places(rows, part[0]).into_iter().flat_map(|r| across.iter().map(move |&c| [r, c]));
+    tiles
+        .map(|[r0, c0]| {
+            let cells = (r0..r0 + part[0]).flat_map(|r| (c0..c0 + part[1]).map(move |c| r * cols + c));
+            ([r0, c0], cells.filter(|&k| counts(k)).count())
+        })
+        .collect()
+}
+
+/// One block of a DEM.
+pub struct Block {
+    /// Sum of products and number of pairs of each bin, both cells within the block.
+    pub sums: Vec<(f64, u64)>,
+}
+
+/// The DEM cut into blocks of at least two windows; empty when too few have data.
+pub fn blocks(case: &Case, bins: &LagBins) -> Vec<Block> {
+    let (rows, cols) = (case.geometry.rows, case.geometry.cols);
+    let width = case.window.cells();
+    let along = [0, 1].map(|k| ([rows, cols][k] / (2 * width[k])).clamp(1, BLOCKS_ALONG));
+    let places: Vec<[usize; 2]> = (0..along[0]).flat_map(|r| (0..along[1]).map(move |c| [r, c])).collect();
+    let all: Vec<Block> = places
+        .into_par_iter()
+        .map(|[r, c]| {
+            let [top, bottom] = [r, r + 1].map(|k| k * rows / along[0]);
+            let [left, right] = [c, c + 1].map(|k| k * cols / along[1]);
+            let part: Vec<f64> = (top..bottom)
+                .flat_map(|row| case.trimmed.residual[row * cols + left..row * cols + right].iter().copied())
+                .collect();
+            Block { sums: bins.bin_sums(&masked_covariance(&part, right - left, case.max_lag)) }
+        })
+        .filter(|b: &Block| b.sums.iter().all(|(_, pairs)| *pairs > 0))
+        .collect();
+    if all.len() < BLOCKS_MIN { Vec::new() } else { all }
+}
+
+/// Search coordinates of resampled blocks.
+pub fn block_replicates(
+    estimator: &Estimator,
+    estimate: &Estimate,
+    blocks: &[Block],
+    count: usize,
+    streams: &Streams,
+) -> Vec<Vec<f64>> {
+    if blocks.is_empty() {
+        return Vec::new();
+    }
+    let threshold_m = estimator.case.trimmed.threshold_m;
+    let together = |chosen: &[usize]| -> Vec<f64> {
+        let mut total = vec![(0.0, 0); estimator.bins.len()];
+        for &k in chosen {
+            total.iter_mut().zip(&blocks[k].sums).for_each(|(t, s)| *t = (t.0 + s.0, t.1 + s.1));
+        }
+        means(&total)
+    };
+    // Pairs across blocks are missing: deviations are taken from what all blocks once give.
+    let once: Vec<usize> = (0..blocks.len()).collect();
+    let centre = estimator.refit(estimate, &together(&once), threshold_m).at;
+    (0..BLOCK_REPLICATES * count)
+        .into_par_iter()
+        .map(|k| {
+            let mut stream: Stream = streams.stream(&format!("blocks-{k}"));
+            let chosen: Vec<usize> = once.iter().map(|_| stream.below(blocks.len() as u64) as usize).collect();
+            let at = estimator.refit(estimate, &together(&chosen), threshold_m).at;
+            at.iter().zip(&centre).zip(&estimate.at).map(|((a, c), e)| e + a - c).collect()
+        })
+        .collect()
+}
+
+/// Basic intervals of the form's parameters from replicates; `None` without any.
+pub fn intervals(estimator: &Estimator, estimate: &Estimate, replicates: &[Vec<f64>]) -> Option<Intervals> {
+    if replicates.is_empty() {
+        return None;
+    }
+    let coordinates = estimator.case.coordinates(&estimate.form);
+    let covariances: Vec<_> = replicates.iter().map(|at| coordinates.decode(at)).collect();
+    let mut values = BTreeMap::new();
+    for parameter in estimate.form.parameters() {
+        let own = parameter.of(&estimate.covariance);
+        let all: Vec<f64> = covariances.iter().map(|c| parameter.of(c)).collect();
+        values.insert(parameter.name.clone(), interval(parameter.role, own, &all));
+    }
+    if let Some(own) = sill_over_range(&estimate.covariance) {
+        let all: Vec<f64> = covariances.iter().filter_map(sill_over_range).collect();
+        values.insert("sigma2_over_range_m".to_owned(), interval(Role::Sigma(0), own, &all));
+    }
+    Some(Intervals { level: LEVEL, replicates: replicates.len() as u32, values })
+}
+
+/// `sigma^2 / b` of a covariance of one term with a range, m.
+pub fn sill_over_range(covariance: &crate::covariance::Covariance) -> Option<f64> {
+    let [term] = covariance.structures.as_slice() else { return None };
+    term.model.scale_names().1.map(|_| term.sigma_m * term.sigma_m / term.range_m)
+}
+
+/// The interval of one parameter.
+fn interval(role: Role, own: f64, all: &[f64]) -> [f64; 2] {
+    match role {
+        // A logarithm reaches neither zero nor below.
+        Role::Sigma(_) | Role::Range(_) | Role::Shape(_) => {
+            let logs: Vec<f64> = all.iter().map(|&v| libm::log(v)).collect();
+            basic(libm::log(own), &logs).map(libm::exp)
+        }
+        // A ratio of 1 is an end of its range, and random surfaces never reach it: no more than quantiles.
+        Role::Ratio => quantiles(all).map(|q| q.min(1.0)),
+        Role::Nugget => basic(own, all).map(|v| v.max(0.0)),
+        Role::Azimuth => {
+            let turned: Vec<f64> = all.iter().map(|v| own + nearest_turn(v - own)).collect();
+            basic(own, &turned)
+        }
+    }
+}
+
+/// The difference of two azimuths of axes, in [-90, 90).
+fn nearest_turn(difference_deg: f64) -> f64 {
+    difference_deg - 180.0 * ((difference_deg + 90.0) / 180.0).floor()
+}
+
+fn basic(own: f64, all: &[f64]) -> [f64; 2] {
+    let [low, high] = quantiles(all);
+    [2.0 * own - high, 2.0 * own - low]
+}
+
+fn quantiles(all: &[f64]) -> [f64; 2] {
+    let mut sorted = sums::finite(all);
+    sorted.sort_by(f64::total_cmp);
+    [0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL].map(|q| sums::quantile_sorted(&sorted, q))
+}
+
+/// Share of replicates at least as large as `own`, as a p-value that is never 0 (Davison and Hinkley, 1997, Eq. 4.11).
+pub fn upper_p(own: f64, replicates: &[f64]) -> f64 {
+    let larger = replicates.iter().filter(|r| **r >= own).count();
+    (larger + 1) as f64 / (replicates.len() + 1) as f64
+}
+
+/// Two-sided p-value.
+pub fn two_sided_p(own: f64, replicates: &[f64]) -> f64 {
+    let upper = upper_p(own, replicates);
+    let negative: Vec<f64> = replicates.iter().map(|r| -r).collect();
+    (2.0 * upper.min(upper_p(-own, &negative))).min(1.0)
+}

@@ -1,0 +1,78 @@
+//! Measured surfaces with a given covariance, for Monte Carlo work: normal fields cut from a torus at least twice as wide, so
+//! that neither the torus nor fixed amplitudes make them more alike than surfaces are.
+//!
+//! A self-affine surface is replaced by a Matern one of a range of `outer_m`, made from its spectral density.
+
+use crate::covariance::Covariance;
+use crate::covariance::filtered::{Measurement, blur, torus_covariance};
+use crate::covariance::models::matern;
+use crate::synth::fft_ma::{Phase, random_spectrum};
+use rayon::prelude::*;
+use sastrugi_numeric::Streams;
+use sastrugi_numeric::fft::{Complex64, HalfSpectrum, RealFft2, smooth_length};
+use std::f64::consts::PI;
+
+/// Surfaces of `rows` by `cols` cells.
+pub struct Simulator {
+    rows: usize,
+    cols: usize,
+    fft: RealFft2,
+    torus: [usize; 2],
+    /// `sqrt(lambda M)` in the order of a half spectrum.
+    amplitude: Vec<f64>,
+}
+
+impl Simulator {
+    /// Surfaces of a covariance as they are measured.
+    pub fn new(
+        covariance: &Covariance,
+        measurement: Measurement,
+        [rows, cols]: [usize; 2],
+        cell_m: [f64; 2],
+        outer_m: f64,
+    ) -> Self {
+        let torus = [rows, cols].map(|n| smooth_length(2 * n));
+        let fft = RealFft2::new(torus[0], torus[1]);
+        let mut spectrum = match covariance.is_stationary() {
+            true => fft.forward(&torus_covariance(torus, cell_m, covariance)),
+            false => power_law(&covariance.stationary(outer_m), torus, cell_m),
+        };
+        if measurement.inner_scale_m > 0.0 {
+            blur(&mut spectrum, cell_m, measurement.inner_scale_m);
+        }
+        let noise_m2 = measurement.noise_sigma_m * measurement.noise_sigma_m;
+        let cells = (torus[0] * torus[1]) as f64;
+        let amplitude = spectrum.values.iter().map(|s| ((s.re + noise_m2).max(0.0) * cells).sqrt()).collect();
+        Self { rows, cols, fft, torus, amplitude }
+    }
+
+    /// One surface, row-major, m.
+    pub fn surface(&self, streams: &Streams) -> Vec<f64> {
+        let [rows, cols] = self.torus;
+        let spectrum = random_spectrum(self.torus, |kx, ky| self.amplitude[kx * rows + ky], Phase::Gaussian, streams);
+        let field = self.fft.inverse(spectrum);
+        (0..self.rows).flat_map(|r| field[r * cols..r * cols + self.cols].iter().copied()).collect()
+    }
+}
+
+/// Eigenvalues of a Matern covariance of any range, in the order of a half spectrum.
+fn power_law(covariance: &Covariance, [rows, cols]: [usize; 2], cell_m: [f64; 2]) -> HalfSpectrum {
+    let term = &covariance.structures[0];
+    let wave = |k: usize, n: usize, cell: f64| {
+        let k = if 2 * k > n { k as f64 - n as f64 } else { k as f64 };
+        2.0 * PI * k / (n as f64 * cell)
+    };
+    let (sin, cos) = libm::sincos(covariance.azimuth_deg.to_radians());
+    let across = covariance.ratio;
+    let value = |k: usize| {
+        let (x, y) = (wave(k / rows, cols, cell_m[0]), wave(k % rows, rows, cell_m[1]));
+        // Across the long axis distances are stretched by 1 / ratio, wavenumbers shrunk.
+        let stretched = [x * sin + y * cos, (x * cos - y * sin) * across];
+        let wave = if covariance.is_isotropic() { [x, y] } else { stretched };
+        let value = matern::eigenvalue(wave, term.range_m, term.shape, cell_m);
+        let nugget = covariance.nugget_m2;
+        Complex64::new(term.sigma_m * term.sigma_m * across * value + nugget, 0.0)
+    };
+    let values = (0..rows * (cols / 2 + 1)).into_par_iter().map(value).collect();
+    HalfSpectrum { rows, cols, values }
+}

@@ -1,0 +1,163 @@
+//! What the data says about the fit: is there one scale, one model, one direction, one site?
+
+use super::case::Case;
+use super::estimator::{Estimate, Estimator};
+use super::params::FitSettings;
+use super::resampling::{Block, Replicates, two_sided_p, upper_p};
+use crate::covariance::bins::Layout;
+use crate::covariance::form::Role;
+use sastrugi_numeric::{Grid, sums};
+use sastrugi_schemas::fit::{Candidate, Profile};
+use sastrugi_statistics::normal;
+use serde_json::{Value, json};
+
+/// Ranges of the profile, as shares of the estimate.
+const PROFILE: [f64; 13] = [0.25, 0.35, 0.5, 0.6, 0.7, 0.85, 1.0, 1.2, 1.4, 1.7, 2.0, 3.0, 4.0];
+/// Standard errors that two windows may differ by. Both see the same surface, so that their difference scatters less than
+/// this test takes it to.
+const WINDOWS_Z: f64 = 2.58;
+
+/// How the generalised sum of squares rises away from the fitted range.
+pub fn profile(estimator: &Estimator, estimate: &Estimate) -> Option<Profile> {
+    let coordinate = estimate.coordinate(Role::Range(0))?;
+    let rise = |share: f64| estimator.rise(estimate, coordinate, estimate.at[coordinate] + libm::log(share));
+    let rises = PROFILE.into_iter().map(rise).collect::<Option<Vec<f64>>>()?;
+    let range_m = PROFILE.iter().map(|s| s * estimate.covariance.structures[0].range_m).collect();
+    Some(Profile { range_m, chi2_rise: rises })
+}
+
+/// The fit at another outer scale.
+pub struct AtWindow {
+    pub outer_scale_m: f64,
+    pub estimate: Estimate,
+}
+
+/// Fits of the same form at half and at twice the outer scale, where the DEM allows them.
+pub fn other_windows(dem: &Grid, settings: &FitSettings, estimate: &Estimate) -> Vec<AtWindow> {
+    let scales = [0.5, 2.0].map(|factor| factor * settings.outer_scale_m());
+    scales.into_iter().filter_map(|outer_scale_m| at_window(dem, settings, estimate, outer_scale_m)).collect()
+}
+
+fn at_window(dem: &Grid, settings: &FitSettings, estimate: &Estimate, outer_scale_m: f64) -> Option<AtWindow> {
+    let there = settings.at_outer_scale(outer_scale_m);
+    let case = Case::new(dem, &there).ok()?;
+    let layout = if estimate.form.is_anisotropic() { Layout::DIRECTIONAL } else { Layout::ISOTROPIC };
+    let bins = case.bins_of(layout);
+    let (sigma_m, range_m) = (estimate.covariance.sigma_m(), estimate.covariance.range_m());
+    let estimate = Estimator::rough(&case, &bins).fit(&estimate.form, sigma_m, range_m);
+    Some(AtWindow { outer_scale_m, estimate })
+}
+
+/// How far apart fits at neighbouring windows are, in standard errors; the largest over sigma and b (or the shape).
+pub fn window_disagreement(estimate: &Estimate, others: &[AtWindow]) -> Option<f64> {
+    let compared = [Role::Sigma(0), Role::Range(0), Role::Shape(0)];
+    let z = |other: &Estimate, role: Role| {
+        let k = estimate.coordinate(role)?;
+        let inflated = |e: &Estimate| Some(e.standard_error(k)? * e.misfit_ratio()?.max(1.0).sqrt());
+        let (own, its) = (inflated(estimate)?, inflated(other)?);
+        Some((estimate.at[k] - other.at[k]).abs() / (own * own + its * its).sqrt())
+    };
+    let all = others.iter().flat_map(|o| compared.iter().filter_map(move |&role| z(&o.estimate, role)));
+    all.fold(None, |largest, v| Some(largest.map_or(v, |l: f64| l.max(v))))
+}
+
+/// True when windows disagree beyond what scatter explains.
+pub fn no_scale_separation(disagreement: Option<f64>) -> bool {
+    disagreement.is_some_and(|z| z > WINDOWS_Z)
+}
+
+/// Is one direction longer than another? The rise of the likelihood from an isotropic fit to one with an axis, on bins by
+/// direction, over what misfit there is; chi-squared with two degrees of freedom for an isotropic surface.
+pub struct Isotropy {
+    pub p: f64,
+    pub ratio: f64,
+    pub azimuth_deg: f64,
+}
+
+/// The verdict of an estimator on bins by direction.
+pub fn isotropy(estimator: &Estimator, estimate: &Estimate) -> Option<Isotropy> {
+    let (case, bins) = (estimator.case, estimator.bins);
+    let (sigma_m, range_m) = (estimate.covariance.sigma_m(), estimate.covariance.range_m());
+    let round = estimator.fit(&estimate.form.isotropic(), sigma_m, range_m);
+    let form = estimate.form.with_axis();
+    let start = case.coordinates(&form).encode(&round.covariance);
+    let likelihood = round.likelihood.clone()?;
+    let from = Estimate { form: form.clone(), at: start, likelihood: Some(likelihood.clone()), ..round.clone() };
+    let long = estimator.refit(&from, &bins.covariance_m2, case.trimmed.threshold_m);
+    let freedom = bins.len().saturating_sub(long.at.len()).max(1) as f64;
+    let rise = (likelihood.chi2 - long.value).max(0.0) / (long.value / freedom).max(1.0);
+    let covariance = case.coordinates(&form).decode(&long.at);
+    Some(Isotropy { p: libm::exp(-0.5 * rise), ratio: covariance.ratio, azimuth_deg: covariance.azimuth_deg })
+}
+
+/// Do the blocks of the site have one variance? Largest over smallest block sigma, and the p-value of their scatter about
+/// the mean against what surfaces of the fitted model scatter (chi-squared).
+pub struct Stationarity {
+    pub p: f64,
+    pub sigma_max_over_min: f64,
+}
+
+pub fn stationarity(estimator: &Estimator, estimate: &Estimate, blocks: &[Block]) -> Option<Stationarity> {
+    if blocks.len() < 2 {
+        return None;
+    }
+    let threshold_m = estimator.case.trimmed.threshold_m;
+    let variance_of_one = estimator.expectation.covariance(&estimate.covariance, threshold_m).first().copied()?
+        * estimator.case.trimmed.kept as f64;
+    let variances: Vec<f64> = blocks.iter().map(|b| b.sums[0].0 / b.sums[0].1 as f64).collect();
+    let cells: Vec<f64> = blocks.iter().map(|b| b.sums[0].1 as f64).collect();
+    let total: f64 = sums::sum(&cells);
+    let mean = variances.iter().zip(&cells).map(|(v, n)| v * n).sum::<f64>() / total;
+    let chi2: f64 = variances.iter().zip(&cells).map(|(v, n)| (v - mean) * (v - mean) * n / variance_of_one).sum();
+    let (low, high) = variances.iter().fold((f64::INFINITY, 0.0f64), |(l, h), v| (l.min(*v), h.max(*v)));
+    let p = chi_squared_upper(chi2, (blocks.len() - 1) as f64);
+    Some(Stationarity { p, sigma_max_over_min: (high / low).sqrt() })
+}
+
+/// Upper tail of chi-squared by Wilson and Hilferty (1931): error below 0.003 for 5 degrees of freedom or more.
+pub fn chi_squared_upper(chi2: f64, freedom: f64) -> f64 {
+    let spread = 2.0 / (9.0 * freedom);
+    1.0 - normal::cdf((libm::cbrt(chi2 / freedom) - (1.0 - spread)) / spread.sqrt())
+}
+
+/// p-value of the misfit: against the replicates where there are, else chi-squared.
+pub fn misfit_p(estimate: &Estimate, replicates: Option<&Replicates>) -> Option<f64> {
+    let ratio = estimate.misfit_ratio()?;
+    let freedom = (estimate.likelihood.as_ref()?.bins.saturating_sub(estimate.at.len())) as f64;
+    Some(match replicates {
+        Some(r) => upper_p(ratio, &r.misfit_ratio),
+        None => chi_squared_upper(ratio * freedom, freedom),
+    })
+}
+
+/// p-value of the residual's shape: its median size over the trimming threshold, against normal surfaces.
+pub fn normality_p(case: &Case, replicates: &Replicates) -> f64 {
+    two_sided_p(case.trimmed.median_size_m / case.trimmed.threshold_m, &replicates.median_over_threshold)
+}
+
+/// Every model tried, the best first.
+pub fn candidates(estimates: &[Estimate]) -> Vec<Candidate> {
+    let least = estimates.iter().filter_map(Estimate::aicc).fold(f64::INFINITY, f64::min);
+    let mut all: Vec<Candidate> = estimates
+        .iter()
+        .map(|e| Candidate {
+            model: e.form.name().to_owned(),
+            parameters: e.covariance.parameters(&e.form),
+            free: e.at.len() as u32,
+            chi2: e.likelihood.as_ref().map(|l| l.chi2),
+            aicc_above_best: e.aicc().map(|a| a - least),
+        })
+        .collect();
+    let order = |c: &Candidate| c.aicc_above_best.unwrap_or(f64::INFINITY);
+    all.sort_by(|a, b| order(a).total_cmp(&order(b)));
+    all
+}
+
+/// A fit at another window as a diagnostic.
+pub fn window_entry(at: &AtWindow) -> Value {
+    json!({
+        "outer_scale_m": at.outer_scale_m,
+        "parameters": at.estimate.covariance.parameters(&at.estimate.form),
+        "misfit_chi2_per_freedom": at.estimate.misfit_ratio(),
+    })
+}
