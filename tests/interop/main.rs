@@ -1,4 +1,4 @@
-//! Independent readers on our files: rasterio, pyarrow, duckdb and the Python mcap reader see what we say.
+//! Independent readers on our files: rasterio, pyarrow, duckdb, laspy and the Python mcap reader see what we say.
 //!
 //! The readers live in `.cache/readers`, which `./test` sets up. Without them these tests are skipped with a message; with
 //! CI set that is a failure.
@@ -70,6 +70,32 @@ fn val_measured_dems_read_as_rasterio_reads_them() {
             let single = theirs["dtype"] == "float32";
             assert_eq!(number(&ours[key], single), number(&theirs[key], single), "{name}: {key}");
         }
+    }
+}
+
+/// Cell means of measured clouds as numpy takes them of the points that laspy reads; the hashes of the points per cell are
+/// those that the tests of the room `store` find.
+#[test]
+fn val_measured_clouds_are_gridded_as_numpy_grids_them() {
+    let Some(python) = python() else { return };
+    let clouds = [
+        ("Otira_1cm_grains_G3POINT.laz", "0.02", "65f3fac0680ed4b23e280bba25669431431e5a3ac1b9a28bd127e7281f83b918"),
+        ("pozo_blanca.laz", "0.5", "9ddaeadfe1e544d212085baa047a183083738c77f25fc39f73254fc1c6cdcc9f"),
+    ];
+    for (name, cell, counts_sha256) in clouds {
+        let Some(cloud) = sastrugi_fixtures::measured(name) else {
+            eprintln!("SKIPPED: ../shared/data/{name} is absent");
+            continue;
+        };
+        let folder = area();
+        let heights = folder.path().join("heights.npy");
+        let (from, to) = (cloud.to_str().unwrap(), heights.to_str().unwrap());
+        let call = sastrugi_in(folder.path(), &["convert", from, to, "--cell", cell]);
+        assert_eq!(call.code, 0, "{}", call.stderr);
+        let call = check(&python, "check_points.py", &[&cloud, Path::new(cell), &heights]);
+        assert_eq!(call.code, 0, "{}{}", call.stdout, call.stderr);
+        let theirs: Value = serde_json::from_str(&call.stdout).unwrap();
+        assert_eq!(theirs["counts_sha256"], counts_sha256, "{name}");
     }
 }
 

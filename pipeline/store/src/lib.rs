@@ -1,7 +1,8 @@
-//! Files: DEM formats, atomic writes, Parquet tables, MCAP recordings, and the release folder with its checksums.
+//! Files: DEM formats, point clouds, atomic writes, Parquet tables, MCAP recordings, and the release folder with its
+//! checksums.
 //!
-//! The only room that names `arrow`, `parquet`, `mcap`, `foxglove`, `prost`, `geotiff-*`, `tiff` and `png`. Nothing here
-//! computes: heights, rows and recordings come in and go out as they are.
+//! The only room that names `arrow`, `parquet`, `mcap`, `foxglove`, `prost`, `geotiff-*`, `tiff`, `png` and `las`. Nothing
+//! here computes: heights, rows and recordings come in and go out as they are. Only point clouds are gridded ([`points`]).
 //!
 //! * Same input, same bytes, on any x86-64 CPU and for any number of threads.
 //! * A file appears under its name only when it is complete and on disk ([`atomic`]).
@@ -12,6 +13,7 @@ pub mod dem;
 pub mod digest;
 pub mod mcap;
 pub mod parquet;
+pub mod points;
 pub mod release;
 
 /// `sastrugi/<version>`: the name of the program in every file that has a place for it.

@@ -46,7 +46,7 @@ impl Crs {
     }
 
     /// The system that GeoTIFF keys describe.
-    pub(super) fn from_keys(mut keys: Vec<(u16, GeoKey)>) -> Self {
+    pub(crate) fn from_keys(mut keys: Vec<(u16, GeoKey)>) -> Self {
         keys.retain(|(id, _)| *id != RASTER_TYPE);
         keys.sort_by_key(|(id, _)| *id);
         let mut crs = Self { keys, ..Self::default() };
@@ -60,7 +60,7 @@ impl Crs {
     }
 
     /// Sentences on units that are not metres.
-    pub(super) fn unit_notes(&self) -> Vec<String> {
+    pub(crate) fn unit_notes(&self) -> Vec<String> {
         let not_metre = |id| self.short(id).filter(|unit| *unit != 9001 && !NO_CODE.contains(unit));
         let horizontal = not_metre(LINEAR_UNITS).filter(|_| !self.geographic);
         let vertical = not_metre(VERTICAL_UNITS);

@@ -1,4 +1,5 @@
-//! Elevation rasters of many formats, read to one form and written from it.
+//! Elevation rasters of many formats, and point clouds gridded to one ([`crate::points`]), read to one form and written
+//! from it.
 //!
 //! Heights are metres as the file states them; `NaN` stands for no data. Cells follow the grid convention of
 //! `sastrugi-numeric`: a PixelIsPoint raster is shifted by half a cell so that its posts become cell centres. What is
@@ -23,13 +24,16 @@ pub use crs::{Crs, GeoKey};
 pub use png::{HeightScale, write_png_heights, write_png16};
 
 use crate::atomic;
+use crate::points::{self, GridSettings};
 use sastrugi_numeric::Grid;
-use std::fs;
-use std::io;
+use std::fs::{self, File};
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
 /// Most cells of a raster: 2 GiB of heights in memory.
 pub const MAX_CELLS: u64 = 1 << 28;
+/// Bytes that tell a point cloud, which is not read whole.
+const SNIFFED_BYTES: u64 = 4;
 /// Heights without data in the formats that need a number for it.
 pub const NO_DATA: f64 = -9999.0;
 
@@ -74,6 +78,8 @@ pub enum Format {
     Png,
     /// Wavefront mesh; written only.
     Obj,
+    /// Point cloud, LAS or LAZ, which is gridded ([`crate::points`]); read only.
+    Las,
 }
 
 impl Format {
@@ -86,6 +92,7 @@ impl Format {
             Self::Npy => "npy",
             Self::Png => "png",
             Self::Obj => "obj",
+            Self::Las => "las",
         }
     }
 
@@ -99,6 +106,7 @@ impl Format {
             "npy" => Some(Self::Npy),
             "png" => Some(Self::Png),
             "obj" => Some(Self::Obj),
+            "las" | "laz" => Some(Self::Las),
             _ => None,
         }
     }
@@ -132,7 +140,7 @@ pub enum DemError {
         /// What is wrong with it.
         reason: String,
     },
-    /// The grid does not fit the format.
+    /// The grid does not fit the format, or a setting is out of range.
     #[error("{}: {reason}", path.display())]
     Unfit {
         /// The file that was asked for.
@@ -156,7 +164,7 @@ impl DemError {
         matches!(self, Self::Missing { .. } | Self::Unusable { .. })
     }
 
-    fn reading(path: &Path, source: io::Error) -> Self {
+    pub(crate) fn reading(path: &Path, source: io::Error) -> Self {
         match source.kind() {
             io::ErrorKind::NotFound => Self::Missing { path: path.to_owned() },
             io::ErrorKind::IsADirectory => Refusal::new("is a folder, not a raster").about(path),
@@ -168,14 +176,14 @@ impl DemError {
 /// Why bytes are no usable raster.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
-struct Refusal(String);
+pub(crate) struct Refusal(String);
 
 impl Refusal {
-    fn new(reason: impl Into<String>) -> Self {
+    pub(crate) fn new(reason: impl Into<String>) -> Self {
         Self(reason.into())
     }
 
-    fn about(self, path: &Path) -> DemError {
+    pub(crate) fn about(self, path: &Path) -> DemError {
         DemError::Unusable { path: path.to_owned(), reason: self.0 }
     }
 }
@@ -183,7 +191,8 @@ impl Refusal {
 /// What a caller knows about a file that the file does not say.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ReadOptions {
-    /// Cell size east-west and north-south, m, for formats that carry none (.npy, .png, TIFF without GeoTIFF tags).
+    /// Cell size east-west and north-south, m, for formats that carry none (.npy, .png, TIFF without GeoTIFF tags), and
+    /// the size of the square cells of a gridded point cloud.
     pub cell_m: Option<[f64; 2]>,
 }
 
@@ -196,13 +205,40 @@ pub fn read(path: &Path) -> Result<Dem, DemError> {
     read_with(path, &ReadOptions::default())
 }
 
-/// Reads a raster with what the caller knows about it.
+/// Reads a raster with what the caller knows about it. A point cloud becomes the mean of each cell, without filling.
 ///
 /// # Errors
 /// As [`read`].
 pub fn read_with(path: &Path, options: &ReadOptions) -> Result<Dem, DemError> {
-    let bytes = fs::read(path).map_err(|e| DemError::reading(path, e))?;
+    read_gridded(path, options, &GridSettings::default())
+}
+
+/// As [`read_with`], with the settings by which a point cloud is gridded; rasters have no use for them. The cell size is
+/// that of the settings, or else that of the options.
+///
+/// # Errors
+/// As [`read`]; also [`DemError::Unfit`] when the file is a point cloud and a setting is out of range.
+pub fn read_gridded(path: &Path, options: &ReadOptions, settings: &GridSettings) -> Result<Dem, DemError> {
+    let reading = |e| DemError::reading(path, e);
+    let mut file = File::open(path).map_err(reading)?;
+    let mut bytes = Vec::new();
+    file.by_ref().take(SNIFFED_BYTES).read_to_end(&mut bytes).map_err(reading)?;
+    if points::looks_like(&bytes) {
+        let cell_m = settings.cell_m.map_or_else(|| square_cell(path, options), |cell| Ok(Some(cell)))?;
+        return Ok(points::read_open(path, file, &GridSettings { cell_m, ..*settings })?.dem);
+    }
+    file.read_to_end(&mut bytes).map_err(reading)?;
     parse(path, bytes, options).and_then(checked).map_err(|refusal| refusal.about(path))
+}
+
+fn square_cell(path: &Path, options: &ReadOptions) -> Result<Option<f64>, DemError> {
+    match options.cell_m {
+        Some([x, y]) if x != y => {
+            let reason = format!("a point cloud is gridded to square cells, not to cells of {x} x {y} m");
+            Err(DemError::Unfit { path: path.to_owned(), reason })
+        }
+        cell => Ok(cell.map(|[side, _]| side)),
+    }
 }
 
 fn parse(path: &Path, bytes: Vec<u8>, options: &ReadOptions) -> Result<Dem, Refusal> {
@@ -215,14 +251,15 @@ fn parse(path: &Path, bytes: Vec<u8>, options: &ReadOptions) -> Result<Dem, Refu
         Some(Format::Hgt) => hgt::parse(path, &bytes),
         Some(Format::Npy) => npy::parse(&bytes, options),
         Some(Format::Png) => png::parse(&bytes, options),
-        Some(Format::Obj) | None => {
-            Err(Refusal::new("is no raster that can be read; GeoTIFF, ESRI ASCII, .hgt, .npy and greyscale .png can"))
-        }
+        Some(Format::Las) => Err(Refusal::new("is no point cloud: LAS and LAZ files start with \"LASF\"")),
+        Some(Format::Obj) | None => Err(Refusal::new(
+            "is no raster that can be read; GeoTIFF, ESRI ASCII, .hgt, .npy, greyscale .png, .las and .laz can",
+        )),
     }
 }
 
 /// The checks that every format shares.
-fn checked(mut dem: Dem) -> Result<Dem, Refusal> {
+pub(crate) fn checked(mut dem: Dem) -> Result<Dem, Refusal> {
     let g = &dem.grid.geometry;
     if !g.cell.iter().all(|c| c.is_finite() && *c > 0.0) || !g.origin.iter().all(|o| o.is_finite()) {
         return Err(Refusal::new(format!("the cell size {:?} at {:?} is not usable", g.cell, g.origin)));
@@ -294,6 +331,7 @@ pub fn write(path: &Path, grid: &Grid, crs: &Crs, options: &WriteOptions) -> Res
             return Ok(vec![scale.sentence()]);
         }
         Some(Format::Obj) => (obj::render(grid), lost_crs(crs)),
+        Some(Format::Las) => return Err(unfit(Refusal::new("point clouds are read, not written"))),
         None => {
             let reason = "ends in none of .tif, .asc, .hgt, .npy, .png, .obj".to_owned();
             return Err(DemError::Unfit { path: path.to_owned(), reason });

@@ -1,0 +1,147 @@
+//! Coordinate reference systems of point clouds: GeoTIFF keys (LAS 1.4, "Georeferencing Information using GeoTIFF") or
+//! OGC well-known text (versions 1 and 2), brought to the form of the rasters.
+//!
+//! Of well-known text, the name, the EPSG code and the units of the horizontal and the vertical system are kept.
+
+use crate::dem::{Crs, GeoKey, Refusal};
+use las::Header;
+use las::crs::GeoTiffData;
+
+const MODEL_TYPE: u16 = 1024;
+const CITATION: u16 = 1026;
+const GEODETIC_CRS: u16 = 2048;
+const PROJECTED_CRS: u16 = 3072;
+const LINEAR_UNITS: u16 = 3076;
+const VERTICAL_UNITS: u16 = 4099;
+const MODEL_PROJECTED: u16 = 1;
+const MODEL_GEOCENTRIC: u16 = 3;
+/// Nodes of well-known text within each other, at most.
+const DEPTH: usize = 24;
+
+/// The system that a header names: the default (a local plane in metres) where it names none.
+///
+/// # Errors
+/// Coordinates that are degrees, or geocentric.
+pub(super) fn of_header(header: &Header, well_known_text: bool) -> Result<Crs, Refusal> {
+    let text = || Some(String::from_utf8_lossy(header.get_wkt_crs_bytes()?).into_owned());
+    let keys = || geotiff_keys(header).map(Crs::from_keys);
+    let crs = if well_known_text {
+        text().and_then(|text| of_text(&text)).or_else(keys)
+    } else {
+        keys().or_else(|| of_text(&text()?))
+    };
+    let crs = crs.unwrap_or_default();
+    let geocentric = crs.keys.contains(&(MODEL_TYPE, GeoKey::Short(MODEL_GEOCENTRIC)));
+    if crs.geographic || geocentric {
+        let kind = if geocentric { "geocentric" } else { "degrees of longitude and latitude" };
+        let code = crs.epsg.map_or_else(String::new, |code| format!(" (EPSG:{code})"));
+        return Err(Refusal::new(format!(
+            "its coordinates are {kind}{code}; a point cloud must be projected to metres before it can be gridded"
+        )));
+    }
+    Ok(crs)
+}
+
+fn geotiff_keys(header: &Header) -> Option<Vec<(u16, GeoKey)>> {
+    let found = header.get_geotiff_crs().ok()??;
+    let value = |data: GeoTiffData| match data {
+        GeoTiffData::U16(code) => GeoKey::Short(code),
+        GeoTiffData::String(text) => GeoKey::Ascii(text.trim_end_matches('\0').to_owned()),
+        GeoTiffData::Doubles(numbers) => GeoKey::Double(numbers),
+    };
+    let keys: Vec<(u16, GeoKey)> = found.entries.into_iter().map(|entry| (entry.id, value(entry.data))).collect();
+    (!keys.is_empty()).then_some(keys)
+}
+
+/// The system that well-known text describes.
+pub(super) fn of_text(text: &str) -> Option<Crs> {
+    let (root, _) = node(text.trim_start(), DEPTH)?;
+    let compound = root.is(&["COMPD_CS", "COMPOUNDCRS"]);
+    let parts = if compound { root.nodes.iter().collect() } else { vec![&root] };
+    let horizontal = parts.iter().find(|part| part.is(&PROJECTED) || part.is(&GEOGRAPHIC) || part.is(&GEOCENTRIC));
+    let vertical = parts.iter().find(|part| part.is(&["VERT_CS", "VERTCRS", "VERTICALCRS"]));
+    let mut keys = vec![];
+    if let Some(node) = horizontal {
+        let projected = node.is(&PROJECTED);
+        let (model, id) = if projected { (MODEL_PROJECTED, PROJECTED_CRS) } else { (2, GEODETIC_CRS) };
+        let model = if node.is(&GEOCENTRIC) { MODEL_GEOCENTRIC } else { model };
+        keys.push((MODEL_TYPE, GeoKey::Short(model)));
+        keys.extend(node.epsg().map(|code| (id, GeoKey::Short(code))));
+        keys.extend(node.unit().filter(|_| projected).map(|unit| (LINEAR_UNITS, GeoKey::Short(unit))));
+    }
+    keys.extend(vertical.and_then(|node| node.unit()).map(|unit| (VERTICAL_UNITS, GeoKey::Short(unit))));
+    let name = horizontal.map_or(root.name(), |node| node.name());
+    keys.push((CITATION, GeoKey::Ascii(name.to_owned())));
+    Some(Crs::from_keys(keys))
+}
+
+const PROJECTED: [&str; 3] = ["PROJCS", "PROJCRS", "PROJECTEDCRS"];
+const GEOGRAPHIC: [&str; 5] = ["GEOGCS", "GEOGCRS", "GEOGRAPHICCRS", "GEODCRS", "GEODETICCRS"];
+const GEOCENTRIC: [&str; 1] = ["GEOCCS"];
+
+/// `WORD["name", 1.0, OTHER[...], ...]`.
+#[derive(Debug, Default)]
+struct Node<'a> {
+    word: &'a str,
+    /// Texts, numbers and bare words, in their order.
+    values: Vec<&'a str>,
+    nodes: Vec<Node<'a>>,
+}
+
+impl Node<'_> {
+    fn is(&self, words: &[&str]) -> bool {
+        words.iter().any(|word| self.word.eq_ignore_ascii_case(word))
+    }
+
+    fn name(&self) -> &str {
+        self.values.first().copied().unwrap_or_default()
+    }
+
+    /// The node's own code, not that of a part of it.
+    fn epsg(&self) -> Option<u16> {
+        let authority = self.nodes.iter().find(|node| node.is(&["AUTHORITY", "ID"]))?;
+        let [kind, code, ..] = authority.values.as_slice() else { return None };
+        if kind.eq_ignore_ascii_case("EPSG") { code.parse().ok() } else { None }
+    }
+
+    /// EPSG code of the unit of length, where it is known: metre, foot or US survey foot.
+    fn unit(&self) -> Option<u16> {
+        let axis = || self.nodes.iter().filter(|n| n.is(&["AXIS"])).flat_map(|n| &n.nodes);
+        let unit = self.nodes.iter().chain(axis()).find(|node| node.is(&["UNIT", "LENGTHUNIT"]))?;
+        let metres: f64 = unit.values.get(1)?.parse().ok()?;
+        let known = [(9001, 1.0), (9002, 0.3048), (9003, 1200.0 / 3937.0)];
+        let close = |m: f64| (metres / m - 1.0).abs() < 1e-7;
+        unit.epsg().or_else(|| known.into_iter().find(|(_, m)| close(*m)).map(|(code, _)| code))
+    }
+}
+
+/// Reads a node and returns it with the text after it.
+fn node(text: &str, depth: usize) -> Option<(Node<'_>, &str)> {
+    let depth = depth.checked_sub(1)?;
+    let open = text.find(['[', '(', '"', ',', ']', ')'])?;
+    let mut node = Node { word: text[..open].trim(), ..Node::default() };
+    let mut rest = text[open..].strip_prefix(['[', '('])?;
+    loop {
+        rest = rest.trim_start();
+        if let Some(quoted) = rest.strip_prefix('"') {
+            let (value, after) = quoted.split_once('"')?;
+            node.values.push(value);
+            rest = after;
+        } else {
+            let end = rest.find(['[', '(', ',', ']', ')'])?;
+            if rest[end..].starts_with(['[', '(']) {
+                let (child, after) = self::node(rest, depth)?;
+                node.nodes.push(child);
+                rest = after;
+            } else {
+                node.values.push(rest[..end].trim());
+                rest = &rest[end..];
+            }
+        }
+        rest = rest.trim_start();
+        match rest.strip_prefix(',') {
+            Some(after) => rest = after,
+            None => return Some((node, rest.strip_prefix([']', ')'])?)),
+        }
+    }
+}

@@ -1,0 +1,326 @@
+//! What the header of a LAS or LAZ file claims, held against the file's length before a decoder sees it.
+//!
+//! ASPRS, "LAS Specification 1.4 - R15" (2019), tables 3 (public header block), 5 and 6 (variable length records) and
+//! 7 to 17 (point records); Isenburg, "LASzip: lossless compression of LiDAR data", Photogrammetric Engineering and
+//! Remote Sensing 79(2), 2013, and the LASzip sources for the chunk table and the layers of point formats 6 to 10.
+//!
+//! The decoders (`las`, `laz`) ask for memory by numbers found in the file: the length of an extended record, the
+//! number of chunks, the bytes of a layer. Each of them is compared here with what the file can hold.
+
+use crate::dem::Refusal;
+use std::io::{self, Read, Seek, SeekFrom};
+
+/// Longest header of a known version, bytes.
+const HEADER_BYTES: usize = 375;
+/// Header lengths by minor version.
+const HEADER_SIZES: [u16; 5] = [227, 227, 227, 235, 375];
+const RECORD_HEADER_BYTES: u64 = 54;
+const EXTENDED_RECORD_HEADER_BYTES: u64 = 60;
+/// Bytes of a point by format (LAS 1.4, tables 7 to 17).
+const POINT_BYTES: [u16; 11] = [20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67];
+/// Points of a compressed file per byte: a million equal points take 7 kB.
+const MAX_POINTS_PER_BYTE: u64 = 1 << 10;
+const COMPRESSED: u8 = 0x80;
+/// LASzip's compressors: all points in one chunk, in many, and in chunks of layers.
+const POINT_WISE: u16 = 1;
+const CHUNKED: u16 = 2;
+const LAYERED: u16 = 3;
+
+/// First bytes of every LAS and LAZ file.
+pub(super) const SIGNATURE: &[u8; 4] = b"LASF";
+
+/// What the header says, checked.
+#[derive(Clone, Debug)]
+pub(super) struct Claims {
+    /// Number of points, at least 1.
+    pub points: u64,
+    /// Bytes of a decoded point.
+    pub point_bytes: u16,
+    /// Point format, 0 to 10.
+    pub format: u8,
+    /// True for LAZ.
+    pub compressed: bool,
+    /// Factor from stored integers to coordinates, by axis.
+    pub scale: [f64; 3],
+    /// Coordinates of the stored zero, by axis.
+    pub offset: [f64; 3],
+    /// True when the reference system is well-known text.
+    pub well_known_text: bool,
+    /// Where the points start.
+    data_start: u64,
+    /// Length of the file.
+    file_bytes: u64,
+}
+
+/// Little-endian numbers at the places where the specification puts them.
+struct Header([u8; HEADER_BYTES]);
+
+impl Header {
+    fn bytes<const N: usize>(&self, at: usize) -> [u8; N] {
+        let mut array = [0; N];
+        array.copy_from_slice(&self.0[at..at + N]);
+        array
+    }
+
+    fn minor_version(&self) -> u8 {
+        self.0[25]
+    }
+
+    fn u16(&self, at: usize) -> u16 {
+        u16::from_le_bytes(self.bytes(at))
+    }
+
+    fn u32(&self, at: usize) -> u32 {
+        u32::from_le_bytes(self.bytes(at))
+    }
+
+    fn u64(&self, at: usize) -> u64 {
+        u64::from_le_bytes(self.bytes(at))
+    }
+
+    fn f64(&self, at: usize) -> f64 {
+        f64::from_le_bytes(self.bytes(at))
+    }
+}
+
+/// A failed read of a file that was opened.
+pub(super) fn unreadable(error: &io::Error) -> Refusal {
+    match error.kind() {
+        io::ErrorKind::UnexpectedEof => Refusal::new("the point cloud breaks off"),
+        _ => Refusal::new(format!("cannot be read: {error}")),
+    }
+}
+
+impl Claims {
+    /// Reads the header of a file and checks it.
+    pub fn read(file: &mut (impl Read + Seek)) -> Result<Self, Refusal> {
+        let file_bytes = file.seek(SeekFrom::End(0)).map_err(|e| unreadable(&e))?;
+        file.seek(SeekFrom::Start(0)).map_err(|e| unreadable(&e))?;
+        let mut bytes = Vec::with_capacity(HEADER_BYTES);
+        file.by_ref().take(HEADER_BYTES as u64).read_to_end(&mut bytes).map_err(|e| unreadable(&e))?;
+        if !bytes.starts_with(SIGNATURE) {
+            return Err(Refusal::new("is no LAS or LAZ file: it does not start with \"LASF\""));
+        }
+        let mut header = Header([0; HEADER_BYTES]);
+        header.0[..bytes.len()].copy_from_slice(&bytes);
+        let claims = Self::check(&header, file_bytes)?;
+        if header.minor_version() == 4 && header.u64(235) > 0 && header.u32(243) > 0 {
+            claims.check_extended_record(file, header.u64(235))?;
+        }
+        Ok(claims)
+    }
+
+    fn check(header: &Header, file_bytes: u64) -> Result<Self, Refusal> {
+        let (major, minor) = (header.0[24], header.minor_version());
+        let least = HEADER_SIZES.get(usize::from(minor)).copied().filter(|_| major == 1);
+        let least = least.ok_or_else(|| Refusal::new(format!("is LAS {major}.{minor}; 1.0 to 1.4 can be read")))?;
+        let header_size = header.u16(94);
+        if header_size < least || u64::from(header_size) > file_bytes {
+            return Err(Refusal::new(format!("its LAS header has {header_size} bytes in a file of {file_bytes}")));
+        }
+        let data_start = u64::from(header.u32(96));
+        let records = u64::from(header.u32(100));
+        let room = data_start.checked_sub(u64::from(header_size)).filter(|_| data_start <= file_bytes);
+        if room.is_none_or(|room| records * RECORD_HEADER_BYTES > room) {
+            return Err(Refusal::new(format!(
+                "claims {records} records before its points at byte {data_start} of a file of {file_bytes}"
+            )));
+        }
+        let (format, compressed) = point_format(header.0[104])?;
+        let claims = Self {
+            points: points(header, minor),
+            point_bytes: header.u16(105),
+            format,
+            compressed,
+            scale: [header.f64(131), header.f64(139), header.f64(147)],
+            offset: [header.f64(155), header.f64(163), header.f64(171)],
+            well_known_text: minor == 4 && header.u16(6) & 16 != 0,
+            data_start,
+            file_bytes,
+        };
+        claims.check_points()?;
+        claims.check_transform()?;
+        Ok(claims)
+    }
+
+    fn check_points(&self) -> Result<(), Refusal> {
+        let least = POINT_BYTES[usize::from(self.format)];
+        if self.point_bytes < least {
+            let (format, bytes) = (self.format, self.point_bytes);
+            return Err(Refusal::new(format!("its points have {bytes} bytes; point format {format} takes {least}")));
+        }
+        if self.points == 0 {
+            return Err(Refusal::new("holds no points"));
+        }
+        let room = self.file_bytes - self.data_start;
+        let most =
+            if self.compressed { room.saturating_mul(MAX_POINTS_PER_BYTE) } else { room / u64::from(self.point_bytes) };
+        if self.points > most {
+            let points = self.points;
+            return Err(Refusal::new(format!("claims {points} points in {room} bytes, which hold at most {most}")));
+        }
+        if self.points > u64::from(u32::MAX) {
+            return Err(Refusal::new(format!("holds {} points; at most {} can be read", self.points, u32::MAX)));
+        }
+        Ok(())
+    }
+
+    fn check_transform(&self) -> Result<(), Refusal> {
+        let usable = self.scale.iter().all(|s| s.is_finite() && *s > 0.0) && self.offset.iter().all(|o| o.is_finite());
+        if usable {
+            return Ok(());
+        }
+        let (scale, offset) = (self.scale, self.offset);
+        Err(Refusal::new(format!(
+            "its coordinates have scale {scale:?} and offset {offset:?}; finite numbers belong there, and scales above 0"
+        )))
+    }
+
+    /// Checks the first extended record, which the decoder reads whole.
+    fn check_extended_record(&self, file: &mut (impl Read + Seek), start: u64) -> Result<(), Refusal> {
+        let room = self.file_bytes.checked_sub(EXTENDED_RECORD_HEADER_BYTES).and_then(|room| room.checked_sub(start));
+        let room =
+            room.ok_or_else(|| Refusal::new(format!("breaks off before its extended records at byte {start}")))?;
+        let length = u64_at(file, start + 20)?;
+        if length > room {
+            return Err(Refusal::new(format!("claims an extended record of {length} bytes where {room} are left")));
+        }
+        Ok(())
+    }
+
+    /// Checks what the decoder of a compressed file would believe; `laszip` is the LASzip record. Returns where the
+    /// compressed points end: the decoder must not read on from there.
+    pub fn check_compression(&self, file: &mut (impl Read + Seek), laszip: Option<&[u8]>) -> Result<u64, Refusal> {
+        let record = laszip.ok_or_else(|| Refusal::new("is compressed, but lacks the LASzip record that says how"))?;
+        let layered = self.format >= 6;
+        let compressor = self.check_items(record, layered)?;
+        if compressor == POINT_WISE {
+            return Ok(self.file_bytes);
+        }
+        let table = self.chunk_table(file)?;
+        if layered {
+            self.check_layers(file, table)?;
+        }
+        Ok(table)
+    }
+
+    /// The fields that the LASzip record lists must be those of the point format, since the decoder takes their sizes
+    /// as they come. Returns the kind of compressor.
+    fn check_items(&self, record: &[u8], layered: bool) -> Result<u16, Refusal> {
+        let word = |at: usize| record.get(at..at + 2).map(|b| u16::from_le_bytes([b[0], b[1]]));
+        let compressors = if layered { LAYERED..=LAYERED } else { POINT_WISE..=CHUNKED };
+        let versions = if layered { 3..=4 } else { 1..=2 };
+        let compressor = word(0).filter(|kind| compressors.contains(kind));
+        let count = usize::from(word(32).unwrap_or(0));
+        let items: Option<Vec<(u16, u16)>> = (0..count).map(|i| Some((word(34 + 6 * i)?, word(36 + 6 * i)?))).collect();
+        let known = (0..count).all(|i| word(38 + 6 * i).is_some_and(|version| versions.contains(&version)));
+        compressor.filter(|_| known && items.as_ref() == Some(&laszip_items(self.format, self.point_bytes))).ok_or_else(
+            || Refusal::new(format!("its LASzip record does not describe points of format {}", self.format)),
+        )
+    }
+
+    /// Where the table of chunks lies.
+    fn chunk_table(&self, file: &mut (impl Read + Seek)) -> Result<u64, Refusal> {
+        let later = |at: &u64| *at > self.data_start && *at <= i64::MAX as u64;
+        // A writer that could not seek back puts the place at the end of the file.
+        let places = [self.data_start, self.file_bytes - 8];
+        let first = u64_at(file, places[0])?;
+        let table = if later(&first) { first } else { u64_at(file, places[1])? };
+        let table = Some(table).filter(|at| later(at) && *at <= self.file_bytes - 8);
+        let table = table.ok_or_else(|| Refusal::new("lacks the table of its compressed chunks: it breaks off"))?;
+        // Every chunk starts with a whole point.
+        let chunks = u64::from(u32_at(file, table + 4)?);
+        if chunks * u64::from(self.point_bytes) > self.file_bytes {
+            return Err(Refusal::new(format!("claims {chunks} chunks of points in {} bytes", self.file_bytes)));
+        }
+        Ok(table)
+    }
+
+    /// Walks the chunks of point formats 6 to 10: a whole point, the number of points, the bytes of each layer, the
+    /// layers, up to the table of chunks.
+    fn check_layers(&self, file: &mut (impl Read + Seek), table: u64) -> Result<(), Refusal> {
+        let mut sizes = vec![0; 4 * laszip_layers(self.format, self.point_bytes)];
+        let (mut at, mut points) = (self.data_start + 8, 0);
+        while at < table {
+            let start = at + u64::from(self.point_bytes);
+            let in_chunk = u64::from(u32_at(file, start)?);
+            file.read_exact(&mut sizes).map_err(|e| unreadable(&e))?;
+            let layers: u64 = sizes.as_chunks().0.iter().map(|size| u64::from(u32::from_le_bytes(*size))).sum();
+            at = start + 4 + sizes.len() as u64 + layers;
+            if at > table {
+                return Err(Refusal::new(format!("is damaged after {points} of its {} points", self.points)));
+            }
+            points += in_chunk;
+        }
+        if points < self.points {
+            return Err(Refusal::new(format!("claims {} points, but its chunks hold {points}", self.points)));
+        }
+        Ok(())
+    }
+}
+
+fn points(header: &Header, minor: u8) -> u64 {
+    // LAS 1.4, "Legacy Number of Point Records": where both are given and differ, the older field counts.
+    match u64::from(header.u32(107)) {
+        0 if minor == 4 => header.u64(247),
+        legacy => legacy,
+    }
+}
+
+fn point_format(byte: u8) -> Result<(u8, bool), Refusal> {
+    // LASzip marks a compressed file in the two highest bits.
+    let (format, compressed) = (byte & 0x3f, byte & COMPRESSED != 0);
+    if format > 10 || (!compressed && byte > 10) {
+        return Err(Refusal::new(format!("has the point format {byte}; 0 to 10 can be read")));
+    }
+    Ok((format, compressed))
+}
+
+/// LASzip's item types and bytes of a point format.
+fn laszip_items(format: u8, point_bytes: u16) -> Vec<(u16, u16)> {
+    let base: &[(u16, u16)] = match format {
+        0 => &[(6, 20)],
+        1 => &[(6, 20), (7, 8)],
+        2 => &[(6, 20), (8, 6)],
+        3 => &[(6, 20), (7, 8), (8, 6)],
+        4 => &[(6, 20), (7, 8), (9, 29)],
+        5 => &[(6, 20), (7, 8), (8, 6), (9, 29)],
+        6 => &[(10, 30)],
+        7 => &[(10, 30), (11, 6)],
+        8 => &[(10, 30), (12, 8)],
+        9 => &[(10, 30), (13, 29)],
+        _ => &[(10, 30), (12, 8), (13, 29)],
+    };
+    let extra = point_bytes - POINT_BYTES[usize::from(format)];
+    let kind = if format < 6 { 0 } else { 14 };
+    base.iter().copied().chain((extra > 0).then_some((kind, extra))).collect()
+}
+
+/// Number of layers of a chunk of points of format 6 to 10: nine of the point, one of colour, near infrared and wave
+/// packet each, one of every extra byte.
+fn laszip_layers(format: u8, point_bytes: u16) -> usize {
+    let extra = usize::from(point_bytes - POINT_BYTES[usize::from(format)]);
+    let others = match format {
+        7 | 9 => 1,
+        8 => 2,
+        10 => 3,
+        _ => 0,
+    };
+    9 + others + extra
+}
+
+fn u32_at(file: &mut (impl Read + Seek), at: u64) -> Result<u32, Refusal> {
+    let mut bytes = [0; 4];
+    read_at(file, at, &mut bytes)?;
+    Ok(u32::from_le_bytes(bytes))
+}
+
+fn u64_at(file: &mut (impl Read + Seek), at: u64) -> Result<u64, Refusal> {
+    let mut bytes = [0; 8];
+    read_at(file, at, &mut bytes)?;
+    Ok(u64::from_le_bytes(bytes))
+}
+
+fn read_at(file: &mut (impl Read + Seek), at: u64, bytes: &mut [u8]) -> Result<(), Refusal> {
+    file.seek(SeekFrom::Start(at)).and_then(|_| file.read_exact(bytes)).map_err(|e| unreadable(&e))
+}

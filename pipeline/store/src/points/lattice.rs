@@ -1,0 +1,58 @@
+//! Which cell a point falls in.
+
+use super::{MAX_CELLS, Survey};
+use crate::dem::Refusal;
+use sastrugi_numeric::Geometry;
+
+/// Whole numbers up to here are exact.
+const MAX_INDEX: f64 = 9_007_199_254_740_992.0;
+
+/// The cells over a cloud, from whole multiples of the cell size.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Lattice {
+    cell_m: f64,
+    /// Western, southern and northern border, in cells.
+    west: f64,
+    south: f64,
+    north: f64,
+    /// Shape.
+    pub rows: usize,
+    pub cols: usize,
+}
+
+impl Lattice {
+    /// The lattice over all points of a survey.
+    pub fn new(survey: &Survey, cell_m: f64) -> Result<Self, Refusal> {
+        let [west, south] = survey.low.map(|low| (low / cell_m).floor());
+        let east = (survey.high[0] / cell_m).floor() + 1.0;
+        let north = (survey.high[1] / cell_m).ceil().max(south + 1.0);
+        if ![west, south, east, north].iter().all(|border| border.abs() < MAX_INDEX) {
+            let (low, high) = (survey.low, survey.high);
+            return Err(Refusal::new(format!(
+                "its points lie from {low:?} to {high:?}, too far for cells of {cell_m} m"
+            )));
+        }
+        let (cols, rows) = (east - west, north - south);
+        // Both are whole and below 2^54: the product is not, but large enough where it matters.
+        if cols * rows > MAX_CELLS as f64 {
+            let size = [0, 1].map(|axis| survey.high[axis] - survey.low[axis]);
+            return Err(Refusal::new(format!(
+                "covers {} x {} m, which is {rows} x {cols} cells of {cell_m} m; at most {MAX_CELLS} cells can be held",
+                size[0], size[1]
+            )));
+        }
+        Ok(Self { cell_m, west, south, north, rows: rows as usize, cols: cols as usize })
+    }
+
+    /// Row and column of a point of the survey.
+    pub fn cell(&self, [x, y]: [f64; 2]) -> (usize, usize) {
+        let col = (x / self.cell_m).floor() - self.west;
+        let row = self.north - (y / self.cell_m).ceil();
+        ((row as usize).min(self.rows - 1), col as usize)
+    }
+
+    pub fn geometry(&self) -> Geometry {
+        let origin = [self.west * self.cell_m, self.south * self.cell_m];
+        Geometry { rows: self.rows, cols: self.cols, cell: [self.cell_m; 2], origin }
+    }
+}

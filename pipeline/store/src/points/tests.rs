@@ -1,0 +1,515 @@
+use super::*;
+use crate::dem::{Crs, ReadOptions, WriteOptions};
+use las::point::Classification;
+use las::{Builder, Color, Transform, Vector, Vlr, Writer};
+use proptest::prelude::*;
+use sastrugi_numeric::Geometry;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+fn data(name: &str) -> Option<PathBuf> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data").join(name);
+    if !path.exists() {
+        eprintln!("skipped: ../shared/data/{name} is absent");
+        return None;
+    }
+    Some(path)
+}
+
+/// x, y, z in millimetres, class, withheld.
+type Shot = ([i32; 3], u8, bool);
+
+fn ground(places: &[[i32; 3]]) -> Vec<Shot> {
+    places.iter().map(|place| (*place, 2, false)).collect()
+}
+
+fn header(format: u8, extra_bytes: u16) -> Builder {
+    let mut builder = Builder::from((1, 4));
+    builder.point_format = las::point::Format::new(format).unwrap();
+    builder.point_format.extra_bytes = extra_bytes;
+    let transform = Transform { scale: 0.001, offset: 0.0 };
+    builder.transforms = Vector { x: transform, y: transform, z: transform };
+    // The clock stays out of test files.
+    builder.date = None;
+    builder
+}
+
+/// A file in memory; compressed or not.
+fn file(shots: &[Shot], mut builder: Builder, compressed: bool) -> Vec<u8> {
+    builder.point_format.is_compressed = compressed;
+    let header = builder.into_header().unwrap();
+    let format = *header.point_format();
+    let mut writer = Writer::new(std::io::Cursor::new(vec![]), header).unwrap();
+    for (i, ([x, y, z], class, withheld)) in shots.iter().enumerate() {
+        let metres = |mm: &i32| f64::from(*mm) * 0.001;
+        writer
+            .write_point(las::Point {
+                x: metres(x),
+                y: metres(y),
+                z: metres(z),
+                classification: Classification::new(*class).unwrap(),
+                is_withheld: *withheld,
+                return_number: 1,
+                number_of_returns: 1,
+                gps_time: format.has_gps_time.then_some(i as f64),
+                color: format.has_color.then(|| Color::new(1, i as u16, 3)),
+                nir: format.has_nir.then_some(i as u16),
+                extra_bytes: vec![i as u8; usize::from(format.extra_bytes)],
+                ..las::Point::default()
+            })
+            .unwrap();
+    }
+    writer.into_inner().unwrap().into_inner()
+}
+
+fn plain(shots: &[Shot]) -> Vec<u8> {
+    file(shots, header(1, 0), false)
+}
+
+fn grid_bytes(bytes: &[u8], settings: &GridSettings) -> Result<Gridded, DemError> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("cloud.laz");
+    std::fs::write(&path, bytes).unwrap();
+    read(&path, settings)
+}
+
+fn of(cell_m: f64, statistic: Statistic) -> GridSettings {
+    GridSettings { cell_m: Some(cell_m), statistic, ..GridSettings::default() }
+}
+
+fn refusal(bytes: &[u8]) -> String {
+    let error = grid_bytes(bytes, &of(1.0, Statistic::Mean)).unwrap_err();
+    assert!(error.unusable_input(), "{error}");
+    error.to_string()
+}
+
+#[test]
+fn val_statistics_of_four_points() {
+    let shots = ground(&[[100, 100, 1000], [200, 900, 4000], [900, 100, 2000], [500, 500, 3000]]);
+    let bytes = plain(&shots);
+    let statistics = [
+        (Statistic::Mean, 2.5),
+        (Statistic::Median, 2.5),
+        (Statistic::Percentile(0.0), 1.0),
+        (Statistic::Percentile(25.0), 1.75),
+        (Statistic::Percentile(90.0), 3.7),
+        (Statistic::Percentile(100.0), 4.0),
+        (Statistic::Min, 1.0),
+        (Statistic::Max, 4.0),
+    ];
+    for (statistic, expected) in statistics {
+        let gridded = grid_bytes(&bytes, &of(1.0, statistic)).unwrap();
+        assert_eq!(gridded.counts.values, [4]);
+        assert!((gridded.dem.grid.values[0] - expected).abs() < 1e-12, "{statistic:?}");
+    }
+}
+
+/// Borders: a point on one belongs to the eastern or southern cell, one on the southern border of all to the last row.
+#[test]
+fn val_points_on_borders() {
+    let shots = ground(&[[0, 0, 1000], [1000, 1000, 2000], [2000, 2000, 3000], [500, 1500, 4000]]);
+    let gridded = grid_bytes(&plain(&shots), &of(1.0, Statistic::Mean)).unwrap();
+    let expected = Geometry { rows: 2, cols: 3, cell: [1.0; 2], origin: [0.0; 2] };
+    assert_eq!(gridded.dem.grid.geometry, expected);
+    assert_eq!(gridded.counts.values, [1, 0, 1, 1, 1, 0]);
+    assert_eq!(gridded.dem.grid.at(0, 2), 3.0);
+    let at = expected.cell_at(1.0, 1.0).unwrap();
+    assert_eq!((at, gridded.dem.grid.at(1, 1)), ((1, 1), 2.0));
+    assert!(gridded.dem.grid.at(0, 1).is_nan());
+}
+
+#[test]
+fn val_clouds_of_one_site_share_their_cells() {
+    let west =
+        grid_bytes(&plain(&ground(&[[-2300, 700, 1000], [400, 2100, 2000]])), &of(0.5, Statistic::Mean)).unwrap();
+    let east =
+        grid_bytes(&plain(&ground(&[[410, 2110, 3000], [9000, 9000, 1000]])), &of(0.5, Statistic::Mean)).unwrap();
+    let (west, east) = (west.dem.grid, east.dem.grid);
+    assert_eq!(west.geometry.origin, [-2.5, 0.5]);
+    for axis in 0..2 {
+        let cells = (east.geometry.origin[axis] - west.geometry.origin[axis]) / 0.5;
+        assert_eq!(cells, cells.round());
+    }
+}
+
+#[test]
+fn val_noise_and_other_classes_are_left_out() {
+    let shots = [
+        ([100, 100, 1000], 2, false),
+        ([100, 100, 9000], 7, false),
+        ([100, 100, 9000], 18, false),
+        ([100, 100, 9000], 2, true),
+        ([100, 100, 3000], 5, false),
+    ];
+    let mut settings = of(1.0, Statistic::Mean);
+    for format in [1, 6] {
+        // Five bits hold no class above 31; 18 exists as a number in both.
+        let bytes = file(&shots, header(format, 0), false);
+        settings.ground_only = false;
+        let all = grid_bytes(&bytes, &settings).unwrap();
+        assert_eq!((all.counts.values[0], all.dem.grid.values[0]), (2, 2.0));
+        assert!(all.dem.info.notes.iter().any(|note| note.starts_with("3 points that are withheld")));
+        settings.ground_only = true;
+        let bare = grid_bytes(&bytes, &settings).unwrap();
+        assert_eq!((bare.counts.values[0], bare.dem.grid.values[0]), (1, 1.0));
+        assert!(bare.dem.info.notes.iter().any(|note| note.starts_with("1 points of other classes")));
+    }
+    let error = grid_bytes(&plain(&shots[4..]), &settings).unwrap_err();
+    assert!(error.to_string().contains("class 2, ground"));
+    assert!(refusal(&plain(&shots[1..4])).contains("withheld or noise"));
+}
+
+/// Cells by a map, statistics of sorted lists.
+fn slow(shots: &[Shot], cell: f64, statistic: Statistic) -> BTreeMap<(i64, i64), (u32, f64)> {
+    let low = shots.iter().map(|([_, y, _], ..)| f64::from(*y) * 0.001).fold(f64::INFINITY, f64::min);
+    let mut cells: BTreeMap<(i64, i64), Vec<f64>> = BTreeMap::new();
+    for ([x, y, z], ..) in shots {
+        let [x, y, z] = [x, y, z].map(|v| f64::from(*v) * 0.001);
+        let south = ((y / cell).ceil() - 1.0).max((low / cell).floor());
+        cells.entry(((x / cell).floor() as i64, south as i64)).or_default().push(z);
+    }
+    let value = |heights: &mut Vec<f64>| {
+        heights.sort_by(f64::total_cmp);
+        let n = heights.len();
+        let percentile = |p: f64| {
+            let rank = (n - 1) as f64 * p / 100.0;
+            let (low, high) = (heights[rank.floor() as usize], heights[rank.ceil() as usize]);
+            low + (rank - rank.floor()) * (high - low)
+        };
+        let height = match statistic {
+            Statistic::Mean => heights.iter().sum::<f64>() / n as f64,
+            Statistic::Min => heights[0],
+            Statistic::Max => heights[n - 1],
+            Statistic::Median => percentile(50.0),
+            Statistic::Percentile(p) => percentile(p),
+        };
+        (n as u32, height)
+    };
+    cells.into_iter().map(|(cell, mut heights)| (cell, value(&mut heights))).collect()
+}
+
+fn shots() -> impl Strategy<Value = Vec<Shot>> {
+    let place = (-20_000i32..20_000, -20_000i32..20_000, -5000i32..5000);
+    prop::collection::vec(place.prop_map(|(x, y, z)| ([x, y, z], 2, false)), 1..300)
+}
+
+fn statistics() -> impl Strategy<Value = Statistic> {
+    prop_oneof![
+        Just(Statistic::Mean),
+        Just(Statistic::Median),
+        Just(Statistic::Min),
+        Just(Statistic::Max),
+        (0.0..=100.0).prop_map(Statistic::Percentile),
+    ]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(150))]
+
+    #[test]
+    fn prop_cells_are_those_of_the_slow_way(
+        shots in shots(),
+        statistic in statistics(),
+        cell in prop::sample::select(vec![0.1, 0.25, 0.7, 1.0, 3.0, 50.0]),
+        format in prop::sample::select(vec![0u8, 1, 2, 3, 6, 7, 8]),
+        extra in 0u16..6,
+        compressed in any::<bool>(),
+    ) {
+        let bytes = file(&shots, header(format, extra), compressed);
+        let gridded = grid_bytes(&bytes, &of(cell, statistic)).unwrap();
+        let grid = &gridded.dem.grid;
+        let expected = slow(&shots, cell, statistic);
+        prop_assert_eq!(grid.finite_count(), expected.len());
+        let g = grid.geometry;
+        let [west, south] = g.origin.map(|o| (o / cell).round() as i64);
+        for ((i, j), (n, height)) in expected {
+            let (row, col) = (g.rows - 1 - (j - south) as usize, (i - west) as usize);
+            prop_assert_eq!(gridded.counts.at(row, col), n);
+            prop_assert!((grid.at(row, col) - height).abs() < 1e-9);
+        }
+    }
+
+    /// The order of the points changes nothing.
+    #[test]
+    fn prop_order_does_not_matter(shots in shots(), statistic in statistics()) {
+        let settings = GridSettings { statistic, fill_cells: 2, ..GridSettings::default() };
+        let forward = grid_bytes(&plain(&shots), &settings).unwrap();
+        let backward = grid_bytes(&plain(&shots.iter().rev().copied().collect::<Vec<_>>()), &settings).unwrap();
+        let bits = |g: &Gridded| g.dem.grid.values.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
+        prop_assert_eq!(bits(&forward), bits(&backward));
+        prop_assert_eq!(forward.dem.info.notes, backward.dem.info.notes);
+    }
+}
+
+/// Enough points for chunks: LASzip starts a new one after 50 000.
+fn many() -> Vec<Shot> {
+    (0..120_000).map(|i: i32| ([i % 400 * 50, i / 400 * 50, i.wrapping_mul(7919) % 1000], 2, false)).collect()
+}
+
+#[test]
+fn val_compressed_chunks_hold_the_same_points() {
+    let shots = many();
+    for format in [1, 7] {
+        let settings = of(0.2, Statistic::Mean);
+        let plain = grid_bytes(&file(&shots, header(format, 2), false), &settings).unwrap();
+        let compressed = grid_bytes(&file(&shots, header(format, 2), true), &settings).unwrap();
+        assert_eq!(plain, compressed);
+        assert_eq!(plain.counts.values.iter().map(|n| u64::from(*n)).sum::<u64>(), 120_000);
+    }
+}
+
+/// Points at the corners of a lattice: the cell size is its side, and the note says so.
+#[test]
+fn val_a_cell_size_is_chosen() {
+    let gridded = grid_bytes(&plain(&many()), &GridSettings::default()).unwrap();
+    assert_eq!(gridded.dem.grid.geometry.cell, [0.05; 2]);
+    assert!(
+        gridded.dem.info.notes.iter().any(|note| note.contains("0.05 m was chosen")),
+        "{:?}",
+        gridded.dem.info.notes
+    );
+    for places in [vec![[5, 5, 5]], vec![[5, 5, 5], [5, 9005, 5]], vec![[0, 0, 0]; 9]] {
+        let few = grid_bytes(&plain(&ground(&places)), &GridSettings::default()).unwrap();
+        assert!(few.dem.info.notes.iter().any(|note| note.contains("was chosen")));
+    }
+}
+
+/// The cell sizes, shapes and cell means that an independent gridding of two measured clouds has; its gaps were filled by
+/// another rule, so filled cells are left out. Its raster holds single precision.
+#[test]
+fn val_measured_clouds_are_gridded_as_elsewhere() {
+    let table = [
+        ("Otira_1cm_grains_G3POINT.laz", "otira_grid_2cm.tif", 0.02, 48_878, 1e-6),
+        ("pozo_blanca.laz", "pozo_blanca_grid_50cm.tif", 0.5, 190_596, 2e-5),
+    ];
+    for (cloud, raster, cell, held, tolerance) in table {
+        let (Some(cloud), Some(raster)) = (data(cloud), data(raster)) else { continue };
+        let ours = read(&cloud, &GridSettings::default()).unwrap().dem;
+        let theirs = dem::read(&raster).unwrap();
+        let (g, other) = (ours.grid.geometry, theirs.grid.geometry);
+        assert_eq!((g.rows, g.cols, g.cell), (other.rows, other.cols, [cell; 2]));
+        assert!((0..2).all(|a| (g.origin[a] - other.origin[a]).abs() < 1e-9), "{:?} {:?}", g.origin, other.origin);
+        assert_eq!(ours.grid.finite_count(), held);
+        let worst = ours.grid.values.iter().zip(&theirs.grid.values).filter(|(a, _)| a.is_finite());
+        let worst = worst.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(worst <= tolerance, "{worst}");
+    }
+}
+
+/// Points per cell as laspy 2.7.0 (lazrs 0.8.2) and numpy 2.4.6 count them: hashes printed by
+/// `tests/interop/check_points.py`, which also compares the means.
+#[test]
+fn val_measured_clouds_have_the_counts_that_laspy_finds() {
+    let table = [
+        (
+            "Otira_1cm_grains_G3POINT.laz",
+            0.02,
+            "65f3fac0680ed4b23e280bba25669431431e5a3ac1b9a28bd127e7281f83b918",
+            None,
+        ),
+        ("pozo_blanca.laz", 0.5, "9ddaeadfe1e544d212085baa047a183083738c77f25fc39f73254fc1c6cdcc9f", Some(26911)),
+    ];
+    for (name, cell, sha256, epsg) in table {
+        let Some(path) = data(name) else { continue };
+        let gridded = read(&path, &of(cell, Statistic::Median)).unwrap();
+        let bytes: Vec<u8> = gridded.counts.values.iter().flat_map(|n| n.to_le_bytes()).collect();
+        assert_eq!(crate::digest::of_bytes(&bytes), sha256, "{name}");
+        assert_eq!(gridded.dem.info.crs.epsg, epsg);
+    }
+}
+
+#[test]
+fn val_clouds_are_read_like_rasters() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("cloud.las");
+    std::fs::write(&path, plain(&ground(&[[100, 100, 1000], [2100, 100, 3000]]))).unwrap();
+    let dem = dem::read_with(&path, &ReadOptions { cell_m: Some([1.0; 2]) }).unwrap();
+    assert_eq!((dem.grid.cols(), dem.info.format.name(), dem.info.dtype), (3, "las", "int32"));
+    let filling = GridSettings { fill_cells: 1, ..GridSettings::default() };
+    let filled = dem::read_gridded(&path, &ReadOptions { cell_m: Some([1.0; 2]) }, &filling).unwrap();
+    assert_eq!(filled.grid.values, [1.0, 2.0, 3.0]);
+    let oblong = dem::read_with(&path, &ReadOptions { cell_m: Some([1.0, 2.0]) }).unwrap_err();
+    assert!(oblong.to_string().contains("square") && !oblong.unusable_input());
+    let written = dem::write(&path, &dem.grid, &Crs::default(), &WriteOptions::default()).unwrap_err();
+    assert!(written.to_string().contains("not written"));
+    let copy = folder.path().join("copy.tif");
+    dem::write(&copy, &filled.grid, &filled.info.crs, &WriteOptions::default()).unwrap();
+    assert_eq!(dem::read(&copy).unwrap().grid, filled.grid);
+}
+
+#[test]
+fn val_settings_out_of_range_are_the_callers() {
+    let bytes = plain(&ground(&[[0, 0, 0], [9000, 9000, 0]]));
+    let wrong = [
+        of(0.0, Statistic::Mean),
+        of(f64::NAN, Statistic::Mean),
+        of(1.0, Statistic::Percentile(101.0)),
+        of(1.0, Statistic::Percentile(f64::NAN)),
+        GridSettings { fill_cells: 101, ..GridSettings::default() },
+    ];
+    for settings in wrong {
+        assert!(matches!(grid_bytes(&bytes, &settings), Err(DemError::Unfit { .. })), "{settings:?}");
+    }
+    let fine = grid_bytes(&bytes, &of(1e-4, Statistic::Mean)).unwrap_err().to_string();
+    assert!(fine.contains("at most 268435456 cells"), "{fine}");
+}
+
+fn with_record(record_id: u16, data: Vec<u8>, well_known_text: bool) -> Result<Gridded, DemError> {
+    let mut builder = header(6, 0);
+    builder.has_wkt_crs = well_known_text;
+    builder.vlrs.push(Vlr { user_id: "LASF_Projection".to_owned(), record_id, description: String::new(), data });
+    grid_bytes(&file(&ground(&[[0, 0, 0]]), builder, false), &of(1.0, Statistic::Mean))
+}
+
+fn keys(entries: &[[u16; 4]]) -> Vec<u8> {
+    let head = [1, 1, 0, entries.len() as u16];
+    head.iter().chain(entries.iter().flatten()).flat_map(|v| v.to_le_bytes()).collect()
+}
+
+const WKT1: &str = r#"COMPD_CS["NAD83 / UTM zone 11N + NAVD88 height (ftUS)",
+    PROJCS["NAD83 / UTM zone 11N", GEOGCS["NAD83", DATUM["North_American_Datum_1983",
+        SPHEROID["GRS 1980",6378137,298.257222101, AUTHORITY["EPSG","7019"]]], PRIMEM["Greenwich",0],
+        UNIT["degree",0.0174532925199433], AUTHORITY["EPSG","4269"]],
+        PROJECTION["Transverse_Mercator"], PARAMETER["central_meridian",-117], UNIT["metre",1, AUTHORITY["EPSG","9001"]],
+        AXIS["Easting",EAST], AUTHORITY["EPSG","26911"]],
+    VERT_CS["NAVD88 height (ftUS)", VERT_DATUM["North American Vertical Datum 1988",2005],
+        UNIT["US survey foot",0.304800609601219], AXIS["Up",UP], AUTHORITY["EPSG","6360"]]]"#;
+
+#[test]
+fn val_reference_systems_are_found() {
+    let found = |record, data, text| with_record(record, data, text).unwrap().dem.info;
+    let text = found(2112, WKT1.as_bytes().to_vec(), true);
+    assert_eq!(
+        (text.crs.epsg, text.crs.name.as_str(), text.crs.geographic),
+        (Some(26911), "NAD83 / UTM zone 11N", false)
+    );
+    assert!(text.notes.iter().any(|note| note.contains("heights are in the unit EPSG:9003")), "{:?}", text.notes);
+    let newer = r#"PROJCRS["WGS 84 / UTM zone 33N",BASEGEOGCRS["WGS 84",ID["EPSG",4326]],CONVERSION["UTM zone 33N",METHOD["Transverse Mercator"]],CS[Cartesian,2],AXIS["(E)",east,ORDER[1],LENGTHUNIT["metre",1]],ID["EPSG",32633]]"#;
+    assert_eq!(found(2112, newer.as_bytes().to_vec(), true).crs.epsg, Some(32633));
+    let feet = keys(&[[1024, 0, 1, 1], [3072, 0, 1, 2992], [3076, 0, 1, 9002]]);
+    let feet = found(34735, feet, false);
+    assert_eq!(feet.crs.epsg, Some(2992));
+    assert!(feet.notes.iter().any(|note| note.contains("EPSG:9002")));
+    let none = grid_bytes(&plain(&ground(&[[0, 0, 0]])), &of(1.0, Statistic::Mean)).unwrap().dem.info;
+    assert!(none.crs == Crs::default() && none.notes.iter().any(|note| note.contains("names no reference system")));
+}
+
+#[test]
+fn val_degrees_are_refused() {
+    let degrees = keys(&[[1024, 0, 1, 2], [2048, 0, 1, 4326]]);
+    let error = with_record(34735, degrees, false).unwrap_err().to_string();
+    assert!(error.contains("degrees of longitude and latitude (EPSG:4326)"), "{error}");
+    let text = br#"GEOGCS["WGS 84",DATUM["WGS_1984",SPHEROID["WGS 84",6378137,298.257223563]],PRIMEM["Greenwich",0]]"#;
+    assert!(with_record(2112, text.to_vec(), true).unwrap_err().to_string().contains("degrees"));
+}
+
+proptest! {
+    /// Damaged well-known text is no system or some system, never a panic.
+    #[test]
+    fn prop_damaged_text_never_panics(cut in 0..WKT1.len(), at in 0..WKT1.len(), with in "[\\[\\](),\"a\u{e9}]{0,3}") {
+        let mut text: String = WKT1.chars().take(cut.max(1)).collect();
+        let at = at.min(text.len());
+        text.insert_str(at, &with);
+        let _ = crs::of_text(&text);
+        let _ = crs::of_text(&"A[".repeat(cut));
+    }
+}
+
+fn patched(bytes: &[u8], at: usize, with: &[u8]) -> Vec<u8> {
+    let mut bytes = bytes.to_vec();
+    bytes[at..at + with.len()].copy_from_slice(with);
+    bytes
+}
+
+/// Headers that claim what the file cannot hold are refused before memory is asked for.
+#[test]
+fn val_impossible_claims_are_refused() {
+    let las = plain(&ground(&[[0, 0, 0], [5, 5, 5]]));
+    assert!(refusal(&patched(&las, 107, &u32::MAX.to_le_bytes())).contains("claims 4294967295 points"));
+    let long = patched(&patched(&las, 107, &[0; 4]), 247, &u64::MAX.to_le_bytes());
+    assert!(refusal(&long).contains("claims 18446744073709551615 points"));
+    assert!(refusal(&patched(&patched(&las, 107, &[0; 4]), 247, &[0; 8])).contains("holds no points"));
+    assert!(refusal(&las[..las.len() - 1]).contains("at most 1"));
+    assert!(refusal(&las[..100]).contains("bytes"));
+    assert!(refusal(&patched(&las, 131, &f64::NAN.to_le_bytes())).contains("scale"));
+    assert!(refusal(&patched(&las, 139, &0f64.to_le_bytes())).contains("scale"));
+    assert!(refusal(&patched(&las, 163, &f64::INFINITY.to_le_bytes())).contains("offset"));
+    assert!(refusal(&patched(&las, 131, &1e300f64.to_le_bytes())).contains("too far"));
+    assert!(refusal(&patched(&las, 25, &[9])).contains("LAS 1.9"));
+    assert!(refusal(&patched(&las, 104, &[11])).contains("point format 11"));
+    assert!(refusal(&patched(&las, 105, &[20, 0])).contains("20 bytes"));
+    assert!(refusal(&patched(&las, 100, &u32::MAX.to_le_bytes())).contains("4294967295 records"));
+    assert!(refusal(&patched(&las, 96, &u32::MAX.to_le_bytes())).contains("4294967295"));
+    let extended = patched(&patched(&las, 235, &300u64.to_le_bytes()), 243, &1u32.to_le_bytes());
+    assert!(refusal(&patched(&extended, 320, &(1u64 << 40).to_le_bytes())).contains("extended record"));
+    assert!(refusal(&patched(&extended, 235, &u64::MAX.to_le_bytes())).contains("extended records"));
+    assert!(refusal(b"ply\nformat").contains("LASF"));
+}
+
+#[test]
+fn val_impossible_claims_of_compressed_files_are_refused() {
+    for format in [1u8, 6] {
+        let laz = file(&many()[..1000], header(format, 0), true);
+        let start = u32::from_le_bytes(laz[96..100].try_into().unwrap()) as usize;
+        let table = u64::from_le_bytes(laz[start..start + 8].try_into().unwrap()) as usize;
+        assert!(refusal(&patched(&laz, table + 4, &u32::MAX.to_le_bytes())).contains("4294967295 chunks"));
+        assert!(refusal(&laz[..table]).contains("breaks off"));
+        assert!(refusal(&patched(&laz, 107, &u32::MAX.to_le_bytes())).contains("claims 4294967295 points"));
+        // A point or two may be left in the last bytes; many more are not.
+        let more = refusal(&patched(&patched(&laz, 107, &2000u32.to_le_bytes()), 247, &2000u64.to_le_bytes()));
+        assert!(more.contains(if format == 6 { "its chunks hold 1000" } else { "is damaged or breaks off" }), "{more}");
+        // The LASzip record: no fields, and another size of the first one.
+        let fields = 375 + 54 + 32;
+        assert!(refusal(&patched(&laz, fields, &[0, 0])).contains("LASzip record"));
+        assert!(refusal(&patched(&laz, fields + 4, &[255, 255])).contains("LASzip record"));
+        assert!(refusal(&patched(&laz, 375 + 2, b"nobody")).contains("lacks the LASzip record"));
+        if format == 6 {
+            let layer = start + 8 + 30 + 4;
+            assert!(refusal(&patched(&laz, layer, &u32::MAX.to_le_bytes())).contains("damaged after 0"));
+        }
+    }
+}
+
+/// One small file of each kind, to be damaged.
+fn samples() -> &'static [Vec<u8>] {
+    static SAMPLES: std::sync::OnceLock<Vec<Vec<u8>>> = std::sync::OnceLock::new();
+    SAMPLES.get_or_init(|| {
+        let shots = &many()[..500];
+        vec![
+            file(shots, header(1, 0), false),
+            file(shots, header(3, 2), true),
+            file(shots, header(6, 0), true),
+            file(shots, header(8, 3), true),
+        ]
+    })
+}
+
+#[test]
+fn prop_files_that_break_off_are_refused() {
+    for bytes in samples() {
+        for length in (0..bytes.len()).step_by(7) {
+            assert!(grid_bytes(&bytes[..length], &of(1.0, Statistic::Mean)).is_err(), "{length} of {}", bytes.len());
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(1000))]
+
+    #[test]
+    fn prop_damaged_files_never_panic(which in 0usize..4, at in any::<prop::sample::Index>(), bytes in prop::collection::vec(any::<u8>(), 1..6)) {
+        let file = &samples()[which];
+        let at = at.index(file.len());
+        let end = (at + bytes.len()).min(file.len());
+        let damaged = patched(file, at, &bytes[..end - at]);
+        let settings = GridSettings { fill_cells: 1, ..GridSettings::default() };
+        let _ = grid_bytes(&damaged, &settings);
+    }
+
+    #[test]
+    fn prop_damaged_headers_never_panic(which in 0usize..4, at in 0usize..600, bytes in prop::collection::vec(any::<u8>(), 1..9)) {
+        let file = &samples()[which];
+        let damaged = patched(file, at, &bytes);
+        let _ = grid_bytes(&damaged, &GridSettings::default());
+    }
+}
