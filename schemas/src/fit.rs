@@ -83,9 +83,13 @@ pub struct Intervals {
     pub level: f64,
     /// Number of replicates.
     pub replicates: u32,
-    /// Lower and upper end by the parameter's name.
+    /// True when `sigma_m` and `range_m` are by profile likelihood: it is open at an end, or replicates cannot tell the range
+    /// from the end of the search.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub from_profile: bool,
+    /// Lower and upper end by the parameter's name; `null` where the data knows no end.
     #[serde(flatten)]
-    pub values: BTreeMap<String, [f64; 2]>,
+    pub values: BTreeMap<String, [Option<f64>; 2]>,
 }
 
 /// A model that was tried.

@@ -94,7 +94,8 @@ pub fn fit(args: &Fit, common: &Common) -> Verdict {
     let (fit, read_notes) = verbs::fit::fit(&request)?;
     let interval = |name: &str| {
         let [low, high] = fit.intervals.as_ref()?.values.get(name)?;
-        Some(format!(" [{low:.6}, {high:.6}]"))
+        let end = |end: &Option<f64>| end.map_or_else(|| "open".to_owned(), |v| format!("{v:.6}"));
+        Some(format!(" [{}, {}]", end(low), end(high)))
     };
     let parameters: Vec<String> = fit
         .parameters

@@ -67,6 +67,14 @@ impl Estimate {
     }
 }
 
+/// A fit with one coordinate held.
+pub struct Held {
+    /// Rise of the sum of squares above the estimate's.
+    pub rise: f64,
+    /// Search coordinates.
+    pub at: Vec<f64>,
+}
+
 /// The estimator on one set of bins.
 pub struct Estimator<'a> {
     pub case: &'a Case<'a>,
@@ -172,8 +180,8 @@ impl<'a> Estimator<'a> {
         })
     }
 
-    /// How much the sum of squares rises when the coordinate is held at `value` and the others are fitted again.
-    pub fn rise(&self, estimate: &Estimate, coordinate: usize, value: f64) -> Option<f64> {
+    /// The fit with one coordinate held at `value` and the others fitted again; `None` without a likelihood.
+    pub fn held(&self, estimate: &Estimate, coordinate: usize, value: f64) -> Option<Held> {
         let likelihood = estimate.likelihood.as_ref()?;
         let bounds = self.case.coordinates(&estimate.form).bounds();
         let (low, high) = bounds[coordinate];
@@ -183,22 +191,18 @@ impl<'a> Estimator<'a> {
             all.insert(coordinate, held);
             all
         };
-        let without =
-            |all: &[(f64, f64)]| all.iter().enumerate().filter(|(k, _)| *k != coordinate).map(|(_, v)| *v).collect();
-        let open: Vec<(f64, f64)> = without(&bounds);
-        let pairs: Vec<(f64, f64)> = estimate.at.iter().map(|&v| (v, v)).collect();
-        let mut start: Vec<f64> = without(&pairs).iter().map(|p: &(f64, f64)| p.0).collect();
-        if let (Some(Role::Range(0)), Some(Role::Sigma(0))) = (
-            estimate.form.parameters().get(coordinate).map(|p| p.role),
-            estimate.form.parameters().first().map(|p| p.role),
-        ) {
+        let mut open = bounds.clone();
+        open.remove(coordinate);
+        let mut start = estimate.at.clone();
+        start.remove(coordinate);
+        if [estimate.coordinate(Role::Range(0)), estimate.coordinate(Role::Sigma(0))] == [Some(coordinate), Some(0)] {
             // sigma^2 / b is what the data tells best.
             start[0] += 0.5 * (held - estimate.at[coordinate]);
         }
         let end = minimise(&start, &open, |others| {
             self.misfit(&estimate.form, &whole(others), Some(&likelihood.weights), &self.bins.covariance_m2)
         });
-        Some((end.value - likelihood.chi2).max(0.0))
+        Some(Held { rise: (end.value - likelihood.chi2).max(0.0), at: whole(&end.at) })
     }
 }
 

@@ -25,11 +25,12 @@ mod estimator;
 mod expectation;
 mod least_squares;
 mod params;
+mod profile;
 mod report;
 mod resampling;
 mod residual;
 mod search;
-mod simulate;
+pub(crate) mod simulate;
 mod verdicts;
 
 pub use error::FitError;
@@ -98,10 +99,13 @@ fn corrected(dem: &Grid, case: &Case, naive: &Estimate, streams: &Streams) -> Re
     let others = verdicts::other_windows(&examined(dem), settings, estimate);
     let rough = Estimator::rough(case, &by_direction);
     let findings = Findings {
-        intervals: replicates.as_ref().and_then(|r| resampling::intervals(&estimator, estimate, &r.at)),
+        intervals: replicates
+            .as_ref()
+            .and_then(|r| resampling::intervals(&estimator, estimate, &r.at))
+            .map(|i| resampling::with_profile(i, &estimator, estimate)),
         block_intervals: resampling::intervals(&estimator, estimate, &resampled),
         candidates: verdicts::candidates(&estimates),
-        profile: verdicts::profile(&estimator, estimate),
+        profile: profile::profile(&estimator, estimate),
         disagreement: verdicts::window_disagreement(estimate, &others),
         others: others.iter().map(verdicts::window_entry).collect(),
         isotropy: verdicts::isotropy(&rough, estimate),

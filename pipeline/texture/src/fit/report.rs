@@ -3,8 +3,10 @@
 use super::Mode;
 use super::case::Case;
 use super::estimator::{Estimate, Estimator, difference, on_surface};
-use super::resampling::sill_over_range;
+use super::profile::LIKELIHOOD_RISE;
+use super::resampling::{SILL_OVER_RANGE, sill_over_range};
 use super::verdicts::{Isotropy, Stationarity, no_scale_separation};
+use crate::covariance::form::Role;
 use crate::covariance::{Covariance, Form};
 use sastrugi_schemas::fit::{Candidate, DirectionBin, FitFile, GsTools, Intervals, Profile, Trim};
 use serde_json::{Value, json};
@@ -13,8 +15,6 @@ use std::f64::consts::FRAC_PI_2;
 
 /// Naive range over window above which the true range cannot be told (its ceiling for a pure exponential is 0.135).
 const NAIVE_RANGE_MAX: f64 = 0.12;
-/// Rise of twice the log-likelihood that rules a parameter out at 95 % (chi-squared, one degree of freedom).
-const LIKELIHOOD_RISE: f64 = 3.84;
 /// Misfit over variance above which the model is called wrong whatever the p-value.
 const MISFIT_MAX: f64 = 0.05;
 /// Share of measured cells taken for outliers above which the site is called cluttered.
@@ -163,7 +163,7 @@ impl Figures {
             ("trimmed_share", json!(self.share(trimmed.detrended - trimmed.kept))),
         ];
         let known = [
-            ("sigma2_over_range_m", sill_over_range(&estimate.covariance)),
+            (SILL_OVER_RANGE, sill_over_range(&estimate.covariance)),
             ("misfit_chi2_per_freedom", self.misfit_ratio),
             ("misfit_p", findings.misfit_p),
             ("normality_p", findings.normality_p),
@@ -199,7 +199,7 @@ impl Figures {
         let all = [
             paper,
             self.range_warning(case, naive, estimate),
-            self.flat_warning(estimate, findings),
+            self.flat_warning(case, estimate, findings),
             self.misfit_warning(case, estimate, findings),
             separation_warning(findings),
             isotropy_warning(estimate, findings),
@@ -223,8 +223,13 @@ impl Figures {
         })
     }
 
-    fn flat_warning(&self, estimate: &Estimate, findings: &Findings) -> Option<String> {
+    fn flat_warning(&self, case: &Case, estimate: &Estimate, findings: &Findings) -> Option<String> {
         let b = estimate.covariance.structures[0].range_m;
+        let coordinate = estimate.coordinate(Role::Range(0))?;
+        let (_, end) = case.coordinates(&estimate.form).bounds()[coordinate];
+        if estimate.at[coordinate] > end - 1e-3 {
+            return Some(format!("b = {b:.3} m is where the search ends: all that the data tells is that b is long"));
+        }
         let flat = self.rise_at_3b(findings)? < LIKELIHOOD_RISE;
         flat.then(|| format!("the likelihood is flat: b = {b:.3} m cannot be told from {:.3} m", 3.0 * b))
     }

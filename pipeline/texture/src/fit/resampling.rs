@@ -9,20 +9,26 @@
 //! estimate, q the quantiles of the replicates (Davison and Hinkley, 1997, section 5.2), which hold whatever the size of
 //! the bias.
 //!
+//! A range whose profile likelihood (`profile.rs`) is open at an end, or that replicates cannot tell from the end of the search, has its
+//! interval from the profile: replicates of a surface whose range nobody can tell say little.
+//!
 //! Rasters of more than [`CELLS_MAX`] cells are examined on a part of that size, and the deviations scaled by the square root
 //! of the share of residuals in it.
 
 use super::case::Case;
 use super::estimator::{Estimate, Estimator};
+use super::profile;
 use super::residual::Detrended;
 use super::simulate::Simulator;
 use crate::covariance::form::Role;
-use crate::covariance::{LagBins, masked_covariance};
+use crate::covariance::{Covariance, LagBins, masked_covariance};
 use rayon::prelude::*;
 use sastrugi_numeric::{Stream, Streams, sums};
 use sastrugi_schemas::fit::Intervals;
 use std::collections::BTreeMap;
 
+/// Name of `sigma^2 / b` among intervals and diagnostics.
+pub const SILL_OVER_RANGE: &str = "sigma2_over_range_m";
 /// Level of every interval.
 pub const LEVEL: f64 = 0.95;
 /// Most cells of a replicate.
@@ -186,7 +192,8 @@ pub fn block_replicates(
         .collect()
 }
 
-/// Basic intervals of the form's parameters from replicates; `None` without any.
+/// Intervals of the form's parameters from replicates; `None` without any. Where more than 2.5 % of the replicates end at a
+/// bound of the search, or the estimate does, their quantiles are those of the bound: such a parameter has no interval.
 pub fn intervals(estimator: &Estimator, estimate: &Estimate, replicates: &[Vec<f64>]) -> Option<Intervals> {
     if replicates.is_empty() {
         return None;
@@ -194,27 +201,67 @@ pub fn intervals(estimator: &Estimator, estimate: &Estimate, replicates: &[Vec<f
     let coordinates = estimator.case.coordinates(&estimate.form);
     let covariances: Vec<_> = replicates.iter().map(|at| coordinates.decode(at)).collect();
     let mut values = BTreeMap::new();
-    for parameter in estimate.form.parameters() {
+    for (k, parameter) in estimate.form.parameters().into_iter().enumerate() {
         let own = parameter.of(&estimate.covariance);
         let all: Vec<f64> = covariances.iter().map(|c| parameter.of(c)).collect();
-        values.insert(parameter.name.clone(), interval(parameter.role, own, &all));
+        let ends =
+            if at_bound(estimator, estimate, replicates, k) { [None; 2] } else { interval(parameter.role, own, &all) };
+        values.insert(parameter.name.clone(), ends);
+    }
+    // Where the range is unknown, so is the sigma that goes with it.
+    if let (Some([None, None]), true) = (values.get("range_m"), values.contains_key("sigma_m")) {
+        values.insert("sigma_m".to_owned(), [None; 2]);
     }
     if let Some(own) = sill_over_range(&estimate.covariance) {
         let all: Vec<f64> = covariances.iter().filter_map(sill_over_range).collect();
-        values.insert("sigma2_over_range_m".to_owned(), interval(Role::Sigma(0), own, &all));
+        values.insert(SILL_OVER_RANGE.to_owned(), interval(Role::Sigma(0), own, &all));
     }
-    Some(Intervals { level: LEVEL, replicates: replicates.len() as u32, values })
+    Some(Intervals { level: LEVEL, replicates: replicates.len() as u32, from_profile: false, values })
+}
+
+/// Intervals with what the profile likelihood says of sigma and b where it is open at an end, or where replicates say
+/// nothing.
+pub fn with_profile(mut intervals: Intervals, estimator: &Estimator, estimate: &Estimate) -> Intervals {
+    if estimate.covariance.structures.len() > 1 {
+        return intervals;
+    }
+    let Some(ends) = profile::ends(estimator, estimate) else { return intervals };
+    let unknown = intervals.values.get("range_m") == Some(&[None, None]);
+    if !unknown && ends.iter().all(Option::is_some) {
+        return intervals;
+    }
+    let covariances = ends.map(|end| Some(estimator.case.coordinates(&estimate.form).decode(&end?.at)));
+    for (name, of) in [("sigma_m", Covariance::sigma_m as fn(&Covariance) -> f64), ("range_m", Covariance::range_m)] {
+        intervals.values.insert(name.to_owned(), covariances.each_ref().map(|c| c.as_ref().map(of)));
+    }
+    intervals.from_profile = true;
+    intervals
+}
+
+/// True when the estimate or too many replicates lie at an end of what was searched in a coordinate that has ends of its own.
+fn at_bound(estimator: &Estimator, estimate: &Estimate, replicates: &[Vec<f64>], coordinate: usize) -> bool {
+    /// Distance from a bound that is none.
+    const NEAR: f64 = 1e-3;
+    let role = estimate.form.parameters()[coordinate].role;
+    // A nugget of nothing and a round surface are results.
+    if matches!(role, Role::Nugget | Role::Ratio | Role::Azimuth) {
+        return false;
+    }
+    let (low, high) = estimator.case.coordinates(&estimate.form).bounds()[coordinate];
+    let near = |at: &Vec<f64>| at[coordinate] < low + NEAR || at[coordinate] > high - NEAR;
+    let share = replicates.iter().filter(|at| near(at)).count() as f64 / replicates.len() as f64;
+    near(&estimate.at) || share > 0.5 * (1.0 - LEVEL)
 }
 
 /// `sigma^2 / b` of a covariance of one term with a range, m.
-pub fn sill_over_range(covariance: &crate::covariance::Covariance) -> Option<f64> {
+pub fn sill_over_range(covariance: &Covariance) -> Option<f64> {
     let [term] = covariance.structures.as_slice() else { return None };
     term.model.scale_names().1.map(|_| term.sigma_m * term.sigma_m / term.range_m)
 }
 
 /// The interval of one parameter.
-fn interval(role: Role, own: f64, all: &[f64]) -> [f64; 2] {
-    match role {
+fn interval(role: Role, own: f64, all: &[f64]) -> [Option<f64>; 2] {
+    let ends = match role {
         // A logarithm reaches neither zero nor below.
         Role::Sigma(_) | Role::Range(_) | Role::Shape(_) => {
             let logs: Vec<f64> = all.iter().map(|&v| libm::log(v)).collect();
@@ -222,12 +269,14 @@ fn interval(role: Role, own: f64, all: &[f64]) -> [f64; 2] {
         }
         // A ratio of 1 is an end of its range, and random surfaces never reach it: no more than quantiles.
         Role::Ratio => quantiles(all).map(|q| q.min(1.0)),
-        Role::Nugget => basic(own, all).map(|v| v.max(0.0)),
+        // Nor is a nugget below nothing.
+        Role::Nugget => quantiles(all),
         Role::Azimuth => {
             let turned: Vec<f64> = all.iter().map(|v| own + nearest_turn(v - own)).collect();
             basic(own, &turned)
         }
-    }
+    };
+    ends.map(Some)
 }
 
 /// The difference of two azimuths of axes, in [-90, 90).

@@ -1,11 +1,12 @@
 //! Measured surfaces with a given covariance, for Monte Carlo work: normal fields cut from a torus at least twice as wide, so
 //! that neither the torus nor fixed amplitudes make them more alike than surfaces are.
 //!
-//! A self-affine surface is replaced by a Matern one of a range of `outer_m`, made from its spectral density.
+//! A covariance that reaches across the torus is made from its spectral density, which no torus cuts (exponential and
+//! Matern); a self-affine surface is replaced by a Matern one of a range of `outer_m` and made in the same way.
 
-use crate::covariance::Covariance;
 use crate::covariance::filtered::{Measurement, blur, torus_covariance};
 use crate::covariance::models::matern;
+use crate::covariance::{Covariance, Structure};
 use crate::synth::fft_ma::{Phase, random_spectrum};
 use rayon::prelude::*;
 use sastrugi_numeric::Streams;
@@ -33,9 +34,11 @@ impl Simulator {
     ) -> Self {
         let torus = [rows, cols].map(|n| smooth_length(2 * n));
         let fft = RealFft2::new(torus[0], torus[1]);
-        let mut spectrum = match covariance.is_stationary() {
-            true => fft.forward(&torus_covariance(torus, cell_m, covariance)),
-            false => power_law(&covariance.stationary(outer_m), torus, cell_m),
+        let mut spectrum = match smoothnesses(covariance) {
+            Some(nu) if reaches_across(covariance, torus, cell_m) => {
+                from_density(&covariance.stationary(outer_m), &nu, torus, cell_m)
+            }
+            _ => fft.forward(&torus_covariance(torus, cell_m, covariance)),
         };
         if measurement.inner_scale_m > 0.0 {
             blur(&mut spectrum, cell_m, measurement.inner_scale_m);
@@ -55,9 +58,32 @@ impl Simulator {
     }
 }
 
-/// Eigenvalues of a Matern covariance of any range, in the order of a half spectrum.
-fn power_law(covariance: &Covariance, [rows, cols]: [usize; 2], cell_m: [f64; 2]) -> HalfSpectrum {
-    let term = &covariance.structures[0];
+/// A torus this many ranges wide holds a covariance with a kink at lag zero.
+const TORUS_RANGES: f64 = 16.0;
+
+/// True when a covariance has not died away half way round the torus.
+fn reaches_across(covariance: &Covariance, [rows, cols]: [usize; 2], cell_m: [f64; 2]) -> bool {
+    let side_m = (rows as f64 * cell_m[1]).min(cols as f64 * cell_m[0]);
+    !covariance.is_stationary() || TORUS_RANGES * covariance.range_m() > side_m
+}
+
+/// Smoothness of each term as a Matern one; `None` where a term is none.
+fn smoothnesses(covariance: &Covariance) -> Option<Vec<f64>> {
+    let of = |term: &Structure| match term.model.kind().kind {
+        "exponential" => Some(0.5),
+        "matern" | "self_affine" => Some(term.shape),
+        _ => None,
+    };
+    covariance.structures.iter().map(of).collect()
+}
+
+/// Eigenvalues of a sum of Matern covariances of any range, in the order of a half spectrum.
+fn from_density(
+    covariance: &Covariance,
+    smoothness: &[f64],
+    [rows, cols]: [usize; 2],
+    cell_m: [f64; 2],
+) -> HalfSpectrum {
     let wave = |k: usize, n: usize, cell: f64| {
         let k = if 2 * k > n { k as f64 - n as f64 } else { k as f64 };
         2.0 * PI * k / (n as f64 * cell)
@@ -69,9 +95,10 @@ fn power_law(covariance: &Covariance, [rows, cols]: [usize; 2], cell_m: [f64; 2]
         // Across the long axis distances are stretched by 1 / ratio, wavenumbers shrunk.
         let stretched = [x * sin + y * cos, (x * cos - y * sin) * across];
         let wave = if covariance.is_isotropic() { [x, y] } else { stretched };
-        let value = matern::eigenvalue(wave, term.range_m, term.shape, cell_m);
-        let nugget = covariance.nugget_m2;
-        Complex64::new(term.sigma_m * term.sigma_m * across * value + nugget, 0.0)
+        let terms = covariance.structures.iter().zip(smoothness).map(|(term, &nu)| {
+            term.sigma_m * term.sigma_m * across * matern::eigenvalue(wave, term.range_m, nu, cell_m)
+        });
+        Complex64::new(terms.sum::<f64>() + covariance.nugget_m2, 0.0)
     };
     let values = (0..rows * (cols / 2 + 1)).into_par_iter().map(value).collect();
     HalfSpectrum { rows, cols, values }

@@ -7,24 +7,13 @@ use super::resampling::{Block, Replicates, two_sided_p, upper_p};
 use crate::covariance::bins::Layout;
 use crate::covariance::form::Role;
 use sastrugi_numeric::{Grid, sums};
-use sastrugi_schemas::fit::{Candidate, Profile};
+use sastrugi_schemas::fit::Candidate;
 use sastrugi_statistics::normal;
 use serde_json::{Value, json};
 
-/// Ranges of the profile, as shares of the estimate.
-const PROFILE: [f64; 13] = [0.25, 0.35, 0.5, 0.6, 0.7, 0.85, 1.0, 1.2, 1.4, 1.7, 2.0, 3.0, 4.0];
 /// Standard errors that two windows may differ by. Both see the same surface, so that their difference scatters less than
 /// this test takes it to.
 const WINDOWS_Z: f64 = 2.58;
-
-/// How the generalised sum of squares rises away from the fitted range.
-pub fn profile(estimator: &Estimator, estimate: &Estimate) -> Option<Profile> {
-    let coordinate = estimate.coordinate(Role::Range(0))?;
-    let rise = |share: f64| estimator.rise(estimate, coordinate, estimate.at[coordinate] + libm::log(share));
-    let rises = PROFILE.into_iter().map(rise).collect::<Option<Vec<f64>>>()?;
-    let range_m = PROFILE.iter().map(|s| s * estimate.covariance.structures[0].range_m).collect();
-    Some(Profile { range_m, chi2_rise: rises })
-}
 
 /// The fit at another outer scale.
 pub struct AtWindow {

@@ -1,0 +1,55 @@
+//! Profile likelihood of the range: the generalised sum of squares with the range held, everything else fitted again.
+//!
+//! A range is inside the 95 % interval while its sum of squares lies within 3.84 of the least (chi-squared, one degree of
+//! freedom: Wilks, 1938), times the misfit per degree of freedom where that is above 1. The interval is open where the sum
+//! never rises that far: then the data does not know an end.
+
+use super::estimator::{Estimate, Estimator, Held};
+use crate::covariance::form::Role;
+use sastrugi_schemas::fit::Profile;
+
+/// Rise of twice the log-likelihood that rules a parameter out at 95 %.
+pub const LIKELIHOOD_RISE: f64 = 3.84;
+/// Ranges of the profile, as shares of the estimate.
+const SHARES: [f64; 13] = [0.25, 0.35, 0.5, 0.6, 0.7, 0.85, 1.0, 1.2, 1.4, 1.7, 2.0, 3.0, 4.0];
+/// Halvings of a bracket of a factor of two: the end is good to 1 %.
+const HALVINGS: usize = 6;
+
+/// How the generalised sum of squares rises away from the fitted range.
+pub fn profile(estimator: &Estimator, estimate: &Estimate) -> Option<Profile> {
+    let coordinate = estimate.coordinate(Role::Range(0))?;
+    let rise = |share: f64| {
+        estimator.held(estimate, coordinate, estimate.at[coordinate] + libm::log(share)).map(|held| held.rise)
+    };
+    let rises = SHARES.into_iter().map(rise).collect::<Option<Vec<f64>>>()?;
+    let range_m = SHARES.iter().map(|s| s * estimate.covariance.structures[0].range_m).collect();
+    Some(Profile { range_m, chi2_rise: rises })
+}
+
+/// The fits at both ends of the interval of the range, each `None` where it is open; `None` without a likelihood.
+pub fn ends(estimator: &Estimator, estimate: &Estimate) -> Option<[Option<Held>; 2]> {
+    let coordinate = estimate.coordinate(Role::Range(0))?;
+    let limit = LIKELIHOOD_RISE * estimate.misfit_ratio()?.max(1.0);
+    let (low, high) = estimator.case.coordinates(&estimate.form).bounds()[coordinate];
+    let find = |bound: f64, step: f64| {
+        end(&|at| estimator.held(estimate, coordinate, at), estimate.at[coordinate], bound, step, limit)
+    };
+    Some([find(low, -std::f64::consts::LN_2), find(high, std::f64::consts::LN_2)])
+}
+
+/// Where the rise from `start` passes `limit`, in steps towards `bound`; the last fit inside.
+fn end(held: &dyn Fn(f64) -> Option<Held>, start: f64, bound: f64, step: f64, limit: f64) -> Option<Held> {
+    let (mut inside, mut outside) = (start, start);
+    while outside != bound {
+        outside = if step < 0.0 { (outside + step).max(bound) } else { (outside + step).min(bound) };
+        if held(outside)?.rise > limit {
+            for _ in 0..HALVINGS {
+                let middle = 0.5 * (inside + outside);
+                if held(middle)?.rise > limit { outside = middle } else { inside = middle }
+            }
+            return held(inside);
+        }
+        inside = outside;
+    }
+    None
+}
