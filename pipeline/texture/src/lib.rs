@@ -11,15 +11,17 @@
 //! deviation and range of the texture in m; covariance in m2, not semivariance; M, cells along a side of the torus on
 //! which covariances are filtered or fields are made.
 
+mod bitmap;
 pub mod covariance;
 pub mod detrend;
 pub mod fit;
 mod onto;
 pub mod outliers;
 pub mod registry;
+mod sizes;
 pub mod synth;
 
-pub use fit::{FitError, FitOutcome, FitParameters, FitSettings, fit};
+pub use fit::{FitError, FitOutcome, FitParameters, FitSettings, Heights, Profiles, fit};
 pub use onto::{OntoError, onto};
 pub use registry::{kinds, prepare};
 pub use synth::{Synthesis, SynthesisError, TextureOutcome};

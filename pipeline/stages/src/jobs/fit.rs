@@ -110,19 +110,20 @@ impl Job for FitJob {
     fn run(&self, work: &Work<'_>) -> Result<Outcome, JobError> {
         let read = dem::read(&work.parent(&self.dem, HEIGHTS)?).map_err(|e| input_error(&e))?;
         let outcome = sastrugi_texture::fit(&read.grid, &self.settings, &self.streams).map_err(JobError::new)?;
+        let [background, residual] = outcome.rasters(&read.grid).map_err(JobError::new)?;
         let fit = FitFile { source: Some(self.source.clone()), ..outcome.fit };
         atomic::write(&work.output(FIT), to_json(&fit)?.as_bytes()).map_err(JobError::new)?;
         let id = &self.id;
         let mut products = vec![Product::released(FIT, format!("fit/{id}.json"), None)];
-        for (file, grid) in [(BACKGROUND, &outcome.background), (RESIDUAL, &outcome.residual)] {
+        for (file, grid) in [(BACKGROUND, &background), (RESIDUAL, &residual)] {
             dem::write(&work.output(file), grid, &read.info.crs, &Default::default()).map_err(JobError::new)?;
             products.push(Product::released(file, format!("fit/{id}.{file}"), Some(digest::heights(grid))));
         }
         let rows = Rows {
             fits: vec![fit_row(id, &self.dem_id, &fit)],
             covariance: covariance_rows(id, &fit),
-            psd: psd_rows(id, &power_spectrum(&outcome.residual)),
-            height_distribution: height_rows(id, &histogram(&outcome.residual, HISTOGRAM_BINS)),
+            psd: psd_rows(id, &power_spectrum(&residual)),
+            height_distribution: height_rows(id, &histogram(&residual, HISTOGRAM_BINS)),
             ..Rows::default()
         };
         Ok(Outcome { products, rows, notes: fit.warnings })

@@ -61,7 +61,9 @@ impl DetrendFilter {
     /// The filter for lags up to `max_lag` cells.
     pub fn new(window: BoxWindow, cell_m: [f64; 2], max_lag: [usize; 2], measurement: Measurement) -> Self {
         let width = window.cells();
-        let shape = [0, 1].map(|k| smooth_length(2 * (max_lag[k] + width[k].max(max_lag[k]))));
+        // Profiles have one row, and lags along it only.
+        let side = |k: usize| smooth_length(2 * (max_lag[k] + width[k].max(max_lag[k])));
+        let shape = [0, 1].map(|k| if width[k] == 1 && max_lag[k] == 0 { 1 } else { side(k) });
         let fft = RealFft2::new(shape[0], shape[1]);
         let response = fft.forward(&complete_window(window, shape)).values.iter().map(|s| s.norm_sqr()).collect();
         Self { shape, cell_m, measurement, fft, response }

@@ -53,18 +53,44 @@ impl MaskedCovariance {
 pub fn masked_covariance(values: &[f64], cols: usize, max_lag: [usize; 2]) -> MaskedCovariance {
     let rows = values.len().checked_div(cols).unwrap_or(0);
     let max_lag = [max_lag[0].min(rows.saturating_sub(1)), max_lag[1].min(cols.saturating_sub(1))];
-    let step = STRIP_ROWS.max(4 * max_lag[0]);
-    let mut total = StripSums::new(step.min(rows) + max_lag[0], cols, max_lag);
-    let mut shared = StripSums::new(max_lag[0], cols, max_lag);
+    let step = STRIP_ROWS.max(4 * max_lag[0]).min(rows.max(1));
+    let mut sums = PairSums::new(step, cols, max_lag);
     for first in (0..rows).step_by(step) {
-        let next = first + step;
-        total.add(&values[first * cols..(next + max_lag[0]).min(rows) * cols]);
-        if next < rows {
-            shared.add(&values[next * cols..(next + max_lag[0]).min(rows) * cols]);
+        sums.add(&values[first * cols..(first + step + max_lag[0]).min(rows) * cols]);
+    }
+    sums.finish()
+}
+
+/// Pair sums of a raster that comes in strips.
+pub struct PairSums {
+    step: usize,
+    total: StripSums,
+    shared: StripSums,
+}
+
+impl PairSums {
+    /// Sums for strips of `step` rows of `cols` cells; lags smaller than the raster.
+    pub fn new(step: usize, cols: usize, max_lag: [usize; 2]) -> Self {
+        let total = StripSums::new(step + max_lag[0], cols, max_lag);
+        let shared = StripSums::new(max_lag[0], cols, max_lag);
+        Self { step, total, shared }
+    }
+
+    /// Adds the next strip: its rows, and as many of those below as the largest lag, where there are any.
+    pub fn add(&mut self, strip: &[f64]) {
+        self.total.add(strip);
+        if let Some(below) = strip.get(self.step * self.total.cols..).filter(|below| !below.is_empty()) {
+            self.shared.add(below);
         }
     }
-    let (sums, pairs) = total.finish().zip(shared.finish()).map(|((s, n), (s2, n2))| (s - s2, n - n2)).unzip();
-    MaskedCovariance { max_lag, sums, pairs }
+
+    /// The sums of all strips.
+    pub fn finish(self) -> MaskedCovariance {
+        let max_lag = self.total.max_lag;
+        let once = self.total.finish().zip(self.shared.finish());
+        let (sums, pairs) = once.map(|((s, n), (s2, n2))| (s - s2, n - n2)).unzip();
+        MaskedCovariance { max_lag, sums, pairs }
+    }
 }
 
 /// Power spectra of data and mask, added up over strips of one padded shape.

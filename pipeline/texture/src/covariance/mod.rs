@@ -5,7 +5,7 @@ pub mod filtered;
 pub mod form;
 pub mod masked;
 pub mod models;
-pub mod partial;
+pub(crate) mod partial;
 pub mod trimmed;
 
 use sastrugi_schemas::ParameterError;
@@ -14,7 +14,7 @@ use std::collections::BTreeMap;
 
 pub use bins::LagBins;
 pub use form::{Form, Parameter};
-pub use masked::{MaskedCovariance, masked_covariance};
+pub use masked::{MaskedCovariance, PairSums, masked_covariance};
 pub use models::{MODELS, Model, model};
 
 /// One term of a covariance.

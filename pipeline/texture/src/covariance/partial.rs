@@ -10,8 +10,10 @@
 
 use super::bins::{LagBins, Member};
 use super::filtered::LagField;
+use crate::bitmap::Bitmap;
 use crate::detrend::BoxWindow;
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Pairs with a partial window that are averaged over in each bin (about): the correction is good to 1e-4 of the variance.
 pub const PAIRS_FINE: f64 = 2048.0;
@@ -24,20 +26,27 @@ const FINE_BLOCKS: usize = 8;
 /// Blocks along a window for its covariance with another window, which is smoother.
 const COARSE_BLOCKS: usize = 4;
 
+/// Most cells counted at once, besides those within reach.
+const STRIP_CELLS: usize = 1 << 22;
+
 /// The raster's cells as the detrender saw them.
 pub struct DetrendedCells<'a> {
-    /// Data that entered the moving average; NaN where there was none. Row-major.
-    pub values: &'a [f64],
+    /// Number of rows.
+    pub rows: usize,
     /// Number of columns.
     pub cols: usize,
-    /// Data in each cell's window.
-    pub count: &'a [u32],
-    /// Residuals; NaN on cells that are not used.
-    pub residual: &'a [f64],
+    /// Cells that entered the moving average, row-major.
+    pub trusted: &'a Bitmap,
+    /// Cells with a residual.
+    pub used: &'a Bitmap,
+    /// Number of cells with a residual.
+    pub detrended: usize,
+    /// How many of them have a partial window.
+    pub partial: usize,
 }
 
 /// What partial windows add to the covariance of the residual in each bin, as weights of the surface's covariance by lag.
-/// Memory: 8 bytes per bin and lag within the largest lag and two windows, one of two opposite lags.
+/// Memory: 4 bytes per cell of a strip of 4 million cells or four reaches, and 8 bytes per bin and lag within the largest lag and two windows, one of two opposite lags.
 pub struct PartialWindows {
     /// Largest lag with a weight, in cells.
     reach: [isize; 2],
@@ -48,19 +57,32 @@ pub struct PartialWindows {
 impl PartialWindows {
     /// The weights for the bins of a raster, from about `pairs` pairs with a partial window for each bin.
     pub fn new(cells: &DetrendedCells, window: BoxWindow, bins: &LagBins, pairs: f64) -> Self {
-        let centres = centres(cells, window.area() as u32, pairs);
+        let centres = centres(cells, pairs);
         let largest = |axis: usize| bins.members.iter().map(|m| m.lag[axis].abs()).max().unwrap_or(0);
         let reach = [0, 1].map(|axis| largest(axis) + 2 * window.half[axis] as isize);
         if centres.is_empty() {
             return Self { reach, weights: vec![Vec::new(); bins.len()] };
         }
-        let sampler = Sampler { cells, window, data: DataCount::new(cells) };
         let members: Vec<&[Member]> = bins.members.chunk_by(|a, b| a.bin == b.bin).collect();
-        let weights = members.into_par_iter().enumerate().map(|(bin, members)| {
-            let draws = centres.iter().enumerate().map(|(s, &cell)| (cell, Draw { index: s * bins.len() + bin }));
-            sampler.mean_weights(draws, members, LagWeights::new(reach))
-        });
-        Self { reach, weights: weights.collect() }
+        let mut sums: Vec<LagWeights> = members.iter().map(|_| LagWeights::new(reach)).collect();
+        let step = (STRIP_CELLS / cells.cols).max(4 * reach[0] as usize).max(1);
+        for top in (0..cells.rows).step_by(step) {
+            let strip = |row: usize| centres.partition_point(|&cell| cell < row * cells.cols);
+            let samples = strip(top)..strip(top + step);
+            if samples.is_empty() {
+                continue;
+            }
+            let around = top.saturating_sub(reach[0] as usize)..(top + step + reach[0] as usize).min(cells.rows);
+            let sampler = Sampler { cells, window, data: DataCount::new(cells, around) };
+            sums.par_iter_mut().zip(&members).enumerate().for_each(|(bin, (line, members))| {
+                for s in samples.clone() {
+                    let draw = Draw { index: s * bins.len() + bin };
+                    let lag = members[draw.below(0, members.len())].lag;
+                    line.pairs += usize::from(sampler.add_pair(centres[s], lag, &draw, line));
+                }
+            });
+        }
+        Self { reach, weights: sums.into_iter().map(LagWeights::mean).collect() }
     }
 
     /// What is added in each bin for a surface with the covariance `measured`, m2.
@@ -76,39 +98,38 @@ impl PartialWindows {
 
 /// First cells of the pairs, spread evenly over the cells used: the more, the fewer windows are partial; none when all
 /// are complete.
-fn centres(cells: &DetrendedCells, area: u32, pairs: f64) -> Vec<usize> {
-    let used = || (0..cells.residual.len()).filter(|&k| !cells.residual[k].is_nan());
-    let (total, partial) = (used().count(), used().filter(|&k| cells.count[k] < area).count());
-    if partial == 0 {
+fn centres(cells: &DetrendedCells, pairs: f64) -> Vec<usize> {
+    if cells.partial == 0 {
         return Vec::new();
     }
-    let samples = (pairs * total as f64 / partial as f64).min(PAIRS_MAX) as usize;
-    let mut ranks: Vec<usize> = (0..samples).map(|index| Draw { index }.below(5, total)).collect();
+    let samples = (pairs * cells.detrended as f64 / cells.partial as f64).min(PAIRS_MAX) as usize;
+    let mut ranks: Vec<usize> = (0..samples).map(|index| Draw { index }.below(5, cells.detrended)).collect();
     ranks.sort_unstable();
-    let mut wanted = ranks.into_iter().peekable();
-    let mut centres = Vec::with_capacity(samples);
-    for (rank, cell) in used().enumerate() {
-        while wanted.next_if_eq(&rank).is_some() {
-            centres.push(cell);
-        }
-    }
-    centres
+    cells.used.select(&ranks)
 }
 
 /// Weights by lag, one of two opposite lags: `row` in `0..=reach[0]` (outer), `col` in `-reach[1]..=reach[1]` (inner).
 struct LagWeights {
     reach: [isize; 2],
     weights: Vec<f64>,
+    /// Pairs added.
+    pairs: usize,
 }
 
 impl LagWeights {
     fn new(reach: [isize; 2]) -> Self {
-        Self { reach, weights: vec![0.0; ((reach[0] + 1) * (2 * reach[1] + 1)) as usize] }
+        Self { reach, weights: vec![0.0; ((reach[0] + 1) * (2 * reach[1] + 1)) as usize], pairs: 0 }
     }
 
     fn add(&mut self, [row, col]: [isize; 2], weight: f64) {
         let (row, col) = if row < 0 { (-row, -col) } else { (row, col) };
         self.weights[(row * (2 * self.reach[1] + 1) + col + self.reach[1]) as usize] += weight;
+    }
+
+    /// Mean over the pairs.
+    fn mean(mut self) -> Vec<f64> {
+        self.weights.iter_mut().for_each(|w| *w /= self.pairs.max(1) as f64);
+        self.weights
     }
 }
 
@@ -143,28 +164,14 @@ struct Sampler<'a> {
 }
 
 impl Sampler<'_> {
-    /// Mean over the pairs that start at the drawn cells.
-    fn mean_weights(
-        &self,
-        draws: impl Iterator<Item = (usize, Draw)>,
-        members: &[Member],
-        mut line: LagWeights,
-    ) -> Vec<f64> {
-        let mut pairs = 0;
-        for (cell, draw) in draws {
-            let lag = members[draw.below(0, members.len())].lag;
-            pairs += usize::from(self.add_pair(cell, lag, &draw, &mut line));
-        }
-        line.weights.iter_mut().for_each(|w| *w /= pairs.max(1) as f64);
-        line.weights
-    }
-
     /// Adds the pair of `cell` and the cell a lag away; false when that one is not used.
     fn add_pair(&self, cell: usize, lag: [isize; 2], draw: &Draw, line: &mut LagWeights) -> bool {
         let at = [cell / self.cells.cols, cell % self.cells.cols].map(|k| k as isize);
         let partner = [at[0] + lag[0], at[1] + lag[1]];
-        let Some(second) = self.index(partner).filter(|&k| !self.cells.residual[k].is_nan()) else { return false };
-        let counts = [self.cells.count[cell], self.cells.count[second]];
+        if !self.index(partner).is_some_and(|k| self.cells.used.get(k)) {
+            return false;
+        }
+        let counts = [at, partner].map(|[r, c]| self.data.within([self.span(0, r), self.span(1, c)]));
         if counts.iter().any(|&n| (n as usize) < self.window.area()) {
             let shifts = [[draw.unit(1), draw.unit(2)], [draw.unit(3), draw.unit(4)]];
             let back = lag.map(|l| -l);
@@ -178,6 +185,12 @@ impl Sampler<'_> {
             self.add_window_window(lag, &windows(COARSE_BLOCKS), line);
         }
         true
+    }
+
+    /// Rows or columns of the window about one, `from..to`.
+    fn span(&self, axis: usize, centre: isize) -> [isize; 2] {
+        let half = self.window.half[axis] as isize;
+        [centre - half, centre + half + 1]
     }
 
     /// `- D_i(j) C(h - j) - D_(i+h)(k) C(h + k)`, less the same of complete windows.
@@ -252,8 +265,7 @@ impl Sampler<'_> {
 
     /// Index of a cell, `None` beyond the raster.
     fn index(&self, [row, col]: [isize; 2]) -> Option<usize> {
-        let rows = self.cells.values.len() / self.cells.cols;
-        let inside = row >= 0 && col >= 0 && row < rows as isize && col < self.cells.cols as isize;
+        let inside = row >= 0 && col >= 0 && row < self.cells.rows as isize && col < self.cells.cols as isize;
         inside.then(|| row as usize * self.cells.cols + col as usize)
     }
 }
@@ -300,32 +312,34 @@ impl Axis {
     }
 }
 
-/// Number of cells with data in any rectangle, from sums over all cells above and to the left (Crow, 1984).
+/// Number of cells with data in any rectangle within some rows, from sums over all cells above and to the left (Crow, 1984).
 struct DataCount {
-    rows: isize,
+    rows: Range<isize>,
     cols: isize,
     sums: Vec<u32>,
 }
 
 impl DataCount {
-    fn new(cells: &DetrendedCells) -> Self {
+    fn new(cells: &DetrendedCells, rows: Range<usize>) -> Self {
         let cols = cells.cols;
         let stride = cols + 1;
         let mut sums = vec![0; stride];
-        for (r, line) in cells.values.chunks_exact(cols).enumerate() {
+        sums.reserve(rows.len() * stride);
+        for row in rows.clone() {
+            let above = sums.len() - stride;
             let mut data = 0;
             sums.push(0);
-            for (c, value) in line.iter().enumerate() {
-                data += u32::from(!value.is_nan());
-                sums.push(data + sums[r * stride + c + 1]);
+            for c in 0..cols {
+                data += u32::from(cells.trusted.get(row * cols + c));
+                sums.push(data + sums[above + c + 1]);
             }
         }
-        Self { rows: (cells.values.len() / cols) as isize, cols: cols as isize, sums }
+        Self { rows: rows.start as isize..rows.end as isize, cols: cols as isize, sums }
     }
 
     /// Cells with data in the rows and columns `from..to`; cells beyond the raster have none.
     fn within(&self, [rows, cols]: Rectangle) -> u32 {
-        let [top, bottom] = rows.map(|r| r.clamp(0, self.rows));
+        let [top, bottom] = rows.map(|r| r.clamp(self.rows.start, self.rows.end) - self.rows.start);
         let [left, right] = cols.map(|c| c.clamp(0, self.cols));
         let at = |r: isize, c: isize| self.sums[(r * (self.cols + 1) + c) as usize];
         at(bottom, right) + at(top, left) - at(top, right) - at(bottom, left)

@@ -225,7 +225,20 @@ fn partial_windows_case(missing: impl Fn(usize, usize) -> bool, range_m: f64) ->
     let residual: Vec<f64> = (0..values.len()).map(|k| if used(k) { 0.0 } else { f64::NAN }).collect();
     let model = Covariance::new(model("exponential").unwrap(), 1.0, range_m).unwrap();
     let bins = LagBins::of(&masked_covariance(&residual, SIDE, [4; 2]), [1.0; 2], 4.0, bins::Layout::ISOTROPIC);
-    let cells = partial::DetrendedCells { values: &values, cols: SIDE, count: &count, residual: &residual };
+    let bits = |values: &[f64]| {
+        let mut bits = crate::bitmap::Bitmap::with_capacity(values.len());
+        values.iter().for_each(|v| bits.push(!v.is_nan()));
+        bits
+    };
+    let (trusted, used_cells) = (bits(&values), bits(&residual));
+    let cells = partial::DetrendedCells {
+        rows: SIDE,
+        cols: SIDE,
+        trusted: &trusted,
+        used: &used_cells,
+        detrended: used_cells.count(),
+        partial: (0..values.len()).filter(|&k| used(k) && (count[k] as usize) < window.area()).count(),
+    };
     let filter = filtered::DetrendFilter::new(window, [1.0; 2], [4; 2], Measurement::default());
     let measured = filter.measured_covariance(&model);
     let complete = bins.average(|lag| filter.residual_covariance(&measured).at(lag));

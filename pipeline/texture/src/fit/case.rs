@@ -1,65 +1,68 @@
 //! A DEM detrended, trimmed and correlated: everything a fit is made of.
 
-use super::residual::{Detrended, Trimmed};
+use super::heights::Heights;
 use super::search::Coordinates;
+use super::survey::{Detrended, Survey};
 use super::{FitError, FitSettings};
 use crate::covariance::bins::Layout;
-use crate::covariance::{Form, LagBins, MaskedCovariance, masked_covariance};
+use crate::covariance::{Form, LagBins};
 use crate::detrend::BoxWindow;
-use sastrugi_numeric::{Geometry, Grid};
+use sastrugi_numeric::Geometry;
+use sastrugi_schemas::ParameterError;
+use std::ops::Range;
 
 /// Fewest bins for two parameters.
 const BINS_MIN: usize = 3;
 
 /// A DEM detrended, trimmed and correlated.
 pub struct Case<'a> {
+    pub heights: &'a dyn Heights,
     pub settings: &'a FitSettings,
     pub geometry: Geometry,
     pub window: BoxWindow,
     pub max_lag: [usize; 2],
     pub max_lag_m: f64,
-    pub detrended: Detrended,
-    pub trimmed: Trimmed,
-    pub estimate: MaskedCovariance,
+    pub survey: Survey,
     /// Rings.
     pub bins: LagBins,
 }
 
 impl<'a> Case<'a> {
     /// Detrends, trims and correlates.
-    pub fn new(dem: &Grid, settings: &'a FitSettings) -> Result<Self, FitError> {
-        let window = settings.window(&dem.geometry)?;
-        let detrended = Detrended::new(dem, settings, window)?;
-        Self::of_detrended(detrended, dem.geometry, settings, window)
-    }
-
-    /// Trims and correlates.
-    pub fn of_detrended(
-        detrended: Detrended,
-        geometry: Geometry,
-        settings: &'a FitSettings,
-        window: BoxWindow,
-    ) -> Result<Self, FitError> {
-        let trimmed = detrended.trimmed(settings);
+    pub fn new(heights: &'a dyn Heights, settings: &'a FitSettings) -> Result<Self, FitError> {
+        let (geometry, profiles) = (heights.geometry(), heights.are_profiles());
+        if let Some(form) = settings.forms.iter().find(|f| profiles && f.is_anisotropic()) {
+            let message = format!("is `{}`; a transect knows one direction only", form.name());
+            return Err(ParameterError::new("model", message).into());
+        }
+        let window = settings.window(&geometry, profiles)?;
         let max_lag_m = settings.max_lag_m(&geometry);
-        let max_lag = [1, 0].map(|axis: usize| (max_lag_m / geometry.cell[axis] * (1.0 + 1e-9)) as usize);
-        let estimate = masked_covariance(&trimmed.residual, geometry.cols, max_lag);
-        let bins = LagBins::of(&estimate, geometry.cell, max_lag_m, Layout::ISOTROPIC);
+        let cells = |axis: usize| (max_lag_m / geometry.cell[axis] * (1.0 + 1e-9)) as usize;
+        let max_lag = [if profiles { 0 } else { cells(1) }, cells(0)];
+        let survey = Survey::new(heights, settings, window, max_lag)?;
+        let bins = LagBins::of(&survey.covariance, geometry.cell, max_lag_m, Layout::ISOTROPIC);
         if bins.len() < BINS_MIN {
             return Err(FitError::TooFewLags { found: bins.len(), needed: BINS_MIN });
         }
-        Ok(Self { settings, geometry, window, max_lag, max_lag_m, detrended, trimmed, estimate, bins })
+        Ok(Self { heights, settings, geometry, window, max_lag, max_lag_m, survey, bins })
     }
 
     /// The bins of another layout.
     pub fn bins_of(&self, layout: Layout) -> LagBins {
-        LagBins::of(&self.estimate, self.geometry.cell, self.max_lag_m, layout)
+        LagBins::of(&self.survey.covariance, self.geometry.cell, self.max_lag_m, layout)
     }
 
-    /// Width of the window, m (the mean of both ways).
+    /// Residuals of a part, trimmed.
+    pub fn trimmed(&self, rows: Range<usize>, cols: Range<usize>) -> Result<Vec<f64>, FitError> {
+        let Detrended { mut residual, .. } = self.survey.detrended(self.heights, self.settings, rows, cols)?;
+        self.survey.trim.apply(&mut residual);
+        Ok(residual)
+    }
+
+    /// Width of the window, m (the mean of both ways; along transects).
     pub fn window_m(&self) -> f64 {
         let [x, y] = self.window.size_m(self.geometry.cell);
-        0.5 * (x + y)
+        if self.heights.are_profiles() { x } else { 0.5 * (x + y) }
     }
 
     /// Coordinates for a search over the parameters of a form.

@@ -8,6 +8,9 @@ pub enum FitError {
     /// A parameter is out of its range.
     #[error(transparent)]
     Parameter(#[from] ParameterError),
+    /// A part of the raster could not be read.
+    #[error("{0}")]
+    Unreadable(String),
     /// Fewer than two windows fit side by side.
     #[error("the DEM is {width_m} m x {height_m} m; a background needs at least two windows, {needed_m} m, each way")]
     DemTooSmall {

@@ -6,7 +6,7 @@ use super::least_squares::{Cholesky, Minimum, curvature, minimise};
 use crate::covariance::bins::length_m;
 use crate::covariance::filtered::DetrendFilter;
 use crate::covariance::form::Role;
-use crate::covariance::partial::{DetrendedCells, PAIRS_FINE, PAIRS_ROUGH, PartialWindows};
+use crate::covariance::partial::{PAIRS_FINE, PAIRS_ROUGH, PartialWindows};
 use crate::covariance::{Covariance, Form, LagBins};
 
 /// Rounds of weighting by the covariance of the bins.
@@ -94,25 +94,19 @@ impl<'a> Estimator<'a> {
     }
 
     fn with_pairs(case: &'a Case<'a>, bins: &'a LagBins, pairs: f64) -> Self {
-        let cells = DetrendedCells {
-            values: &case.detrended.trusted,
-            cols: case.geometry.cols,
-            count: &case.detrended.count,
-            residual: &case.detrended.residual,
-        };
         let measurement = case.settings.measurement();
         let expectation = Expectation {
             filter: DetrendFilter::new(case.window, case.geometry.cell, case.max_lag, measurement),
-            partial: PartialWindows::new(&cells, case.window, bins, pairs),
+            partial: PartialWindows::new(&case.survey.cells(), case.window, bins, pairs),
             bins,
-            cells: case.trimmed.detrended,
+            cells: case.survey.detrended,
         };
         Self { case, bins, expectation }
     }
 
     /// The model in each bin as the estimator sees it, m2.
     pub fn mean(&self, covariance: &Covariance) -> Vec<f64> {
-        self.expectation.mean(covariance, self.case.trimmed.threshold_m)
+        self.expectation.mean(covariance, self.case.survey.trim.threshold_m)
     }
 
     /// Generalised least squares of a form, from an exponential of the given sigma and b.
@@ -148,7 +142,7 @@ impl<'a> Estimator<'a> {
 
     /// Factor of the covariance of the bins for a surface.
     pub fn weights(&self, covariance: &Covariance) -> Option<Cholesky> {
-        let matrix = self.expectation.covariance(covariance, self.case.trimmed.threshold_m);
+        let matrix = self.expectation.covariance(covariance, self.case.survey.trim.threshold_m);
         Cholesky::new(&matrix, self.bins.len())
     }
 

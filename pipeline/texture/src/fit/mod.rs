@@ -16,24 +16,27 @@
 //! 43 % and 76 % at half a window (`docs/papers/vecherin.md`).
 //!
 //! Cost without intervals: dominated by the moving averages of the outlier search and four real transforms of the raster;
-//! a replicate costs a surface of four times as many cells (at most a million of them) and another such fit. Memory: about
-//! 60 bytes per cell, and 300 bytes per cell of up to a million for each replicate at work.
+//! a replicate costs a surface of four times as many cells (at most a million of them) and another such fit. Memory: the
+//! strips of `survey.rs`, which do not grow with the raster but for two bits per cell, and 300 bytes per cell of up to a
+//! million for each replicate at work. Heights are read in parts, a few times ([`Heights`]).
 
 mod case;
 mod error;
 mod estimator;
 mod expectation;
+mod heights;
 mod least_squares;
 mod params;
 mod profile;
 mod report;
 mod resampling;
-mod residual;
 mod search;
 pub(crate) mod simulate;
+mod survey;
 mod verdicts;
 
 pub use error::FitError;
+pub use heights::{Heights, Profiles};
 pub use params::{FitParameters, FitSettings, Mode};
 
 use crate::covariance::Form;
@@ -41,37 +44,47 @@ use crate::covariance::bins::Layout;
 use case::Case;
 use estimator::{Estimate, Estimator, best, ordinary};
 use report::Findings;
-use sastrugi_numeric::{Grid, Streams};
+use sastrugi_numeric::{Geometry, Grid, Streams};
 use sastrugi_schemas::fit::FitFile;
+use survey::Survey;
 
-/// A fit and the rasters behind it.
-#[derive(Clone, Debug)]
+/// A fit and what is needed to show the rasters behind it.
+#[derive(Clone)]
 pub struct FitOutcome {
     /// The fit; its `source` is left to the caller.
     pub fit: FitFile,
-    /// Moving average, m; NaN where the window has no data.
-    pub background: Grid,
-    /// Height less background, m, on the cells that entered the covariance; NaN elsewhere.
-    pub residual: Grid,
+    settings: FitSettings,
+    survey: Survey,
 }
 
-/// Fits the covariance of the DEM's texture. Heights and cells are in m; the streams are for the replicates of intervals.
+impl FitOutcome {
+    /// Background (moving average, m; NaN where the window has no data) and residual (height less background, m, on the
+    /// cells that entered the covariance; NaN elsewhere) of the heights that were fitted.
+    ///
+    /// # Errors
+    /// Heights that cannot be read.
+    pub fn rasters(&self, heights: &dyn Heights) -> Result<[Grid; 2], FitError> {
+        let geometry = heights.geometry();
+        let all = self.survey.detrended(heights, &self.settings, 0..geometry.rows, 0..geometry.cols)?;
+        let mut residual = all.residual;
+        self.survey.trim.apply(&mut residual);
+        Ok([Grid::new(geometry, all.background), Grid::new(geometry, residual)])
+    }
+}
+
+/// Fits the covariance of the texture of a DEM or of transects. Heights and cells are in m; the streams are for the
+/// replicates of intervals.
 ///
 /// # Errors
 /// See [`FitError`].
-pub fn fit(dem: &Grid, settings: &FitSettings, streams: &Streams) -> Result<FitOutcome, FitError> {
-    let case = Case::new(dem, settings)?;
+pub fn fit(heights: &dyn Heights, settings: &FitSettings, streams: &Streams) -> Result<FitOutcome, FitError> {
+    let case = Case::new(heights, settings)?;
     let naive = ordinary(&case, &Form::parse("exponential")?);
     let fit = match settings.mode() {
         Mode::Paper => paper(&case, &naive)?,
-        Mode::Corrected => corrected(dem, &case, &naive, streams)?,
+        Mode::Corrected => corrected(&case, &naive, streams)?,
     };
-    let Case { detrended, trimmed, .. } = case;
-    Ok(FitOutcome {
-        fit,
-        background: Grid::new(dem.geometry, detrended.background),
-        residual: Grid::new(dem.geometry, trimmed.residual),
-    })
+    Ok(FitOutcome { fit, settings: settings.clone(), survey: case.survey })
 }
 
 fn paper(case: &Case, naive: &Estimate) -> Result<FitFile, FitError> {
@@ -81,7 +94,7 @@ fn paper(case: &Case, naive: &Estimate) -> Result<FitFile, FitError> {
     Ok(report::fit_file(case, naive, &estimate, binned, &Findings::default()))
 }
 
-fn corrected(dem: &Grid, case: &Case, naive: &Estimate, streams: &Streams) -> Result<FitFile, FitError> {
+fn corrected(case: &Case, naive: &Estimate, streams: &Streams) -> Result<FitFile, FitError> {
     let settings = case.settings;
     let by_direction = case.bins_of(Layout::DIRECTIONAL);
     let directional = settings.forms.iter().any(Form::is_anisotropic);
@@ -94,10 +107,10 @@ fn corrected(dem: &Grid, case: &Case, naive: &Estimate, streams: &Streams) -> Re
 
     let replicates =
         (settings.bootstrap() > 0).then(|| resampling::parametric(&estimator, estimate, settings.bootstrap(), streams));
-    let blocks = resampling::blocks(case, bins);
+    let blocks = resampling::blocks(case, bins, settings.bootstrap() > 0)?;
     let resampled = resampling::block_replicates(&estimator, estimate, &blocks, settings.bootstrap(), streams);
-    let others = verdicts::other_windows(&examined(dem), settings, estimate);
-    let rough = Estimator::rough(case, &by_direction);
+    let others = verdicts::other_windows(examined(case)?.as_ref(), settings, estimate);
+    let rough = (!case.heights.are_profiles()).then(|| Estimator::rough(case, &by_direction));
     let findings = Findings {
         intervals: replicates
             .as_ref()
@@ -108,11 +121,11 @@ fn corrected(dem: &Grid, case: &Case, naive: &Estimate, streams: &Streams) -> Re
         profile: profile::profile(&estimator, estimate),
         disagreement: verdicts::window_disagreement(estimate, &others),
         others: others.iter().map(verdicts::window_entry).collect(),
-        isotropy: verdicts::isotropy(&rough, estimate),
+        isotropy: rough.as_ref().and_then(|rough| verdicts::isotropy(rough, estimate)),
         stationarity: verdicts::stationarity(&estimator, estimate, &blocks),
         misfit_p: verdicts::misfit_p(estimate, replicates.as_ref()),
         normality_p: replicates.as_ref().map(|r| verdicts::normality_p(case, r)),
-        directions: report::directions(&rough, estimate),
+        directions: rough.map_or_else(Vec::new, |rough| report::directions(&rough, estimate)),
     };
     let rings = match directional {
         true => Estimator::rough(case, &case.bins).mean(&estimate.covariance),
@@ -132,14 +145,14 @@ fn refuse_white(case: &Case, estimate: &Estimate) -> Result<(), FitError> {
 }
 
 /// The part of a DEM that is fitted again at other windows: all of it, or its middle.
-fn examined(dem: &Grid) -> Grid {
-    let (rows, cols) = (dem.rows(), dem.cols());
-    let share = (resampling::CELLS_MAX as f64 / dem.values.len() as f64).sqrt();
-    if share >= 1.0 {
-        return dem.clone();
-    }
-    let [height, width] = [rows, cols].map(|n| (n as f64 * share) as usize);
-    dem.window((rows - height) / 2, (cols - width) / 2, height, width)
+fn examined(case: &Case) -> Result<Box<dyn Heights>, FitError> {
+    let Geometry { rows, cols, .. } = case.geometry;
+    let share = (resampling::CELLS_MAX as f64 / case.geometry.len() as f64).sqrt().min(1.0);
+    let [height, width] = [rows, cols].map(|n| (n as f64 * share) as usize).map(|n| n.max(1));
+    let (top, left) = ((rows - height) / 2, (cols - width) / 2);
+    let values = case.heights.part(top..top + height, left..left + width).map_err(FitError::Unreadable)?;
+    let part = Grid::new(case.geometry.window(top, left, height, width), values);
+    Ok(if case.heights.are_profiles() { Box::new(Profiles::of(part)) } else { Box::new(part) })
 }
 
 #[cfg(test)]

@@ -169,12 +169,12 @@ impl FitSettings {
         self.parameters.trim
     }
 
-    /// The window on a DEM of this shape.
-    pub(super) fn window(&self, dem: &Geometry) -> Result<BoxWindow, FitError> {
+    /// The window on a DEM of this shape; transects have one along them only.
+    pub(super) fn window(&self, dem: &Geometry, profiles: bool) -> Result<BoxWindow, FitError> {
         let outer_scale_m = self.parameters.outer_scale_m;
         let [width_m, height_m] = dem.size();
         let cell_m = dem.cell[0].max(dem.cell[1]);
-        let narrow_m = width_m.min(height_m);
+        let narrow_m = if profiles { width_m } else { width_m.min(height_m) };
         if narrow_m < 2.0 * outer_scale_m {
             return Err(FitError::DemTooSmall { width_m, height_m, needed_m: 2.0 * outer_scale_m });
         }
@@ -184,7 +184,8 @@ impl FitSettings {
         if outer_scale_m < WINDOW_CELLS_MIN * cell_m {
             return Err(FitError::OuterScaleTooSmall { outer_scale_m, cell_m, smallest_m: WINDOW_CELLS_MIN * cell_m });
         }
-        Ok(BoxWindow::nearest(outer_scale_m, dem.cell))
+        let BoxWindow { half: [rows, cols] } = BoxWindow::nearest(outer_scale_m, dem.cell);
+        Ok(BoxWindow { half: [if profiles { 0 } else { rows }, cols] })
     }
 
     /// Largest lag in m.

@@ -53,8 +53,8 @@ pub fn fit_file(case: &Case, naive: &Estimate, estimate: &Estimate, binned: Vec<
         window_m: Some(case.window.size_m(case.geometry.cell)),
         trim: Some(Trim {
             level: case.settings.trim(),
-            threshold_m: case.trimmed.threshold_m,
-            masked_share: 1.0 - figures.share(case.trimmed.kept),
+            threshold_m: case.survey.trim.threshold_m,
+            masked_share: 1.0 - figures.share(case.survey.kept),
         }),
         cell_m: Some(case.geometry.cell),
         lags_m: case.bins.lag_m.clone(),
@@ -128,8 +128,8 @@ impl Figures {
     fn of(case: &Case, naive: &Estimate, estimate: &Estimate, binned: &[f64]) -> Self {
         let misfit = difference(&case.bins.covariance_m2, binned);
         Self {
-            cells: case.detrended.trusted.len(),
-            trusted: case.detrended.trusted.iter().filter(|z| !z.is_nan()).count(),
+            cells: case.geometry.len(),
+            trusted: case.survey.trusted_count,
             misfit_m2: (misfit.iter().map(|d| d * d).sum::<f64>() / misfit.len() as f64).sqrt(),
             naive_range_windows: naive.covariance.range_m() / case.window_m(),
             misfit_ratio: estimate.misfit_ratio(),
@@ -147,7 +147,7 @@ impl Figures {
         estimate: &Estimate,
         findings: &Findings,
     ) -> BTreeMap<String, Value> {
-        let (detrended, trimmed) = (&case.detrended, &case.trimmed);
+        let survey = &case.survey;
         let mut entries = vec![
             ("naive_sigma_m", json!(naive.covariance.sigma_m())),
             ("naive_range_m", json!(naive.covariance.range_m())),
@@ -157,10 +157,10 @@ impl Figures {
             ("lag_max_m", json!(case.max_lag_m)),
             ("window_cells", json!([case.window.cells()[1], case.window.cells()[0]])),
             ("min_valid_share", json!(case.settings.min_valid_share)),
-            ("no_data_share", json!(1.0 - self.share(detrended.measured))),
-            ("outlier_share", json!(self.share(detrended.measured - self.trusted))),
-            ("window_lacks_data_share", json!(self.share(self.trusted - trimmed.detrended))),
-            ("trimmed_share", json!(self.share(trimmed.detrended - trimmed.kept))),
+            ("no_data_share", json!(1.0 - self.share(survey.measured))),
+            ("outlier_share", json!(self.share(survey.measured - self.trusted))),
+            ("window_lacks_data_share", json!(self.share(self.trusted - survey.detrended))),
+            ("trimmed_share", json!(self.share(survey.detrended - survey.kept))),
         ];
         let known = [
             (SILL_OVER_RANGE, sill_over_range(&estimate.covariance)),
@@ -248,7 +248,7 @@ impl Figures {
     }
 
     fn clutter_warning(&self, case: &Case) -> Option<String> {
-        let outliers = (case.detrended.measured - self.trusted) as f64 / case.detrended.measured as f64;
+        let outliers = (case.survey.measured - self.trusted) as f64 / case.survey.measured as f64;
         (outliers > OUTLIER_SHARE_MAX).then(|| {
             format!(
                 "{:.1} % of the measured cells were taken for outliers; a site with that many objects is better masked by hand",

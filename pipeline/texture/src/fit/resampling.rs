@@ -15,13 +15,15 @@
 //! Rasters of more than [`CELLS_MAX`] cells are examined on a part of that size, and the deviations scaled by the square root
 //! of the share of residuals in it.
 
+use super::FitError;
 use super::case::Case;
 use super::estimator::{Estimate, Estimator};
 use super::profile;
-use super::residual::Detrended;
-use super::simulate::Simulator;
+use super::simulate::{Shape, Simulator};
+use super::survey::{Detrended, Trim};
 use crate::covariance::form::Role;
 use crate::covariance::{Covariance, LagBins, masked_covariance};
+use crate::sizes::Sizes;
 use rayon::prelude::*;
 use sastrugi_numeric::{Stream, Streams, sums};
 use sastrugi_schemas::fit::Intervals;
@@ -35,6 +37,8 @@ pub const LEVEL: f64 = 0.95;
 pub const CELLS_MAX: usize = 1 << 20;
 /// Fewest blocks worth drawing from.
 const BLOCKS_MIN: usize = 9;
+/// Most cells along a side of a block that are looked at.
+const BLOCK_SIDE_MAX: usize = 1024;
 /// Most blocks along a side.
 const BLOCKS_ALONG: usize = 8;
 /// Replicates of the block bootstrap for each one asked for: they cost little.
@@ -54,7 +58,7 @@ pub struct Replicates {
 pub fn parametric(estimator: &Estimator, estimate: &Estimate, count: usize, streams: &Streams) -> Replicates {
     let case = estimator.case;
     let part = Part::of(case);
-    let shape = [part.rows, part.cols];
+    let shape = Shape { rows: part.rows, cols: part.cols, profiles: case.heights.are_profiles() };
     let outer_m = 8.0 * case.window_m();
     let measurement = case.settings.measurement();
     let simulator = Simulator::new(&estimate.covariance, measurement, shape, case.geometry.cell, outer_m);
@@ -65,13 +69,14 @@ pub fn parametric(estimator: &Estimator, estimate: &Estimate, count: usize, stre
         .map(|k| {
             let mut surface = simulator.surface(&streams.child(&format!("bootstrap-{k}")));
             surface.iter_mut().zip(&part.mask).for_each(|(z, keep)| *z = if *keep { *z } else { f64::NAN });
-            let split = Detrended::of_trusted(surface, part.cols, case.settings, case.window);
-            let trimmed = split.trimmed(case.settings);
-            let sums = estimator.bins.bin_sums(&masked_covariance(&trimmed.residual, part.cols, case.max_lag));
-            let end = estimator.refit(estimate, &means(&sums), trimmed.threshold_m);
+            let mut residual = Detrended::of(&surface, part.cols, case.settings, case.window).residual;
+            let trim = Trim::of(&Sizes::of(&residual), case.settings);
+            trim.apply(&mut residual);
+            let sums = estimator.bins.bin_sums(&masked_covariance(&residual, part.cols, case.max_lag));
+            let end = estimator.refit(estimate, &means(&sums), trim.threshold_m);
             let at = end.at.iter().zip(&estimate.at).map(|(a, e)| e + scale * (a - e)).collect();
             // A smaller part scatters more: its sum of squares is larger by the square of the scale.
-            (at, end.value * scale * scale / freedom, trimmed.median_size_m / trimmed.threshold_m)
+            (at, end.value * scale * scale / freedom, trim.median_size_m / trim.threshold_m)
         })
         .collect();
     Replicates {
@@ -99,64 +104,77 @@ impl Part {
     /// The whole, or a window about the middle with as much of it as may be.
     fn of(case: &Case) -> Self {
         let (rows, cols) = (case.geometry.rows, case.geometry.cols);
-        let data = |k: usize| !case.detrended.trusted[k].is_nan();
         let shrink = (CELLS_MAX as f64 / (rows * cols) as f64).sqrt().min(1.0);
         let part = [rows, cols].map(|n| ((n as f64 * shrink) as usize).max(3 * case.window.cells()[0]).min(n));
-        let counts = sums_by_tile(rows, cols, part, &|k| !case.detrended.residual[k].is_nan());
-        let (at, used) = counts.into_iter().fold(([0, 0], 0), |best, tile| if tile.1 > best.1 { tile } else { best });
-        let mask = (at[0]..at[0] + part[0]).flat_map(|r| (at[1]..at[1] + part[1]).map(move |c| data(r * cols + c)));
-        let scale = (used.max(1) as f64 / case.trimmed.detrended.max(1) as f64).sqrt().min(1.0);
-        Self { rows: part[0], cols: part[1], mask: mask.collect(), scale }
+        let places = places([rows, cols], part)
+            .into_iter()
+            .map(|at| (at, case.survey.used_count(at[0]..at[0] + part[0], at[1]..at[1] + part[1])));
+        let (at, used) = places.fold(([0, 0], 0), |best, tile| if tile.1 > best.1 { tile } else { best });
+        let mask = case.survey.trusted(at[0]..at[0] + part[0], at[1]..at[1] + part[1]);
+        let scale = (used.max(1) as f64 / case.survey.detrended.max(1) as f64).sqrt().min(1.0);
+        Self { rows: part[0], cols: part[1], mask, scale }
     }
 }
 
-/// Cells that count in windows of `part` cells at up to 3 x 3 places.
-fn sums_by_tile(
-    rows: usize,
-    cols: usize,
-    part: [usize; 2],
-    counts: &dyn Fn(usize) -> bool,
-) -> Vec<([usize; 2], usize)> {
-    let places = |n: usize, part: usize| -> Vec<usize> {
-        let mut all: Vec<usize> = [1, 0, 2].map(|k| (n - part) * k / 2).to_vec();
+/// Up to 3 x 3 places of a part, the middle first.
+fn places(shape: [usize; 2], part: [usize; 2]) -> Vec<[usize; 2]> {
+    let [down, across] = [0, 1].map(|k| {
+        let mut all: Vec<usize> = [1, 0, 2].map(|place| (shape[k] - part[k]) * place / 2).to_vec();
         all.dedup();
-        if n == part { vec![0] } else { all }
-    };
-    let across = places(cols, part[1]);
-    let tiles = places(rows, part[0]).into_iter().flat_map(|r| across.iter().map(move |&c| [r, c]));
-    tiles
-        .map(|[r0, c0]| {
-            let cells = (r0..r0 + part[0]).flat_map(|r| (c0..c0 + part[1]).map(move |c| r * cols + c));
-            ([r0, c0], cells.filter(|&k| counts(k)).count())
-        })
-        .collect()
+        if shape[k] == part[k] { vec![0] } else { all }
+    });
+    down.into_iter().flat_map(|r| across.iter().map(move |&c| [r, c])).collect()
 }
 
 /// One block of a DEM.
 pub struct Block {
-    /// Sum of products and number of pairs of each bin, both cells within the block.
-    pub sums: Vec<(f64, u64)>,
+    /// Residuals.
+    pub cells: u64,
+    /// Sum of their squares, m2.
+    squares_m2: f64,
+    /// Sum of products and number of pairs of each bin, both cells within the block; empty when not asked for.
+    sums: Vec<(f64, u64)>,
 }
 
-/// The DEM cut into blocks of at least two windows; empty when too few have data.
-pub fn blocks(case: &Case, bins: &LagBins) -> Vec<Block> {
-    let (rows, cols) = (case.geometry.rows, case.geometry.cols);
+impl Block {
+    /// Mean square of its residuals, m2.
+    pub fn variance_m2(&self) -> f64 {
+        self.squares_m2 / self.cells as f64
+    }
+}
+
+/// The DEM cut into blocks of at least two windows; empty when too few have data. Blocks of more cells than are looked at
+/// stand for their surroundings. Pairs are counted only where blocks will be resampled.
+pub fn blocks(case: &Case, bins: &LagBins, with_pairs: bool) -> Result<Vec<Block>, FitError> {
+    let shape = [case.geometry.rows, case.geometry.cols];
     let width = case.window.cells();
-    let along = [0, 1].map(|k| ([rows, cols][k] / (2 * width[k])).clamp(1, BLOCKS_ALONG));
+    let along = match case.heights.are_profiles() {
+        true => [shape[0], (BLOCKS_ALONG * BLOCKS_ALONG / shape[0]).clamp(1, shape[1] / (2 * width[1]))],
+        false => [0, 1].map(|k| (shape[k] / (2 * width[k])).clamp(1, BLOCKS_ALONG)),
+    };
+    let span = |axis: usize, index: usize| {
+        let [from, to] = [index, index + 1].map(|k| k * shape[axis] / along[axis]);
+        let cut = (to - from).saturating_sub(BLOCK_SIDE_MAX) / 2;
+        from + cut..to - cut
+    };
     let places: Vec<[usize; 2]> = (0..along[0]).flat_map(|r| (0..along[1]).map(move |c| [r, c])).collect();
-    let all: Vec<Block> = places
+    let all = places
         .into_par_iter()
         .map(|[r, c]| {
-            let [top, bottom] = [r, r + 1].map(|k| k * rows / along[0]);
-            let [left, right] = [c, c + 1].map(|k| k * cols / along[1]);
-            let part: Vec<f64> = (top..bottom)
-                .flat_map(|row| case.trimmed.residual[row * cols + left..row * cols + right].iter().copied())
-                .collect();
-            Block { sums: bins.bin_sums(&masked_covariance(&part, right - left, case.max_lag)) }
+            let (rows, cols) = (span(0, r), span(1, c));
+            let part = case.trimmed(rows, cols.clone())?;
+            let data = sums::finite(&part);
+            let sums = match with_pairs {
+                true => bins.bin_sums(&masked_covariance(&part, cols.len(), case.max_lag)),
+                false => Vec::new(),
+            };
+            let squares: Vec<f64> = data.iter().map(|r| r * r).collect();
+            Ok(Block { cells: data.len() as u64, squares_m2: sums::sum(&squares), sums })
         })
-        .filter(|b: &Block| b.sums.iter().all(|(_, pairs)| *pairs > 0))
-        .collect();
-    if all.len() < BLOCKS_MIN { Vec::new() } else { all }
+        .collect::<Result<Vec<Block>, FitError>>()?;
+    let full: Vec<Block> =
+        all.into_iter().filter(|b| b.cells > 0 && b.sums.iter().all(|(_, pairs)| *pairs > 0)).collect();
+    Ok(if full.len() < BLOCKS_MIN { Vec::new() } else { full })
 }
 
 /// Search coordinates of resampled blocks.
@@ -167,10 +185,13 @@ pub fn block_replicates(
     count: usize,
     streams: &Streams,
 ) -> Vec<Vec<f64>> {
-    if blocks.is_empty() {
+    if blocks.is_empty() || count == 0 {
         return Vec::new();
     }
-    let threshold_m = estimator.case.trimmed.threshold_m;
+    let threshold_m = estimator.case.survey.trim.threshold_m;
+    // Blocks that are looked at in part scatter more than whole ones.
+    let looked_at: u64 = blocks.iter().map(|b| b.cells).sum();
+    let scale = (looked_at as f64 / estimator.case.survey.kept as f64).sqrt().min(1.0);
     let together = |chosen: &[usize]| -> Vec<f64> {
         let mut total = vec![(0.0, 0); estimator.bins.len()];
         for &k in chosen {
@@ -187,7 +208,7 @@ pub fn block_replicates(
             let mut stream: Stream = streams.stream(&format!("blocks-{k}"));
             let chosen: Vec<usize> = once.iter().map(|_| stream.below(blocks.len() as u64) as usize).collect();
             let at = estimator.refit(estimate, &together(&chosen), threshold_m).at;
-            at.iter().zip(&centre).zip(&estimate.at).map(|((a, c), e)| e + a - c).collect()
+            at.iter().zip(&centre).zip(&estimate.at).map(|((a, c), e)| e + scale * (a - c)).collect()
         })
         .collect()
 }

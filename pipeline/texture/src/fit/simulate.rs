@@ -13,10 +13,18 @@ use sastrugi_numeric::Streams;
 use sastrugi_numeric::fft::{Complex64, HalfSpectrum, RealFft2, smooth_length};
 use std::f64::consts::PI;
 
-/// Surfaces of `rows` by `cols` cells.
+/// Cells of a surface, or transects of `cols` cells, `rows` of them.
+#[derive(Clone, Copy, Debug)]
+pub struct Shape {
+    pub rows: usize,
+    pub cols: usize,
+    /// True for transects, which do not know each other.
+    pub profiles: bool,
+}
+
+/// Surfaces, or sets of transects, of one shape.
 pub struct Simulator {
-    rows: usize,
-    cols: usize,
+    shape: Shape,
     fft: RealFft2,
     torus: [usize; 2],
     /// `sqrt(lambda M)` in the order of a half spectrum.
@@ -28,17 +36,23 @@ impl Simulator {
     pub fn new(
         covariance: &Covariance,
         measurement: Measurement,
-        [rows, cols]: [usize; 2],
+        shape: Shape,
         cell_m: [f64; 2],
         outer_m: f64,
     ) -> Self {
-        let torus = [rows, cols].map(|n| smooth_length(2 * n));
+        let torus = match shape.profiles {
+            true => {
+                let enough = (TORUS_RANGES * covariance.stationary(outer_m).range_m() / cell_m[0]).min(CELLS_ALONG_MAX);
+                [1, smooth_length((2 * shape.cols).max(enough as usize))]
+            }
+            false => [shape.rows, shape.cols].map(|n| smooth_length(2 * n)),
+        };
         let fft = RealFft2::new(torus[0], torus[1]);
         let mut spectrum = match smoothnesses(covariance) {
-            Some(nu) if reaches_across(covariance, torus, cell_m) => {
+            Some(nu) if !shape.profiles && reaches_across(covariance, torus, cell_m) => {
                 from_density(&covariance.stationary(outer_m), &nu, torus, cell_m)
             }
-            _ => fft.forward(&torus_covariance(torus, cell_m, covariance)),
+            _ => fft.forward(&torus_covariance(torus, cell_m, &covariance.stationary(outer_m))),
         };
         if measurement.inner_scale_m > 0.0 {
             blur(&mut spectrum, cell_m, measurement.inner_scale_m);
@@ -46,18 +60,30 @@ impl Simulator {
         let noise_m2 = measurement.noise_sigma_m * measurement.noise_sigma_m;
         let cells = (torus[0] * torus[1]) as f64;
         let amplitude = spectrum.values.iter().map(|s| ((s.re + noise_m2).max(0.0) * cells).sqrt()).collect();
-        Self { rows, cols, fft, torus, amplitude }
+        Self { shape, fft, torus, amplitude }
     }
 
     /// One surface, row-major, m.
     pub fn surface(&self, streams: &Streams) -> Vec<f64> {
-        let [rows, cols] = self.torus;
-        let spectrum = random_spectrum(self.torus, |kx, ky| self.amplitude[kx * rows + ky], Phase::Gaussian, streams);
-        let field = self.fft.inverse(spectrum);
-        (0..self.rows).flat_map(|r| field[r * cols..r * cols + self.cols].iter().copied()).collect()
+        let Shape { rows, cols, profiles } = self.shape;
+        if profiles {
+            let profile = |k: usize| self.field(&streams.child(&format!("profile-{k}")));
+            return (0..rows).flat_map(|k| profile(k).into_iter().take(cols)).collect();
+        }
+        let field = self.field(streams);
+        (0..rows).flat_map(|r| field[r * self.torus[1]..][..cols].iter().copied()).collect()
+    }
+
+    /// A field on the torus.
+    fn field(&self, streams: &Streams) -> Vec<f64> {
+        let rows = self.torus[0];
+        let amplitude = |kx: usize, ky: usize| self.amplitude[kx * rows + ky];
+        self.fft.inverse(random_spectrum(self.torus, amplitude, Phase::Gaussian, streams))
     }
 }
 
+/// Most cells of the torus of a transect.
+const CELLS_ALONG_MAX: f64 = 1e6;
 /// A torus this many ranges wide holds a covariance with a kink at lag zero.
 const TORUS_RANGES: f64 = 16.0;
 

@@ -2,11 +2,12 @@
 
 use super::case::Case;
 use super::estimator::{Estimate, Estimator};
+use super::heights::Heights;
 use super::params::FitSettings;
 use super::resampling::{Block, Replicates, two_sided_p, upper_p};
 use crate::covariance::bins::Layout;
 use crate::covariance::form::Role;
-use sastrugi_numeric::{Grid, sums};
+use sastrugi_numeric::sums;
 use sastrugi_schemas::fit::Candidate;
 use sastrugi_statistics::normal;
 use serde_json::{Value, json};
@@ -22,12 +23,12 @@ pub struct AtWindow {
 }
 
 /// Fits of the same form at half and at twice the outer scale, where the DEM allows them.
-pub fn other_windows(dem: &Grid, settings: &FitSettings, estimate: &Estimate) -> Vec<AtWindow> {
+pub fn other_windows(dem: &dyn Heights, settings: &FitSettings, estimate: &Estimate) -> Vec<AtWindow> {
     let scales = [0.5, 2.0].map(|factor| factor * settings.outer_scale_m());
     scales.into_iter().filter_map(|outer_scale_m| at_window(dem, settings, estimate, outer_scale_m)).collect()
 }
 
-fn at_window(dem: &Grid, settings: &FitSettings, estimate: &Estimate, outer_scale_m: f64) -> Option<AtWindow> {
+fn at_window(dem: &dyn Heights, settings: &FitSettings, estimate: &Estimate, outer_scale_m: f64) -> Option<AtWindow> {
     let there = settings.at_outer_scale(outer_scale_m);
     let case = Case::new(dem, &there).ok()?;
     let layout = if estimate.form.is_anisotropic() { Layout::DIRECTIONAL } else { Layout::ISOTROPIC };
@@ -72,7 +73,7 @@ pub fn isotropy(estimator: &Estimator, estimate: &Estimate) -> Option<Isotropy> 
     let start = case.coordinates(&form).encode(&round.covariance);
     let likelihood = round.likelihood.clone()?;
     let from = Estimate { form: form.clone(), at: start, likelihood: Some(likelihood.clone()), ..round.clone() };
-    let long = estimator.refit(&from, &bins.covariance_m2, case.trimmed.threshold_m);
+    let long = estimator.refit(&from, &bins.covariance_m2, case.survey.trim.threshold_m);
     let freedom = bins.len().saturating_sub(long.at.len()).max(1) as f64;
     let rise = (likelihood.chi2 - long.value).max(0.0) / (long.value / freedom).max(1.0);
     let covariance = case.coordinates(&form).decode(&long.at);
@@ -90,11 +91,11 @@ pub fn stationarity(estimator: &Estimator, estimate: &Estimate, blocks: &[Block]
     if blocks.len() < 2 {
         return None;
     }
-    let threshold_m = estimator.case.trimmed.threshold_m;
+    let threshold_m = estimator.case.survey.trim.threshold_m;
     let variance_of_one = estimator.expectation.covariance(&estimate.covariance, threshold_m).first().copied()?
-        * estimator.case.trimmed.kept as f64;
-    let variances: Vec<f64> = blocks.iter().map(|b| b.sums[0].0 / b.sums[0].1 as f64).collect();
-    let cells: Vec<f64> = blocks.iter().map(|b| b.sums[0].1 as f64).collect();
+        * estimator.case.survey.kept as f64;
+    let variances: Vec<f64> = blocks.iter().map(Block::variance_m2).collect();
+    let cells: Vec<f64> = blocks.iter().map(|b| b.cells as f64).collect();
     let total: f64 = sums::sum(&cells);
     let mean = variances.iter().zip(&cells).map(|(v, n)| v * n).sum::<f64>() / total;
     let chi2: f64 = variances.iter().zip(&cells).map(|(v, n)| (v - mean) * (v - mean) * n / variance_of_one).sum();
@@ -121,7 +122,7 @@ pub fn misfit_p(estimate: &Estimate, replicates: Option<&Replicates>) -> Option<
 
 /// p-value of the residual's shape: its median size over the trimming threshold, against normal surfaces.
 pub fn normality_p(case: &Case, replicates: &Replicates) -> f64 {
-    two_sided_p(case.trimmed.median_size_m / case.trimmed.threshold_m, &replicates.median_over_threshold)
+    two_sided_p(case.survey.trim.median_size_m / case.survey.trim.threshold_m, &replicates.median_over_threshold)
 }
 
 /// Every model tried, the best first.

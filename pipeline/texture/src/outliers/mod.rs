@@ -9,9 +9,10 @@
 //!
 //! On normal data 6e-7 of the cells pass the first bound, so a surface without objects is left as it is.
 //!
-//! Cost: a moving average and a selection per round; rounds end when nothing changes, at most `ROUNDS`.
+//! Cost: a moving average and a count per round; rounds end when nothing changes, at most `ROUNDS`.
 
 use crate::detrend::{BoxWindow, box_mean};
+use crate::sizes::Sizes;
 
 /// Robust standard deviations beyond which a cell is an outlier by itself.
 pub const SEED_SCALES: f64 = 5.0;
@@ -41,17 +42,10 @@ fn judge(values: &[f64], outlier: &[bool], cols: usize, window: BoxWindow) -> Ve
     let trusted: Vec<f64> = values.iter().zip(outlier).map(|(&v, &out)| if out { f64::NAN } else { v }).collect();
     let background = box_mean(&trusted, cols, window).mean;
     let deviation: Vec<f64> = values.iter().zip(&background).map(|(v, b)| (v - b).abs()).collect();
-    let scale = NORMAL_CONSISTENCY * median_of_data(&deviation);
+    let scale = NORMAL_CONSISTENCY * Sizes::of(&deviation).exceeded_by(0.5);
     let seeds = deviation.iter().map(|d| *d > SEED_SCALES * scale).collect();
     let grown = grow(seeds, cols, |k| deviation[k] > GROWTH_SCALES * scale);
     with_margin(&grown, values, cols)
-}
-
-/// Median of the values that are data; 0 when there is none.
-fn median_of_data(values: &[f64]) -> f64 {
-    let mut data: Vec<f64> = values.iter().copied().filter(|v| !v.is_nan()).collect();
-    let middle = data.len() / 2;
-    if data.is_empty() { 0.0 } else { *data.select_nth_unstable_by(middle, f64::total_cmp).1 }
 }
 
 /// Flood fill from the marked cells to neighbours (eight) that are `joined`.

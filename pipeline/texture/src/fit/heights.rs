@@ -1,0 +1,77 @@
+//! Where heights come from: a raster in memory or one that is read in parts.
+
+use super::FitError;
+use sastrugi_numeric::{Geometry, Grid};
+use std::ops::Range;
+
+/// Heights that are read in parts, so that a raster need not fit into memory.
+pub trait Heights: Sync {
+    /// Shape and place; cells in m.
+    fn geometry(&self) -> Geometry;
+
+    /// Heights in m of some rows and columns, row-major; not finite where there is no data.
+    ///
+    /// # Errors
+    /// What keeps the part from being read, as a sentence.
+    fn part(&self, rows: Range<usize>, cols: Range<usize>) -> Result<Vec<f64>, String>;
+
+    /// True when each row is a transect of its own, and neighbouring rows are no neighbours.
+    fn are_profiles(&self) -> bool {
+        false
+    }
+}
+
+impl Heights for Grid {
+    fn geometry(&self) -> Geometry {
+        self.geometry
+    }
+
+    fn part(&self, rows: Range<usize>, cols: Range<usize>) -> Result<Vec<f64>, String> {
+        Ok(rows.flat_map(|r| self.row(r)[cols.clone()].iter().copied()).collect())
+    }
+}
+
+/// Transects with the same spacing.
+#[derive(Clone, Debug)]
+pub struct Profiles {
+    /// One transect in each row; NaN where there is no height.
+    grid: Grid,
+}
+
+impl Profiles {
+    /// Transects of heights in m every `spacing_m`; shorter ones are taken to lack data at their end.
+    ///
+    /// # Errors
+    /// No transect with a height.
+    pub fn new(spacing_m: f64, heights_m: &[Vec<f64>]) -> Result<Self, FitError> {
+        let cols = heights_m.iter().map(Vec::len).max().unwrap_or(0);
+        if cols == 0 {
+            return Err(FitError::NoData { cells: 0 });
+        }
+        let mut values = Vec::with_capacity(cols * heights_m.len());
+        for profile in heights_m {
+            values.extend_from_slice(profile);
+            values.resize(values.len() + cols - profile.len(), f64::NAN);
+        }
+        Ok(Self::of(Grid::new(Geometry::square(heights_m.len(), cols, spacing_m), values)))
+    }
+
+    /// The rows of a grid.
+    pub(super) fn of(grid: Grid) -> Self {
+        Self { grid }
+    }
+}
+
+impl Heights for Profiles {
+    fn geometry(&self) -> Geometry {
+        self.grid.geometry
+    }
+
+    fn part(&self, rows: Range<usize>, cols: Range<usize>) -> Result<Vec<f64>, String> {
+        self.grid.part(rows, cols)
+    }
+
+    fn are_profiles(&self) -> bool {
+        true
+    }
+}
