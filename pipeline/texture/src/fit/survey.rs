@@ -18,7 +18,7 @@ use sastrugi_statistics::normal;
 use std::ops::Range;
 
 /// Cells of a strip.
-const STRIP_CELLS: usize = 1 << 21;
+const STRIP_CELLS: usize = 1 << 19;
 
 /// A DEM detrended, trimmed and correlated.
 #[derive(Clone, Debug)]
