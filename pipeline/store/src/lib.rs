@@ -1,8 +1,9 @@
-//! Files: DEM formats, point clouds, atomic writes, Parquet tables, MCAP recordings, and the release folder with its
+//! Files: DEM formats, point clouds, masks, atomic writes, Parquet tables, MCAP recordings, and the release folder with its
 //! checksums.
 //!
 //! The only room that names `arrow`, `parquet`, `mcap`, `foxglove`, `prost`, `geotiff-*`, `tiff`, `png` and `las`. Nothing
-//! here computes: heights, rows and recordings come in and go out as they are. Only point clouds are gridded ([`points`]).
+//! here computes: heights, rows and recordings come in and go out as they are. Only point clouds are gridded
+//! ([`points`]) and polygons made masks ([`mask`]).
 //!
 //! * Same input, same bytes, on any x86-64 CPU and for any number of threads.
 //! * A file appears under its name only when it is complete and on disk ([`atomic`]).
@@ -11,6 +12,7 @@
 pub mod atomic;
 pub mod dem;
 pub mod digest;
+pub mod mask;
 pub mod mcap;
 pub mod parquet;
 pub mod points;

@@ -18,6 +18,8 @@ const MAX_EXPANSION: u64 = 1 << 15;
 /// Raster bytes allowed for any file.
 const FREE_BYTES: u64 = 1 << 26;
 const RASTER_PIXEL_IS_POINT: u16 = 2;
+/// Note on a raster that says neither where it lies nor how large its cells are.
+pub(super) const NO_CELL_SIZE: &str = "the file states no cell size; 1 m is assumed";
 const SAMPLE_FORMATS_COMPLEX: [u16; 2] = [5, 6];
 const PHOTOMETRIC_PALETTE: u16 = 3;
 
@@ -156,7 +158,7 @@ fn place(file: &GeoTiffFile, options: &ReadOptions, notes: &mut Vec<String>) -> 
 /// Geometry of a raster that does not say where it lies.
 pub(super) fn unplaced(rows: usize, cols: usize, options: &ReadOptions, notes: &mut Vec<String>) -> Geometry {
     let cell = options.cell_m.unwrap_or_else(|| {
-        notes.push("the file states no cell size; 1 m is assumed".to_owned());
+        notes.push(NO_CELL_SIZE.to_owned());
         [1.0; 2]
     });
     Geometry { rows, cols, cell, origin: [0.0; 2] }

@@ -63,6 +63,13 @@ pub struct DemInfo {
     pub notes: Vec<String>,
 }
 
+impl DemInfo {
+    /// False for a raster that was read without a cell size and states none: then its place is unknown as well.
+    pub(crate) fn placed(&self) -> bool {
+        !self.notes.iter().any(|note| note == geotiff::NO_CELL_SIZE)
+    }
+}
+
 /// Raster formats.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
