@@ -66,7 +66,7 @@ pub struct Trim {
 }
 
 /// The DEM a fit was made from.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Source {
     /// File name without its folder.
     pub file: String,
@@ -74,6 +74,23 @@ pub struct Source {
     pub sha256: String,
     /// Window of the DEM `[x0, y0, x1, y1]` in its own coordinates, when one was asked for.
     pub window: Option<[f64; 4]>,
+    /// Files that said which cells take part.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub masks: Vec<MaskSource>,
+    /// Share of the window's cells with data that the masks dropped.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub masked_share: Option<f64>,
+}
+
+/// A mask of a fit.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct MaskSource {
+    /// File name without its folder.
+    pub file: String,
+    /// SHA-256 of the file.
+    pub sha256: String,
+    /// True when what it marks was dropped, false when the rest was.
+    pub excludes: bool,
 }
 
 /// Intervals of a fit's parameters.

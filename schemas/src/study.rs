@@ -66,9 +66,19 @@ pub struct DemItem {
     /// Part to use, `[x0, y0, x1, y1]` in the DEM's own coordinates (m, or degrees for a geographic raster).
     #[serde(default)]
     pub window: Option<[f64; 4]>,
-    /// Cell size east-west and north-south, m, for files that carry none (.npy).
+    /// Cell size east-west and north-south, m, for files that carry none (.npy) and for point clouds, whose cells are square.
     #[serde(default)]
     pub cell_m: Option<[f64; 2]>,
+    /// Height of a cell of a point cloud (.las, .laz): `mean` of its points (default), `median`, `min`, `max`, or `p90` for
+    /// the 90th percentile.
+    #[serde(default)]
+    pub statistic: Option<String>,
+    /// Fill the gaps of a point cloud up to this many cells from its points; none are filled when absent.
+    #[serde(default)]
+    pub fill_cells: Option<u32>,
+    /// Take only the ground points (class 2) of a point cloud.
+    #[serde(default)]
+    pub ground_only: Option<bool>,
     /// Licence of the data.
     #[serde(default)]
     pub license: Option<String>,
@@ -110,12 +120,45 @@ pub struct FitItem {
     pub id: String,
     /// Id of the DEM to fit.
     pub dem: String,
+    /// Mask, or list of masks: files, relative to the study file, of the cells that take part; with several, those that all
+    /// of them mark. GeoJSON with polygons in the DEM's own coordinates, or a raster that is not 0 there.
+    #[serde(default)]
+    pub mask: Files,
+    /// As `mask`, for cells that take no part.
+    #[serde(default)]
+    pub exclude: Files,
     /// Seed of the replicates' random streams; follows from the study's seed and the id when absent.
     #[serde(default)]
     pub seed: Option<u64>,
     /// One fit per value of a parameter: `sweep.<parameter> = [...]`.
     #[serde(default)]
     pub sweep: BTreeMap<String, Vec<serde_json::Value>>,
+}
+
+/// No file, one, or several.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged, expecting = "expected a file name or a list of file names")]
+pub enum Files {
+    /// One file.
+    One(String),
+    /// A list.
+    List(Vec<String>),
+}
+
+impl Default for Files {
+    fn default() -> Self {
+        Self::List(Vec::new())
+    }
+}
+
+impl Files {
+    /// The names, each with its position in the list when there is a list.
+    pub fn numbered(&self) -> Vec<(Option<usize>, &str)> {
+        match self {
+            Self::One(file) => vec![(None, file)],
+            Self::List(files) => files.iter().enumerate().map(|(k, file)| (Some(k), file.as_str())).collect(),
+        }
+    }
 }
 
 /// `[[texture]]` around a synthesis method's parameters.

@@ -160,6 +160,75 @@ fn val_rasters_that_cannot_be_fitted_say_why() {
     refused(path, &["texture", "not.json", "-o", "t.tif"], INPUT, &["no fit file"]);
 }
 
+#[test]
+fn val_bad_masks_are_input_errors() {
+    let folder = area();
+    let path = folder.path();
+    std::fs::copy(sastrugi_fixtures::jacksboro(), path.join("site.tif")).unwrap();
+    write(path, "point.geojson", "{\"type\": \"Point\", \"coordinates\": [1, 2]}");
+    write(path, "broken.geojson", "{\"type\": \"Polygon\", \"coord");
+    let square = |low: i32, high: i32| {
+        let ring = format!("[{low}, {low}], [{high}, {low}], [{high}, {high}], [{low}, {high}], [{low}, {low}]");
+        format!("{{\"type\": \"Polygon\", \"coordinates\": [[{ring}]]}}")
+    };
+    write(path, "metres.geojson", &square(1000, 2000));
+    write(path, "all.geojson", &square(-100, 100));
+    write(path, "words.txt", "all but the trees");
+    let fit = |option: &str, mask: &str, words: &[&str]| {
+        let arguments = ["fit", "site.tif", "--outer-scale", "4000", option, mask, "-o", "fit.json"];
+        refused(path, &arguments, INPUT, words);
+        let stderr = sastrugi_in(path, &arguments).stderr;
+        assert_eq!(stderr.lines().count(), 1, "one sentence: {stderr}");
+    };
+    fit("--mask", "nothing.geojson", &["nothing.geojson", "no such file"]);
+    fit("--mask", "point.geojson", &["point.geojson", "holds a Point"]);
+    fit("--mask", "broken.geojson", &["broken.geojson", "no GeoJSON"]);
+    fit("--mask", "metres.geojson", &["metres.geojson", "none of the DEM's cells", "coordinates"]);
+    fit("--exclude", "all.geojson", &["all.geojson", "none of the DEM's cells"]);
+    fit("--mask", "words.txt", &["words.txt", "no raster"]);
+    // What the mask keeps lies outside of the window.
+    let ring = "[-84.6, 36.4], [-84.3, 36.4], [-84.3, 36.7], [-84.6, 36.7], [-84.6, 36.4]";
+    write(path, "west.geojson", &format!("{{\"type\": \"Polygon\", \"coordinates\": [[{ring}]]}}"));
+    let arguments = ["fit", "site.tif", "--window", "-84.25,36.46,-84.20,36.66", "--mask", "west.geojson"];
+    refused(path, &[&arguments[..], &["-o", "fit.json"]].concat(), INPUT, &["masks leave no cell"]);
+    let study = |mask: &str| {
+        format!(
+            "[study]\nname = \"x\"\nseed = 1\ndate = \"2026-01-01\"\n[[dem]]\nid = \"a\"\nfile = \"site.tif\"\n\
+             [[fit]]\nid = \"f\"\ndem = \"a\"\nouter_scale_m = 4000.0\nbootstrap = 0\nmask = {mask}\n"
+        )
+    };
+    write(path, "study.toml", &study("\"nothing.geojson\""));
+    refused(path, &["run", "study.toml"], INPUT, &["nothing.geojson", "no such file"]);
+    write(path, "study.toml", &study("7"));
+    refused(path, &["run", "study.toml"], USAGE, &["mask", "a file name or a list of file names"]);
+    write(path, "study.toml", &study("\"metres.geojson\""));
+    let call = sastrugi_in(path, &["run", "study.toml", "-o", "release", "--quiet"]);
+    assert!(call.code == 3 && call.stderr.contains("mask/f-1.geojson: keeps none"), "{}", call.stderr);
+}
+
+#[test]
+fn val_settings_of_point_clouds_are_refused_elsewhere() {
+    let folder = area();
+    let path = folder.path();
+    std::fs::copy(sastrugi_fixtures::jacksboro(), path.join("site.tif")).unwrap();
+    let words = ["site.tif", "is no point cloud"];
+    for more in [&["--statistic", "median"][..], &["--fill", "2"], &["--ground"]] {
+        refused(path, &[&["fit", "site.tif", "-o", "fit.json"], more].concat(), USAGE, &words);
+        refused(path, &[&["convert", "site.tif", "b.tif"], more].concat(), USAGE, &words);
+    }
+    refused(path, &["convert", "site.tif", "b.tif", "--statistic", "p101"], USAGE, &["p101", "p0 to p100"]);
+    let study = "[study]\nname = \"x\"\nseed = 1\ndate = \"2026-01-01\"\n[[dem]]\nid = \"a\"\nfile = \"site.tif\"\n";
+    write(path, "study.toml", &format!("{study}statistic = \"mode\"\n"));
+    refused(path, &["run", "study.toml"], USAGE, &["statistic", "mode", "median"]);
+    let mut cloud = b"LASF".to_vec();
+    cloud.resize(400, 0);
+    std::fs::write(path.join("cloud.laz"), cloud).unwrap();
+    for verb in ["fit", "roughness", "info"] {
+        let output = if verb == "fit" { &["-o", "fit.json"][..] } else { &[] };
+        refused(path, &[&[verb, "cloud.laz"], output].concat(), INPUT, &["cloud.laz"]);
+    }
+}
+
 /// Items that cannot succeed are reported with their parameters; the others go on, and the release is sealed.
 #[test]
 fn val_a_failed_item_costs_itself_only() {

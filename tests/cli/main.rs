@@ -3,4 +3,5 @@
 #![allow(clippy::unwrap_used, reason = "a test may end where it stands")]
 
 mod bad_input;
+mod sources;
 mod verbs;

@@ -2,6 +2,7 @@
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
+use sastrugi_store::points::Statistic;
 use std::path::{Path, PathBuf};
 
 /// Rough-terrain datasets that can be reproduced bit for bit, and the statistics to compare them.
@@ -57,7 +58,9 @@ pub enum Verb {
     Terrain(Terrain),
     /// Fit the covariance of a measured DEM.
     #[command(after_help = "Examples:\n  sastrugi fit snow.tif --outer-scale 2 -o fit.json\n  \
-        sastrugi fit snow.tif --outer-scale 2 --model auto --bootstrap 199 -o fit.json")]
+        sastrugi fit snow.tif --outer-scale 2 --model auto --bootstrap 199 -o fit.json\n  \
+        sastrugi fit snow.tif --outer-scale 2 --mask plot.geojson --exclude trees.geojson -o fit.json\n  \
+        sastrugi fit scan.laz --cell 0.05 --statistic median --outer-scale 2 -o fit.json")]
     Fit(Fit),
     /// Synthesise a texture that matches a fit.
     #[command(
@@ -74,8 +77,10 @@ pub enum Verb {
     /// Write the report of a release: one offline HTML page, figures as SVG, numbers as JSON.
     #[command(after_help = "Example:\n  sastrugi report release -o release-report")]
     Report(Report),
-    /// Convert between DEM formats, by file name ending (.tif .asc .hgt .png .npy .obj).
-    #[command(after_help = "Example:\n  sastrugi convert N44W072.hgt tile.tif")]
+    /// Convert between DEM formats, by file name ending (.tif .asc .hgt .png .npy .obj), and grid point clouds (.las .laz).
+    #[command(
+        after_help = "Examples:\n  sastrugi convert N44W072.hgt tile.tif\n  sastrugi convert scan.laz scan.tif --cell 0.05 --fill 2"
+    )]
     Convert(Convert),
     /// Say what a file or a release is.
     #[command(after_help = "Example:\n  sastrugi info terrain.tif")]
@@ -197,6 +202,44 @@ pub struct Terrain {
     pub compress: Compress,
 }
 
+/// How a DEM is read.
+#[derive(Debug, Args)]
+pub struct Reading {
+    /// Cell size for files that carry none and for point clouds, m: one number, or east-west,north-south.
+    #[arg(long, value_name = "M", allow_hyphen_values = true)]
+    pub cell: Option<String>,
+    /// Height of a cell of a point cloud (.las, .laz): the mean of its points, the median, the lowest, the highest, or
+    /// the N-th percentile.
+    #[arg(long, value_name = "mean|median|min|max|pN", default_value = "mean")]
+    pub statistic: Statistic,
+    /// Fill the gaps of a point cloud up to this many cells from its points.
+    #[arg(long, value_name = "CELLS", default_value_t = 0)]
+    pub fill: u32,
+    /// Take only the ground points (class 2) of a point cloud.
+    #[arg(long)]
+    pub ground: bool,
+}
+
+/// Which cells of a DEM take part.
+#[derive(Debug, Args)]
+pub struct Masks {
+    /// Take only the cells that this file marks: GeoJSON polygons in the DEM's coordinates, or a raster that is not 0
+    /// there. Several times: the cells that all of them mark.
+    #[arg(long, value_name = "FILE")]
+    pub mask: Vec<PathBuf>,
+    /// Leave out the cells that this file marks. May be given several times.
+    #[arg(long, value_name = "FILE")]
+    pub exclude: Vec<PathBuf>,
+}
+
+impl Masks {
+    /// Every file, with `true` for those that exclude.
+    pub fn all(&self) -> Vec<(PathBuf, bool)> {
+        let of = |files: &[PathBuf], excludes: bool| files.iter().map(|f| (f.clone(), excludes)).collect::<Vec<_>>();
+        [of(&self.mask, false), of(&self.exclude, true)].concat()
+    }
+}
+
 /// `fit`.
 #[derive(Debug, Args)]
 pub struct Fit {
@@ -232,9 +275,12 @@ pub struct Fit {
     /// Part of the DEM, x0,y0,x1,y1 in its own coordinates.
     #[arg(long, value_name = "X0,Y0,X1,Y1", allow_hyphen_values = true)]
     pub window: Option<String>,
-    /// Cell size for files that carry none, m: one number, or east-west,north-south.
-    #[arg(long, value_name = "M", allow_hyphen_values = true)]
-    pub cell: Option<String>,
+    /// Which cells.
+    #[command(flatten)]
+    pub masks: Masks,
+    /// How the DEM is read.
+    #[command(flatten)]
+    pub reading: Reading,
     /// Any other parameter of the fit (see `kinds fit`), `name=value`.
     #[arg(long = "set", value_name = "K=V")]
     pub set: Vec<String>,
@@ -285,9 +331,9 @@ pub struct Roughness {
     /// Any setting of `[roughness]` (see `schema`), `name=value`.
     #[arg(long = "set", value_name = "K=V")]
     pub set: Vec<String>,
-    /// Cell size for files that carry none, m: one number, or east-west,north-south.
-    #[arg(long, value_name = "M", allow_hyphen_values = true)]
-    pub cell: Option<String>,
+    /// How the DEM is read.
+    #[command(flatten)]
+    pub reading: Reading,
 }
 
 /// `traverse`.
@@ -335,9 +381,15 @@ pub struct Convert {
     pub input: PathBuf,
     /// DEM to write.
     pub output: PathBuf,
-    /// Cell size for files that carry none, m: one number, or east-west,north-south.
-    #[arg(long, value_name = "M", allow_hyphen_values = true)]
-    pub cell: Option<String>,
+    /// Part of the DEM, x0,y0,x1,y1 in its own coordinates.
+    #[arg(long, value_name = "X0,Y0,X1,Y1", allow_hyphen_values = true)]
+    pub window: Option<String>,
+    /// Which cells; the others are written without data.
+    #[command(flatten)]
+    pub masks: Masks,
+    /// How the DEM is read.
+    #[command(flatten)]
+    pub reading: Reading,
     /// Compression of a GeoTIFF.
     #[arg(long, value_enum, default_value_t)]
     pub compress: Compress,
@@ -348,9 +400,9 @@ pub struct Convert {
 pub struct Info {
     /// DEM, fit file, MCAP recording, table, or release folder.
     pub path: PathBuf,
-    /// Cell size for files that carry none, m: one number, or east-west,north-south.
-    #[arg(long, value_name = "M", allow_hyphen_values = true)]
-    pub cell: Option<String>,
+    /// How a DEM is read.
+    #[command(flatten)]
+    pub reading: Reading,
 }
 
 /// `kinds`.

@@ -167,8 +167,8 @@ pub struct Builder<'a> {
 /// An input file and its place in the release.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct InputPlace {
-    /// Position of the item in `[[dem]]`.
-    pub index: usize,
+    /// Path of the key that names it in the study.
+    pub key: Vec<String>,
     /// Path in the release.
     pub release_path: String,
 }
@@ -236,8 +236,13 @@ impl Builder<'_> {
         let input = self.graph.find(&field.item).and_then(|p| self.graph.node(p).inputs.first());
         let window = field.parameters.get("window").and_then(|w| serde_json::from_value(w.clone()).ok());
         match input {
-            Some(input) => Source { file: format!("{id}.{}", field.kind), sha256: input.sha256.clone(), window },
-            None => Source { file: field.release_path.clone(), sha256: String::new(), window: None },
+            Some(input) => Source {
+                file: format!("{id}.{}", field.kind),
+                sha256: input.sha256.clone(),
+                window,
+                ..Source::default()
+            },
+            None => Source { file: field.release_path.clone(), ..Source::default() },
         }
     }
 

@@ -1,7 +1,7 @@
 //! What a command does with a whole study: run, plan, merge. What it does with a release is in [`crate::verification`].
 
 use crate::error::{Error, of_build};
-use crate::jobs::{ItemRef, original};
+use crate::jobs::{ItemRef, mask, original};
 use crate::registry::{self, Plan};
 use crate::runner::assemble::{Contents, assemble};
 use crate::runner::cache::Cache;
@@ -65,7 +65,7 @@ pub fn load_text(text: &str, name: &str, folder: &Path) -> Result<Loaded, Error>
 fn released_text(text: &str, study: &Study, plan: &Plan) -> String {
     let mut places: Vec<(Range<usize>, String)> = Vec::new();
     for place in &plan.inputs {
-        if let Some(span) = study.span_of(&["dem", &place.index.to_string(), "file"]) {
+        if let Some(span) = study.span_of(&place.key) {
             places.push((span, toml_edit::Value::from(place.release_path.as_str()).to_string()));
         }
     }
@@ -122,8 +122,9 @@ pub fn run(loaded: &Loaded, request: &RunRequest<'_>, progress: &dyn Progress) -
     let needed = graph.closure(chosen);
     let execution = execute(graph, &cache, &needed, request.limits, progress);
     write_timings(&cache, &execution)?;
-    // Originals are only copied: with nothing else there is no release to make.
-    let made = execution.done.iter().any(|&p| graph.node(p).item.stage != original::STAGE);
+    // Files are only copied: with nothing else there is no release to make.
+    let copies = [original::STAGE, mask::STAGE];
+    let made = execution.done.iter().any(|&p| !copies.contains(&graph.node(p).item.stage.as_str()));
     if !made && !execution.failures.is_empty() {
         return Err(all_failed(&execution.failures));
     }

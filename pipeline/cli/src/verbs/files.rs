@@ -1,12 +1,12 @@
 //! Verbs on single files of any kind.
 
-use super::{cell, options};
+use super::{options, reading};
 use crate::Verdict;
-use crate::args::{Common, Convert, Info};
+use crate::args::{self, Common, Convert, Info};
 use crate::failure::{Code, Failure};
 use crate::output::{columns, print};
-use sastrugi_stages::verbs::describe_grid;
-use sastrugi_store::dem::{self, DemError, ReadOptions};
+use sastrugi_stages::verbs::{Read, Reading, describe_grid, numbers, read_as_it_is};
+use sastrugi_store::dem::{self, Dem, DemError};
 use sastrugi_store::release::Release;
 use serde_json::{Value, json};
 use std::path::Path;
@@ -26,12 +26,15 @@ pub fn convert(args: &Convert, common: &Common) -> Verdict {
         let message = format!("{path}: the ending names no DEM format; .tif, .asc, .hgt, .png, .npy and .obj do");
         return Err(Failure::usage(message));
     }
-    let read = dem::read_with(&args.input, &ReadOptions { cell_m: cell(args.cell.as_deref())? }).map_err(failure)?;
-    let lost = dem::write(&args.output, &read.grid, &read.info.crs, &options(args.compress)).map_err(failure)?;
-    let notes: Vec<&String> = read.info.notes.iter().chain(&lost).collect();
-    let mut text = format!("{}: {} x {} cells", args.output.display(), read.grid.rows(), read.grid.cols());
+    let window = args.window.as_deref().map(|w| numbers::<4>("--window", w)).transpose()?;
+    let reading = Reading { window, masks: args.masks.all(), ..reading(&args.reading)? };
+    let Read { dem: Dem { grid, info }, masked_share, .. } = read_as_it_is(&args.input, &reading)?;
+    let lost = dem::write(&args.output, &grid, &info.crs, &options(args.compress)).map_err(failure)?;
+    let masked = masked_share.map(|share| format!("masks dropped {:.2} % of the cells with data", 100.0 * share));
+    let notes: Vec<&String> = info.notes.iter().chain(&masked).chain(&lost).collect();
+    let mut text = format!("{}: {} x {} cells", args.output.display(), grid.rows(), grid.cols());
     notes.iter().for_each(|note| text.push_str(&format!("\n  note: {note}")));
-    let result = json!({ "file": args.output, "grid": describe_grid(&read.grid), "notes": notes });
+    let result = json!({ "file": args.output, "grid": describe_grid(&grid), "notes": notes });
     print(common.json, &result, &text)?;
     Ok(Code::Done)
 }
@@ -44,7 +47,7 @@ pub fn info(args: &Info, common: &Common) -> Verdict {
         "mcap" => sastrugi_store::mcap::describe_file(&args.path).map_err(Failure::input)?,
         "parquet" => sastrugi_store::parquet::describe_file(&args.path).map_err(Failure::input)?,
         "json" => fit(&args.path)?,
-        _ => raster(&args.path, cell(args.cell.as_deref())?)?,
+        _ => raster(&args.path, &args.reading)?,
     };
     let rows: Vec<Vec<String>> =
         result.as_object().into_iter().flatten().map(|(key, value)| vec![key.clone(), plain(value)]).collect();
@@ -56,8 +59,8 @@ fn plain(value: &Value) -> String {
     value.as_str().map_or_else(|| value.to_string(), str::to_owned)
 }
 
-fn raster(path: &Path, cell_m: Option<[f64; 2]>) -> Result<Value, Failure> {
-    let read = dem::read_with(path, &ReadOptions { cell_m }).map_err(failure)?;
+fn raster(path: &Path, settings: &args::Reading) -> Result<Value, Failure> {
+    let read = read_as_it_is(path, &reading(settings)?)?.dem;
     let info = &read.info;
     let mut result = json!({
         "what": "elevation raster",

@@ -1,11 +1,11 @@
 //! Verbs that make or describe one file.
 
-use super::{cell, options};
+use super::{options, reading};
 use crate::Verdict;
 use crate::args::{Common, Fit, Roughness, Terrain, Texture};
 use crate::failure::{Code, Failure};
 use crate::output::{columns, print};
-use sastrugi_stages::verbs::{self, numbers, parameters};
+use sastrugi_stages::verbs::{self, Reading, numbers, parameters};
 use serde_json::{Value, json};
 
 /// `terrain`.
@@ -82,15 +82,9 @@ pub fn fit(args: &Fit, common: &Common) -> Verdict {
     put("noise_sigma_m", args.noise_sigma.map(|v| json!(v)));
     put("inner_scale_m", args.inner_scale.map(|v| json!(v)));
     let window = args.window.as_deref().map(|w| numbers::<4>("--window", w)).transpose()?;
-    let cell_m = cell(args.cell.as_deref())?;
-    let request = verbs::fit::Request {
-        dem: &args.dem,
-        output: &args.output,
-        parameters: params,
-        seed: args.seed,
-        window,
-        cell_m,
-    };
+    let reading = Reading { window, masks: args.masks.all(), ..reading(&args.reading)? };
+    let request =
+        verbs::fit::Request { dem: &args.dem, output: &args.output, parameters: params, seed: args.seed, reading };
     let (fit, read_notes) = verbs::fit::fit(&request)?;
     let interval = |name: &str| {
         let [low, high] = fit.intervals.as_ref()?.values.get(name)?;
@@ -113,9 +107,9 @@ pub fn fit(args: &Fit, common: &Common) -> Verdict {
 pub fn roughness(args: &Roughness, common: &Common) -> Verdict {
     let mut params = json!({});
     parameters::assign(&mut params, &args.set)?;
-    let cell_m = cell(args.cell.as_deref())?;
+    let reading = reading(&args.reading)?;
     let request =
-        verbs::roughness::Request { dem: &args.dem, parameters: params, classes: args.classes.as_deref(), cell_m };
+        verbs::roughness::Request { dem: &args.dem, parameters: params, classes: args.classes.as_deref(), reading };
     let (summary, read_notes) = verbs::roughness::roughness(&request)?;
     let h = &summary.heights;
     let percent = |share: f64| if share.is_nan() { "none".to_owned() } else { format!("{:.2} %", 100.0 * share) };

@@ -6,11 +6,12 @@ mod lists;
 mod study;
 
 use crate::Verdict;
-use crate::args::{Arguments, Compress, Verb};
+use crate::args::{self, Arguments, Compress, Verb};
 use crate::failure::Failure;
-use sastrugi_stages::verbs::numbers;
+use sastrugi_stages::verbs::{Reading, numbers};
 use sastrugi_store::atomic;
 use sastrugi_store::dem::{Compression, WriteOptions};
+use sastrugi_store::points::GridSettings;
 
 /// Does what was asked.
 pub fn dispatch(arguments: &Arguments) -> Verdict {
@@ -49,6 +50,13 @@ fn options(compress: Compress) -> WriteOptions {
         Compress::Zstd => Compression::Zstd,
     };
     WriteOptions { compression }
+}
+
+/// How a DEM is read.
+fn reading(args: &args::Reading) -> Result<Reading, Failure> {
+    let gridding =
+        GridSettings { cell_m: None, statistic: args.statistic, fill_cells: args.fill, ground_only: args.ground };
+    Ok(Reading { cell_m: cell(args.cell.as_deref())?, gridding, ..Reading::default() })
 }
 
 /// `--cell M` or `--cell X,Y`.

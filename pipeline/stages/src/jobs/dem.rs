@@ -5,10 +5,12 @@ use super::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work};
 use crate::registry::{BuildError, Builder, Heightfield, InputPlace};
 use crate::revision::Room;
 use crate::runner::graph::Node;
-use sastrugi_numeric::{Grid, resample};
+use sastrugi_numeric::{Geometry, Grid, resample};
 use sastrugi_schemas::study::DemItem;
 use sastrugi_store::dem::{self, Crs, Dem, ReadOptions};
-use sastrugi_store::digest;
+use sastrugi_store::points::GridSettings;
+use sastrugi_store::{atomic, digest};
+use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -16,6 +18,60 @@ use std::path::Path;
 pub const STAGE: &str = "dem";
 /// File of every heightfield item.
 pub const HEIGHTS: &str = "heights.tif";
+/// Where the heights of a measured DEM lie in its file, for masks; items of other stages have none.
+pub const PLACE: &str = "place.json";
+
+/// Where the cells of a window lie in the raster that they were cut from, in the raster's own coordinates.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Place {
+    /// Rows and columns of the whole raster.
+    shape: [usize; 2],
+    cell: [f64; 2],
+    origin: [f64; 2],
+    /// Row and column of the window's north-west cell.
+    corner: [usize; 2],
+    /// Rows and columns of the window.
+    size: [usize; 2],
+}
+
+impl Place {
+    /// The whole raster, or the window that was cut from it.
+    pub fn of(whole: &Geometry, window: &Geometry) -> Self {
+        // Both count in whole cells of one size.
+        let steps = |axis: usize| ((window.origin[axis] - whole.origin[axis]) / whole.cell[axis]).round() as usize;
+        Self {
+            shape: [whole.rows, whole.cols],
+            cell: whole.cell,
+            origin: whole.origin,
+            corner: [whole.rows - window.rows - steps(1), steps(0)],
+            size: [window.rows, window.cols],
+        }
+    }
+
+    /// The place that a measured DEM's item left at `path`; without one, the heights' own.
+    ///
+    /// # Errors
+    /// A file that cannot be read.
+    pub fn read(path: &Path, heights: &Geometry) -> Result<Self, JobError> {
+        if !path.is_file() {
+            return Ok(Self::of(heights, heights));
+        }
+        let bytes = std::fs::read(path).map_err(JobError::new)?;
+        serde_json::from_slice(&bytes).map_err(JobError::new)
+    }
+
+    /// Geometry of the whole raster.
+    pub fn whole(&self) -> Geometry {
+        let [rows, cols] = self.shape;
+        Geometry { rows, cols, cell: self.cell, origin: self.origin }
+    }
+
+    /// The window of what covers the whole raster.
+    pub fn part<T: Copy>(&self, whole: Grid<T>) -> Grid<T> {
+        let ([row, col], [rows, cols]) = (self.corner, self.size);
+        if self.size == self.shape { whole } else { whole.window(row, col, rows, cols) }
+    }
+}
 
 struct DemJob {
     item: DemItem,
@@ -30,14 +86,15 @@ struct DemJob {
 /// # Errors
 /// A wrong item, or a file that is not there.
 pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
-    for (index, entry) in builder.study.entries(STAGE)?.into_iter().enumerate() {
+    for entry in builder.study.entries(STAGE)? {
         let (item, params): (DemItem, Value) = entry.read()?;
         entry.check_keys::<DemItem>(&params, &json!({}))?;
         builder.claim(&entry, STAGE, &item.id)?;
         check(&item).map_err(|(key, message)| entry.error(key, format!("`{key}` {message}")))?;
         let id = item.id.clone();
-        let original = Original::of(&id, &builder.study.folder, &item.file)?;
-        builder.inputs.push(InputPlace { index, release_path: original.release_path().to_owned() });
+        let original = Original::of(&format!("dem/{id}"), &builder.study.folder, &item.file)?;
+        let key = entry.path_of("file");
+        builder.inputs.push(InputPlace { key, release_path: original.release_path().to_owned() });
         let field = Heightfield {
             item: ItemRef::new(STAGE, &id),
             group: item.group.clone(),
@@ -48,7 +105,7 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
             cells: original.bytes(),
         };
         let (bytes, release_path, inputs) = (original.bytes(), original.release_path().to_owned(), original.inputs());
-        let original = original.node(&id);
+        let original = original.node(original::STAGE, &id);
         let job = DemJob { item, original: original.item.clone(), release_path, bytes };
         let parents = vec![original.item.clone()];
         let node = Node { item: field.item.clone(), parents, inputs, stream: None, job: Box::new(job) };
@@ -69,6 +126,7 @@ fn check(item: &DemItem) -> Result<(), (&'static str, String)> {
             format!("is [{x0}, {y0}, {x1}, {y1}]; it is [x0, y0, x1, y1] with x0 < x1 and y0 < y1"),
         ));
     }
+    gridding(item).map_err(|message| ("statistic", message))?;
     match item.cell_m {
         Some(cell) if !cell.iter().all(|c| c.is_finite() && *c > 0.0) => {
             Err(("cell_m", format!("is {cell:?}; both sizes must be above 0")))
@@ -77,9 +135,24 @@ fn check(item: &DemItem) -> Result<(), (&'static str, String)> {
     }
 }
 
+/// How a point cloud becomes cells.
+fn gridding(item: &DemItem) -> Result<GridSettings, String> {
+    let statistic = item.statistic.as_deref().map(str::parse).transpose()?.unwrap_or_default();
+    let (fill_cells, ground_only) = (item.fill_cells.unwrap_or(0), item.ground_only.unwrap_or(false));
+    Ok(GridSettings { cell_m: None, statistic, fill_cells, ground_only })
+}
+
 /// What decides the result beside the original, whose item is a parent.
 fn recipe(item: &DemItem) -> Value {
-    json!({ "window": item.window, "cell_m": item.cell_m, "license": item.license, "attribution": item.attribution })
+    json!({
+        "window": item.window,
+        "cell_m": item.cell_m,
+        "statistic": item.statistic,
+        "fill_cells": item.fill_cells,
+        "ground_only": item.ground_only,
+        "license": item.license,
+        "attribution": item.attribution,
+    })
 }
 
 impl Job for DemJob {
@@ -105,24 +178,37 @@ impl Job for DemJob {
         // Messages are part of the release: they name the file as it is called there, wherever it lies now.
         let name_it =
             |e: JobError| JobError { message: e.message.replace(&copy.display().to_string(), &self.release_path), ..e };
-        let (metric, notes) = import(&copy, &self.item).map_err(name_it)?;
+        let Imported { metric, place, notes } = import(&copy, &self.item).map_err(name_it)?;
         dem::write(&work.output(HEIGHTS), &metric.grid, &metric.info.crs, &Default::default())
             .map_err(JobError::new)?;
         let content = digest::heights(&metric.grid);
         let path = format!("dem/{}.metric.tif", self.item.id);
-        let products = vec![Product::released(HEIGHTS, path, Some(content))];
+        let place = serde_json::to_vec(&place).map_err(JobError::new)?;
+        atomic::write(&work.output(PLACE), &place).map_err(JobError::new)?;
+        let products = vec![Product::released(HEIGHTS, path, Some(content)), Product::internal(PLACE)];
         Ok(Outcome { products, notes, ..Outcome::default() })
     }
 }
 
+/// A DEM in metres, with its place in its file.
+struct Imported {
+    metric: Dem,
+    place: Place,
+    notes: Vec<String>,
+}
+
 /// Reads a DEM as an item of a study asks for it: window cut, degrees turned into metres.
-fn import(path: &Path, item: &DemItem) -> Result<(Dem, Vec<String>), JobError> {
-    let read = dem::read_with(path, &ReadOptions { cell_m: item.cell_m }).map_err(|e| input_error(&e))?;
+fn import(path: &Path, item: &DemItem) -> Result<Imported, JobError> {
+    let gridding = gridding(item).map_err(JobError::new)?;
+    let options = ReadOptions { cell_m: item.cell_m };
+    let read = dem::read_gridded(path, &options, &gridding).map_err(|e| input_error(&e))?;
     let cut = match item.window {
         Some(window) => window_of(&read.grid, window)?,
         None => read.grid.clone(),
     };
-    Ok(to_metres(Dem { grid: cut, info: read.info }))
+    let place = Place::of(&read.grid.geometry, &cut.geometry);
+    let (metric, notes) = to_metres(Dem { grid: cut, info: read.info });
+    Ok(Imported { metric, place, notes })
 }
 
 /// The cells of a window in the DEM's own coordinates.

@@ -1,6 +1,7 @@
 //! Stage `fit`: the covariance of a measured DEM.
 
 use super::dem::{HEIGHTS, input_error};
+use super::mask::{self, Mask};
 use super::roughness::{height_rows, psd_rows};
 use super::{Estimate, ItemRef, Job, JobError, Outcome, Product, Rows, Work};
 use crate::registry::{BuildError, Builder, unknown_id};
@@ -41,6 +42,7 @@ struct FitJob {
     id: String,
     dem_id: String,
     dem: ItemRef,
+    masks: Vec<Mask>,
     source: Source,
     settings: FitSettings,
     streams: Streams,
@@ -58,7 +60,10 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
         let Some(field) = builder.heightfields.get(&item.dem).cloned() else {
             return Err(unknown_id(&entry, "dem", &item.dem, builder.heightfields.keys()).into());
         };
-        let source = builder.source_of(&item.dem, &field);
+        let masks = mask::add(builder, &entry, &item)?;
+        let mask_sources = masks.iter().map(|m| m.source.clone()).collect();
+        let source = Source { masks: mask_sources, ..builder.source_of(&item.dem, &field) };
+        let parents: Vec<ItemRef> = [&field.item].into_iter().chain(masks.iter().map(|m| &m.item)).cloned().collect();
         for one in entry.expand(&item.id, None, &item.sweep, &params)? {
             builder.claim(&entry, STAGE, &one.id)?;
             let raw: FitParameters = read_parameters(&one.params).map_err(|e| entry.refuse(e))?;
@@ -67,6 +72,7 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
                 id: one.id.clone(),
                 dem_id: item.dem.clone(),
                 dem: field.item.clone(),
+                masks: masks.clone(),
                 source: source.clone(),
                 settings,
                 streams: builder.streams(STAGE, &one.id, item.seed, 0),
@@ -74,7 +80,7 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
             };
             let node = Node {
                 item: ItemRef::new(STAGE, &one.id),
-                parents: vec![field.item.clone()],
+                parents: parents.clone(),
                 inputs: Vec::new(),
                 stream: Some(job.streams.label()),
                 job: Box::new(job),
@@ -108,10 +114,12 @@ impl Job for FitJob {
     }
 
     fn run(&self, work: &Work<'_>) -> Result<Outcome, JobError> {
-        let read = dem::read(&work.parent(&self.dem, HEIGHTS)?).map_err(|e| input_error(&e))?;
+        let mut read = dem::read(&work.parent(&self.dem, HEIGHTS)?).map_err(|e| input_error(&e))?;
+        let masked_share = mask::of_item(&mut read.grid, &self.dem, &self.masks, work)?;
         let outcome = sastrugi_texture::fit(&read.grid, &self.settings, &self.streams).map_err(JobError::new)?;
         let [background, residual] = outcome.rasters(&read.grid).map_err(JobError::new)?;
-        let fit = FitFile { source: Some(self.source.clone()), ..outcome.fit };
+        let source = Source { masked_share, ..self.source.clone() };
+        let fit = FitFile { source: Some(source), ..outcome.fit };
         atomic::write(&work.output(FIT), to_json(&fit)?.as_bytes()).map_err(JobError::new)?;
         let id = &self.id;
         let mut products = vec![Product::released(FIT, format!("fit/{id}.json"), None)];

@@ -2,6 +2,7 @@
 
 pub mod dem;
 pub mod fit;
+pub mod mask;
 pub mod missions;
 pub mod original;
 pub mod roughness;

@@ -1,6 +1,7 @@
 //! Stage `original`: the bytes of a measured file, taken into the release as they are.
 //!
-//! An item of its own, so that a release whose import failed still holds what it was made from.
+//! An item of its own, so that a release whose import failed still holds what it was made from. Masks are copied in the same
+//! way (stage `mask`).
 
 use super::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work};
 use crate::registry::{BuildError, input_file};
@@ -26,16 +27,16 @@ struct Copied {
 }
 
 impl Original {
-    /// The file of the item `id` in `folder`.
+    /// A file in `folder` with its place in the release, without its ending.
     ///
     /// # Errors
     /// A file that is missing or cannot be read.
-    pub fn of(id: &str, folder: &Path, file: &str) -> Result<Self, BuildError> {
+    pub fn of(place: &str, folder: &Path, file: &str) -> Result<Self, BuildError> {
         let path = folder.join(file);
         let extension = extension(file);
-        let mut files = vec![Copied::of(path.clone(), release_path(id, file, &extension))?];
+        let mut files = vec![Copied::of(path.clone(), release_path(place, file, &extension))?];
         if let Some(prj) = sidecar(&path, &extension) {
-            files.push(Copied::of(prj, format!("dem/{id}.prj"))?);
+            files.push(Copied::of(prj, format!("{place}.prj"))?);
         }
         Ok(Self { files })
     }
@@ -50,15 +51,20 @@ impl Original {
         &self.files[0].release_path
     }
 
+    /// SHA-256 of its bytes.
+    pub fn sha256(&self) -> &str {
+        &self.files[0].input.sha256
+    }
+
     /// All files with their hashes.
     pub fn inputs(&self) -> Vec<InputFile> {
         self.files.iter().map(|f| f.input.clone()).collect()
     }
 
     /// The item that takes the files into the release.
-    pub fn node(self, id: &str) -> Node {
+    pub fn node(self, stage: &str, id: &str) -> Node {
         let inputs = self.inputs();
-        Node { item: ItemRef::new(STAGE, id), parents: Vec::new(), inputs, stream: None, job: Box::new(self) }
+        Node { item: ItemRef::new(stage, id), parents: Vec::new(), inputs, stream: None, job: Box::new(self) }
     }
 }
 
@@ -87,10 +93,10 @@ pub fn extension(file: &str) -> String {
 }
 
 /// Where a file goes in the release: an .hgt tile keeps its name, which says where it lies.
-fn release_path(id: &str, file: &str, extension: &str) -> String {
+fn release_path(place: &str, file: &str, extension: &str) -> String {
     match Path::new(file).file_name().and_then(|n| n.to_str()) {
-        Some(name) if extension == "hgt" => format!("dem/{id}/{name}"),
-        _ => format!("dem/{id}.{extension}"),
+        Some(name) if extension == "hgt" => format!("{place}/{name}"),
+        _ => format!("{place}.{extension}"),
     }
 }
 
@@ -145,7 +151,7 @@ mod tests {
 
     #[test]
     fn val_places_in_the_release() {
-        let place = |file: &str| release_path("site", file, &extension(file));
+        let place = |file: &str| release_path("dem/site", file, &extension(file));
         assert_eq!(place("a/Snow.TIF"), "dem/site.tif");
         assert_eq!(place("tiles/N44W072.hgt"), "dem/site/N44W072.hgt");
         assert_eq!(place("no-ending"), "dem/site.dat");
@@ -158,11 +164,11 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let recipe = |file: &str| {
             std::fs::write(folder.path().join(file), b"x").unwrap();
-            Original::of("site", folder.path(), file).unwrap().recipe()
+            Original::of("dem/site", folder.path(), file).unwrap().recipe()
         };
         assert_eq!(recipe("a.tif"), recipe("b.tif"));
         assert_ne!(recipe("N44W072.hgt"), recipe("N45W072.hgt"));
-        let inputs = |file: &str| Original::of("site", folder.path(), file).unwrap().inputs();
+        let inputs = |file: &str| Original::of("dem/site", folder.path(), file).unwrap().inputs();
         std::fs::write(folder.path().join("c.asc"), b"x").unwrap();
         let bare = inputs("c.asc");
         std::fs::write(folder.path().join("c.prj"), b"geographic").unwrap();

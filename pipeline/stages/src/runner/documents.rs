@@ -27,6 +27,7 @@ pub fn readme(contents: &Contents<'_>) -> String {
          | `report/index.html` | report, one offline page |\n\
          | `study.toml` | the study: everything here follows from it |\n\
          | `dem/` | measured inputs, and the same in metres (`.metric.tif`) |\n\
+         | `mask/` | masks of the fits |\n\
          | `terrain/`, `texture/` | heightfields, GeoTIFF, float32 metres, no data -9999 |\n\
          | `classes/` | roughness classes: 0 low, 1 semi, 2 high, 255 none; `.raw.tif` before closing |\n\
          | `fit/` | covariance fits (JSON), with background and residual |\n\

@@ -148,6 +148,11 @@ impl<'a> Entry<'a> {
         self.error(&error.key, error.to_string())
     }
 
+    /// Path of one of this table's keys in the study.
+    pub fn path_of(&self, key: &str) -> Vec<String> {
+        self.path().into_iter().chain([key.to_owned()]).collect()
+    }
+
     fn path(&self) -> Vec<String> {
         vec![self.section.to_owned(), self.index.to_string()]
     }

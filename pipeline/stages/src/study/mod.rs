@@ -59,9 +59,8 @@ impl Study {
     }
 
     /// Bytes of the value at a path (array positions as numbers) in the study's text; `None` when it is not there.
-    pub fn span_of(&self, path: &[&str]) -> Option<Range<usize>> {
-        let path: Vec<String> = path.iter().map(|s| (*s).to_owned()).collect();
-        self.text.exact_span(&path)
+    pub fn span_of(&self, path: &[String]) -> Option<Range<usize>> {
+        self.text.exact_span(path)
     }
 
     fn check_sections(&self, sections: &[&'static str]) -> Result<(), StudyError> {

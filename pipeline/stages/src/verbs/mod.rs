@@ -2,10 +2,13 @@
 
 pub mod fit;
 pub mod parameters;
+mod reading;
 pub mod roughness;
 pub mod terrain;
 pub mod texture;
 pub mod traverse;
+
+pub use reading::{Read, Reading, read, read_as_it_is};
 
 use crate::error::Error;
 use sastrugi_numeric::Grid;

@@ -1,13 +1,13 @@
 //! `roughness`: a DEM described and classified.
 
-use super::{fit::read_metric, parameters};
+use super::{Read, Reading, parameters, read};
 use crate::error::Error;
 use crate::jobs::roughness::settings;
 use crate::study::check_roughness;
 use sastrugi_roughness::{Summary, classify, describe, moore_gradient};
 use sastrugi_schemas::kind::{read_parameters, schema_of};
 use sastrugi_schemas::study::RoughnessSection;
-use sastrugi_store::dem;
+use sastrugi_store::dem as store;
 use serde_json::Value;
 use std::path::Path;
 
@@ -19,8 +19,8 @@ pub struct Request<'a> {
     pub parameters: Value,
     /// Class map to write.
     pub classes: Option<&'a Path>,
-    /// Cell size for files that carry none, m.
-    pub cell_m: Option<[f64; 2]>,
+    /// How the DEM is read.
+    pub reading: Reading,
 }
 
 /// Describes a DEM; returns the figures and sentences on how it was read.
@@ -32,10 +32,10 @@ pub fn roughness(request: &Request<'_>) -> Result<(Summary, Vec<String>), Error>
     let section: RoughnessSection = read_parameters(&request.parameters)?;
     check_roughness(&section)?;
     let settings = settings(&section)?;
-    let (read, notes) = read_metric(request.dem, None, request.cell_m)?;
+    let Read { dem, notes, .. } = read(request.dem, &request.reading)?;
     if let Some(path) = request.classes {
-        let classes = classify(&moore_gradient(&read.grid), &settings.thresholds);
-        dem::write_classes(path, &classes, &read.info.crs).map_err(Error::failed)?;
+        let classes = classify(&moore_gradient(&dem.grid), &settings.thresholds);
+        store::write_classes(path, &classes, &dem.info.crs).map_err(Error::failed)?;
     }
-    Ok((describe(&read.grid, &settings), notes))
+    Ok((describe(&dem.grid, &settings), notes))
 }

@@ -3,10 +3,11 @@
 use super::parameters;
 use crate::error::Error;
 use crate::jobs::texture::{STAGE, kinds, lay_onto};
-use crate::verbs::fit::read_metric;
+use crate::verbs::{Reading, read};
 use sastrugi_numeric::Streams;
 use sastrugi_schemas::fit::FitFile;
 use sastrugi_store::dem::{self, Crs, WriteOptions};
+use sastrugi_store::points::GridSettings;
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -45,7 +46,9 @@ pub fn texture(request: &Request<'_>) -> Result<Value, Error> {
     let (heights, crs) = match request.onto {
         None => (outcome.grid, Crs::default()),
         Some(path) => {
-            let (base, _) = read_metric(path, None, None)?;
+            // A point cloud is gridded to the texture's cells.
+            let gridding = GridSettings { cell_m: Some(outcome.grid.geometry.cell[0]), ..GridSettings::default() };
+            let base = read(path, &Reading { gridding, ..Reading::default() })?.dem;
             let sum = lay_onto(&base.grid, &outcome.grid, &synthesis.parameters());
             (sum.map_err(|e| Error::Usage(e.message))?, base.info.crs)
         }

@@ -220,11 +220,11 @@ pub fn read_with(path: &Path, options: &ReadOptions) -> Result<Dem, DemError> {
     read_gridded(path, options, &GridSettings::default())
 }
 
-/// As [`read_with`], with the settings by which a point cloud is gridded; rasters have no use for them. The cell size is
-/// that of the settings, or else that of the options.
+/// As [`read_with`], with the settings by which a point cloud is gridded. The cell size of a cloud is that of the settings,
+/// or else that of the options.
 ///
 /// # Errors
-/// As [`read`]; also [`DemError::Unfit`] when the file is a point cloud and a setting is out of range.
+/// As [`read`]; also [`DemError::Unfit`] when a setting is out of range, or the file is a raster, which takes none.
 pub fn read_gridded(path: &Path, options: &ReadOptions, settings: &GridSettings) -> Result<Dem, DemError> {
     let reading = |e| DemError::reading(path, e);
     let mut file = File::open(path).map_err(reading)?;
@@ -233,6 +233,10 @@ pub fn read_gridded(path: &Path, options: &ReadOptions, settings: &GridSettings)
     if points::looks_like(&bytes) {
         let cell_m = settings.cell_m.map_or_else(|| square_cell(path, options), |cell| Ok(Some(cell)))?;
         return Ok(points::read_open(path, file, &GridSettings { cell_m, ..*settings })?.dem);
+    }
+    if (GridSettings { cell_m: None, ..*settings }) != GridSettings::default() {
+        let reason = "is no point cloud; statistic, filling and ground points are for .las and .laz".to_owned();
+        return Err(DemError::Unfit { path: path.to_owned(), reason });
     }
     file.read_to_end(&mut bytes).map_err(reading)?;
     parse(path, bytes, options).and_then(checked).map_err(|refusal| refusal.about(path))

@@ -35,6 +35,7 @@ use lattice::Lattice;
 use sastrugi_numeric::Grid;
 use std::fs::File;
 use std::path::Path;
+use std::str::FromStr;
 
 /// Most points of which a median or a percentile is taken: 2 GiB.
 pub const MAX_RANKED_POINTS: u64 = 1 << 28;
@@ -68,6 +69,24 @@ pub enum Statistic {
     Min,
     /// The highest.
     Max,
+}
+
+impl FromStr for Statistic {
+    type Err = String;
+
+    /// `mean`, `median`, `min`, `max`, or `p` and a percentage.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let percentile = || text.strip_prefix('p')?.parse().ok().filter(|p| (0.0..=100.0).contains(p));
+        match text {
+            "mean" => Ok(Self::Mean),
+            "median" => Ok(Self::Median),
+            "min" => Ok(Self::Min),
+            "max" => Ok(Self::Max),
+            _ => percentile().map(Self::Percentile).ok_or_else(|| {
+                format!("is \"{text}\"; it must be mean, median, min, max, or p0 to p100 for a percentile")
+            }),
+        }
+    }
 }
 
 impl Statistic {

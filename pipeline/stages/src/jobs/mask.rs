@@ -1,0 +1,106 @@
+//! Stage `mask`: the files that say which cells of a DEM a fit takes, copied into the release; and their use.
+
+use super::dem::{PLACE, Place};
+use super::original::Original;
+use super::{ItemRef, JobError, Work};
+use crate::registry::{BuildError, Builder, InputPlace};
+use crate::study::Entry;
+use sastrugi_numeric::Grid;
+use sastrugi_schemas::fit::MaskSource;
+use sastrugi_schemas::study::{Files, FitItem};
+use sastrugi_store::mask::{self, MaskError, MaskOptions};
+use std::path::{Path, PathBuf};
+
+/// Name of the stage.
+pub const STAGE: &str = "mask";
+
+/// A mask of a fit.
+#[derive(Clone)]
+pub struct Mask {
+    /// The item that copies its file.
+    pub item: ItemRef,
+    /// Path in the release.
+    release_path: String,
+    /// What the fit file says of it.
+    pub source: MaskSource,
+}
+
+/// Adds the copies of a fit's mask files; the key of each is known to the released study.
+///
+/// # Errors
+/// A file that is missing or cannot be read.
+pub fn add(builder: &mut Builder<'_>, entry: &Entry<'_>, item: &FitItem) -> Result<Vec<Mask>, BuildError> {
+    let named = |files: &Files, key: &str, excludes: bool| {
+        let one = |(k, file): (Option<usize>, &str)| {
+            let mut path = entry.path_of(key);
+            path.extend(k.map(|k| k.to_string()));
+            (path, file.to_owned(), excludes)
+        };
+        files.numbered().into_iter().map(one).collect::<Vec<_>>()
+    };
+    let files = named(&item.mask, "mask", false).into_iter().chain(named(&item.exclude, "exclude", true));
+    let mut masks = Vec::new();
+    for (number, (path, file, excludes)) in files.enumerate() {
+        let id = format!("{}-{}", item.id, number + 1);
+        let copy = Original::of(&format!("mask/{id}"), &builder.study.folder, &file)?;
+        let (release_path, sha256) = (copy.release_path().to_owned(), copy.sha256().to_owned());
+        let node = copy.node(STAGE, &id);
+        let source = MaskSource { file: super::original::name(&release_path).to_owned(), sha256, excludes };
+        masks.push(Mask { item: node.item.clone(), release_path: release_path.clone(), source });
+        builder.inputs.push(InputPlace { key: path, release_path });
+        builder.node(entry, node)?;
+    }
+    Ok(masks)
+}
+
+/// Applies the masks of an item to its DEM's heights. Returns the share of the cells with data that they dropped.
+///
+/// # Errors
+/// A mask that cannot be used for the DEM, or cells of which none is left.
+pub fn of_item(heights: &mut Grid, dem: &ItemRef, masks: &[Mask], work: &Work<'_>) -> Result<Option<f64>, JobError> {
+    if masks.is_empty() {
+        return Ok(None);
+    }
+    let place = Place::read(&work.parent(dem, PLACE)?, &heights.geometry)?;
+    let before = heights.finite_count();
+    for one in masks {
+        let path = work.parent(&one.item, super::original::name(&one.release_path))?;
+        // Messages are part of the release: they name the file as it is called there.
+        let name_it =
+            |e: JobError| JobError { message: e.message.replace(&path.display().to_string(), &one.release_path), ..e };
+        apply(heights, &place, &path, one.source.excludes).map_err(name_it)?;
+    }
+    dropped_share(before, heights).map(Some)
+}
+
+/// Applies masks to heights whose place is known. Returns the share of the cells with data that they dropped, `None` without
+/// masks.
+///
+/// # Errors
+/// As [`of_item`].
+pub fn of_files(heights: &mut Grid, place: &Place, masks: &[(PathBuf, bool)]) -> Result<Option<f64>, JobError> {
+    let before = heights.finite_count();
+    for (path, excludes) in masks {
+        apply(heights, place, path, *excludes)?;
+    }
+    if masks.is_empty() { Ok(None) } else { dropped_share(before, heights).map(Some) }
+}
+
+fn apply(heights: &mut Grid, place: &Place, path: &Path, excludes: bool) -> Result<(), JobError> {
+    let keep = mask::read_with(path, &place.whole(), &MaskOptions { invert: excludes }).map_err(|e| mask_error(&e))?;
+    let kept = place.part(Grid::new(place.whole(), keep));
+    heights.values.iter_mut().zip(&kept.values).filter(|(_, kept)| !**kept).for_each(|(height, _)| *height = f64::NAN);
+    Ok(())
+}
+
+/// Share of the cells with data that have none any more.
+fn dropped_share(before: usize, heights: &Grid) -> Result<f64, JobError> {
+    match heights.finite_count() {
+        0 => Err(JobError::input("the masks leave no cell of the DEM with data")),
+        left => Ok(1.0 - left as f64 / before as f64),
+    }
+}
+
+fn mask_error(error: &MaskError) -> JobError {
+    if error.unusable_input() { JobError::input(error) } else { JobError::new(error) }
+}

@@ -1,0 +1,67 @@
+//! How the verbs read a DEM.
+
+use crate::error::Error;
+use crate::jobs::dem::{Place, input_error, to_metres, window_of};
+use crate::jobs::mask;
+use sastrugi_store::dem::{self, Dem, DemError, ReadOptions};
+use sastrugi_store::points::GridSettings;
+use std::path::{Path, PathBuf};
+
+/// What of a DEM is taken, and how it is read.
+#[derive(Clone, Debug, Default)]
+pub struct Reading {
+    /// Part of the DEM in its own coordinates.
+    pub window: Option<[f64; 4]>,
+    /// Cell size for files that carry none, m.
+    pub cell_m: Option<[f64; 2]>,
+    /// How a point cloud becomes cells.
+    pub gridding: GridSettings,
+    /// Files of the cells that take part, and those (`true`) of cells that do not.
+    pub masks: Vec<(PathBuf, bool)>,
+}
+
+/// A DEM that was read.
+pub struct Read {
+    /// Window cut, masks applied, metres.
+    pub dem: Dem,
+    /// Sentences on how it was read.
+    pub notes: Vec<String>,
+    /// Share of the window's cells with data that masks dropped, where there are masks.
+    pub masked_share: Option<f64>,
+}
+
+/// A DEM as the kernels want it: window cut, masks applied, metres.
+///
+/// # Errors
+/// A DEM or a mask that cannot be read, settings that it does not take, a window or masks that leave no data.
+pub fn read(path: &Path, reading: &Reading) -> Result<Read, Error> {
+    let Read { dem, masked_share, .. } = read_as_it_is(path, reading)?;
+    let (dem, notes) = to_metres(dem);
+    Ok(Read { dem, notes, masked_share })
+}
+
+/// As [`read`], in the DEM's own coordinates: a geographic raster stays in degrees.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_as_it_is(path: &Path, reading: &Reading) -> Result<Read, Error> {
+    let options = ReadOptions { cell_m: reading.cell_m };
+    let Dem { grid, info } = dem::read_gridded(path, &options, &reading.gridding).map_err(refused)?;
+    let whole = grid.geometry;
+    let mut grid = match reading.window {
+        Some(window) => window_of(&grid, window)?,
+        None => grid,
+    };
+    let place = Place::of(&whole, &grid.geometry);
+    let masked_share = mask::of_files(&mut grid, &place, &reading.masks)?;
+    let notes = info.notes.clone();
+    Ok(Read { dem: Dem { grid, info }, notes, masked_share })
+}
+
+/// Settings that the file does not take are the caller's.
+fn refused(error: DemError) -> Error {
+    match error {
+        DemError::Unfit { .. } => Error::Usage(error.to_string()),
+        other => input_error(&other).into(),
+    }
+}
