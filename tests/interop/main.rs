@@ -99,6 +99,33 @@ fn val_measured_clouds_are_gridded_as_numpy_grids_them() {
     }
 }
 
+/// Cells inside of polygons as GDAL burns them: a lake with an island, another that leaves the DEM, sides of any slope.
+#[test]
+fn val_masks_keep_the_cells_that_rasterio_finds_inside() {
+    let Some(python) = python() else { return };
+    let folder = area();
+    let dem = sastrugi_fixtures::jacksboro();
+    let lake = "[[-84.3811, 36.5237], [-84.2173, 36.4911], [-84.1537, 36.6213], [-84.2991, 36.6677], [-84.3811, 36.5237]], \
+                [[-84.3123, 36.5571], [-84.2517, 36.5433], [-84.2711, 36.6039], [-84.3123, 36.5571]]";
+    let island = "[[-84.2831, 36.5621], [-84.2707, 36.5567], [-84.2743, 36.5809], [-84.2831, 36.5621]]";
+    let beyond = "[[-84.9, 36.6917], [-84.3377, 36.7003], [-84.4019, 37.2], [-84.9, 36.6917]]";
+    let text = format!(
+        "{{\"type\": \"FeatureCollection\", \"features\": [\
+         {{\"type\": \"Feature\", \"properties\": {{}}, \"geometry\": {{\"type\": \"Polygon\", \"coordinates\": [{lake}]}}}}, \
+         {{\"type\": \"Feature\", \"properties\": {{}}, \"geometry\": \
+         {{\"type\": \"MultiPolygon\", \"coordinates\": [[{island}], [{beyond}]]}}}}]}}"
+    );
+    let mask = write(folder.path(), "mask.geojson", &text);
+    let masked = folder.path().join("masked.tif");
+    let arguments = ["convert", dem.to_str().unwrap(), "masked.tif", "--mask", "mask.geojson"];
+    let call = sastrugi_in(folder.path(), &arguments);
+    assert_eq!(call.code, 0, "{}", call.stderr);
+    let call = check(&python, "check_masks.py", &[&dem, &mask, &masked]);
+    assert_eq!(call.code, 0, "{}{}", call.stdout, call.stderr);
+    let theirs: Value = serde_json::from_str(&call.stdout).unwrap();
+    assert!(theirs["kept"].as_u64().unwrap() > 10_000, "{theirs}");
+}
+
 /// A figure as text, numbers in the precision of the raster.
 fn number(value: &Value, single: bool) -> String {
     match value.as_f64() {

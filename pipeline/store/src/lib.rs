@@ -1,4 +1,4 @@
-//! Files: DEM formats, point clouds, masks, atomic writes, Parquet tables, MCAP recordings, and the release folder with its
+//! Files: DEM formats, point clouds, masks, transects, atomic writes, Parquet tables, MCAP recordings, and the release folder with its
 //! checksums.
 //!
 //! The only room that names `arrow`, `parquet`, `mcap`, `foxglove`, `prost`, `geotiff-*`, `tiff`, `png` and `las`. Nothing
@@ -17,6 +17,7 @@ pub mod mcap;
 pub mod parquet;
 pub mod points;
 pub mod release;
+pub mod transect;
 
 /// `sastrugi/<version>`: the name of the program in every file that has a place for it.
 pub const PROGRAM: &str = concat!("sastrugi/", env!("CARGO_PKG_VERSION"));

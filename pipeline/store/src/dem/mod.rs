@@ -252,6 +252,11 @@ fn square_cell(path: &Path, options: &ReadOptions) -> Result<Option<f64>, DemErr
     }
 }
 
+/// True for the text of an ESRI ASCII grid.
+pub(crate) fn is_grid_text(bytes: &[u8]) -> bool {
+    ascii::looks_like(bytes)
+}
+
 fn parse(path: &Path, bytes: Vec<u8>, options: &ReadOptions) -> Result<Dem, Refusal> {
     if bytes.is_empty() {
         return Err(Refusal::new("the file is empty"));
