@@ -207,6 +207,22 @@ fn val_bad_masks_are_input_errors() {
 }
 
 #[test]
+fn val_bad_transects_are_input_errors() {
+    let folder = area();
+    let path = folder.path();
+    write(path, "words.csv", "x,a\n0,1\n1,two\n2,3\n");
+    write(path, "uneven.csv", "x,a\n0,1\n1,2\n3,4\n4,5\n");
+    write(path, "heights.csv", "1\n2\n4\n");
+    for verb in [&["info"][..], &["fit", "-o", "fit.json"]] {
+        let call = |name| [verb, &[name]].concat();
+        refused(path, &call("words.csv"), INPUT, &["words.csv: line 3, column 2", "\"two\" is no number"]);
+        refused(path, &call("uneven.csv"), INPUT, &["uneven.csv: line 3, column 1", "even place"]);
+        refused(path, &call("heights.csv"), USAGE, &["heights.csv", "cell size", "must be given"]);
+    }
+    refused(path, &["fit", "heights.csv", "--window", "0,0,1,1", "-o", "f.json"], USAGE, &["transects", "window"]);
+}
+
+#[test]
 fn val_settings_of_point_clouds_are_refused_elsewhere() {
     let folder = area();
     let path = folder.path();

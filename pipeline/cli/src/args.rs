@@ -398,7 +398,7 @@ pub struct Convert {
 /// `info`.
 #[derive(Debug, Args)]
 pub struct Info {
-    /// DEM, fit file, MCAP recording, table, or release folder.
+    /// DEM, transects (.csv, .txt), fit file, MCAP recording, table, or release folder.
     pub path: PathBuf,
     /// How a DEM is read.
     #[command(flatten)]

@@ -5,9 +5,10 @@ use crate::Verdict;
 use crate::args::{self, Common, Convert, Info};
 use crate::failure::{Code, Failure};
 use crate::output::{columns, print};
-use sastrugi_stages::verbs::{Read, Reading, describe_grid, numbers, read_as_it_is};
+use sastrugi_stages::verbs::{Read, Reading, describe_grid, numbers, read_as_it_is, transects};
 use sastrugi_store::dem::{self, Dem, DemError};
 use sastrugi_store::release::Release;
+use sastrugi_store::transect::Transects;
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -60,7 +61,11 @@ fn plain(value: &Value) -> String {
 }
 
 fn raster(path: &Path, settings: &args::Reading) -> Result<Value, Failure> {
-    let read = read_as_it_is(path, &reading(settings)?)?.dem;
+    let reading = reading(settings)?;
+    if let Some(found) = transects(path, &reading)? {
+        return Ok(describe_transects(&found));
+    }
+    let read = read_as_it_is(path, &reading)?.dem;
     let info = &read.info;
     let mut result = json!({
         "what": "elevation raster",
@@ -78,6 +83,19 @@ fn raster(path: &Path, settings: &args::Reading) -> Result<Value, Failure> {
         all.insert("notes".to_owned(), json!(info.notes));
     }
     Ok(result)
+}
+
+fn describe_transects(found: &Transects) -> Value {
+    let heights = || found.profiles.iter().flatten();
+    json!({
+        "what": "transects",
+        "profiles": found.names,
+        "heights_each": found.profiles.first().map_or(0, Vec::len),
+        "spacing_m": found.spacing_m,
+        "missing": heights().filter(|z| z.is_nan()).count(),
+        "height_min_m": heights().copied().reduce(f64::min),
+        "height_max_m": heights().copied().reduce(f64::max),
+    })
 }
 
 fn fit(path: &Path) -> Result<Value, Failure> {

@@ -1,6 +1,6 @@
 //! `fit`: covariance of a measured DEM to a fit file.
 
-use super::{Read, Reading, parameters, read};
+use super::{Read, Reading, parameters, read, transects};
 use crate::error::Error;
 use crate::jobs::fit::{STAGE, to_json};
 use sastrugi_numeric::Streams;
@@ -34,6 +34,10 @@ pub fn fit(request: &Request<'_>) -> Result<(FitFile, Vec<String>), Error> {
     parameters::check_schema(&request.parameters, &schema_of::<FitParameters>(), "fit")?;
     let raw: FitParameters = read_parameters(&request.parameters)?;
     let settings = FitSettings::try_from(raw)?;
+    if let Some(found) = transects(request.dem, &request.reading)? {
+        let (path, count) = (request.dem.display(), found.profiles.len());
+        return Err(Error::Input(format!("{path}: holds {count} transects; a fit takes a DEM")));
+    }
     let Read { dem, notes, masked_share } = read(request.dem, &request.reading)?;
     let outcome =
         sastrugi_texture::fit(&dem.grid, &settings, &Streams::for_seed(request.seed, STAGE)).map_err(refused)?;

@@ -8,7 +8,7 @@ pub mod terrain;
 pub mod texture;
 pub mod traverse;
 
-pub use reading::{Read, Reading, read, read_as_it_is};
+pub use reading::{Read, Reading, read, read_as_it_is, transects};
 
 use crate::error::Error;
 use sastrugi_numeric::Grid;

@@ -5,10 +5,11 @@ use crate::jobs::dem::{Place, input_error, to_metres, window_of};
 use crate::jobs::mask;
 use sastrugi_store::dem::{self, Dem, DemError, ReadOptions};
 use sastrugi_store::points::GridSettings;
+use sastrugi_store::transect::{self, TransectOptions, Transects};
 use std::path::{Path, PathBuf};
 
 /// What of a DEM is taken, and how it is read.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Reading {
     /// Part of the DEM in its own coordinates.
     pub window: Option<[f64; 4]>,
@@ -56,6 +57,29 @@ pub fn read_as_it_is(path: &Path, reading: &Reading) -> Result<Read, Error> {
     let masked_share = mask::of_files(&mut grid, &place, &reading.masks)?;
     let notes = info.notes.clone();
     Ok(Read { dem: Dem { grid, info }, notes, masked_share })
+}
+
+/// Transects, where the file holds some (see [`transect::looks_like`]).
+///
+/// # Errors
+/// A file that cannot be read, or settings that transects do not take.
+pub fn transects(path: &Path, reading: &Reading) -> Result<Option<Transects>, Error> {
+    if !transect::looks_like(path) {
+        return Ok(None);
+    }
+    let plain = Reading { cell_m: reading.cell_m, ..Reading::default() };
+    let spacing_m = match reading.cell_m {
+        Some([x, y]) if x != y => {
+            return Err(Error::Usage(format!("{}: transects have one cell size", path.display())));
+        }
+        cell => cell.map(|[x, _]| x),
+    };
+    if *reading != plain {
+        let message = "is a table of transects, which take no window, mask or setting of point clouds";
+        return Err(Error::Usage(format!("{}: {message}", path.display())));
+    }
+    let options = TransectOptions { spacing_m, ..TransectOptions::default() };
+    transect::read(path, &options).map(Some).map_err(refused)
 }
 
 /// Settings that the file does not take are the caller's.
