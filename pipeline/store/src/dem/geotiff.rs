@@ -2,14 +2,16 @@
 //!
 //! `geotiff-reader` was chosen because it reads every combination of strips and tiles, LZW, deflate, Zstandard,
 //! PackBits and LERC, predictors 1 to 3, BigTIFF and big-endian files tried bit for bit; it refuses files without
-//! georeferencing. Both stand behind [`parse`].
+//! georeferencing. Both stand behind [`parse`], and behind [`Raster`] for rows at a time.
 
 use super::crs::{Crs, GeoKey};
-use super::{Dem, DemInfo, Format, MAX_CELLS, ReadOptions, Refusal, cell_count};
+use super::{Dem, DemError, DemInfo, Format, MAX_CELLS, ReadOptions, Refusal, cell_count};
 use geotiff_reader::geokeys::{GeoKeyDirectory, GeoKeyValue};
 use geotiff_reader::{GeoTiffFile, GeoTiffOpenOptions};
 use sastrugi_numeric::{Geometry, Grid};
-use std::io::Cursor;
+use std::fs::File;
+use std::io::{BufReader, Cursor, Read, Seek};
+use std::path::Path;
 use tiff::decoder::{Decoder, DecodingResult, Limits};
 use tiff::tags::Tag;
 
@@ -23,22 +25,37 @@ pub(super) const NO_CELL_SIZE: &str = "the file states no cell size; 1 m is assu
 const SAMPLE_FORMATS_COMPLEX: [u16; 2] = [5, 6];
 const PHOTOMETRIC_PALETTE: u16 = 3;
 
-/// Reads a TIFF.
+/// True for the first bytes of a TIFF.
+pub(super) fn looks_like(bytes: &[u8]) -> bool {
+    matches!(bytes, [b'I', b'I', 42 | 43, 0, ..] | [b'M', b'M', 0, 42 | 43, ..])
+}
+
+/// Reads a TIFF from its file, strip by strip or tile by tile.
+pub(super) fn read(path: &Path, options: &ReadOptions) -> Result<Dem, DemError> {
+    Raster::open(path, options)?.whole().map_err(|refusal| refusal.about(path))
+}
+
+/// Reads a TIFF that is in memory.
 pub(super) fn parse(bytes: Vec<u8>, options: &ReadOptions) -> Result<Dem, Refusal> {
     let size = bytes.len() as u64;
-    if let Some(mut decoder) = unreferenced(&bytes) {
-        return parse_plain(&mut decoder, size, options);
-    }
-    let limits = GeoTiffOpenOptions { decode_output_bytes: MAX_CELLS as usize * 8, ..GeoTiffOpenOptions::default() };
-    let file = GeoTiffFile::from_bytes_with_options(bytes, limits).map_err(|e| refused(&e))?;
-    parse_georeferenced(&file, size, options)
+    let raster = if unreferenced(Cursor::new(&bytes[..])).is_some() {
+        Raster::plain(unreferenced(Cursor::new(bytes)), size, options)?
+    } else {
+        let file = GeoTiffFile::from_bytes_with_options(bytes, limits()).map_err(|e| refused(&e))?;
+        Raster::referenced(file, size, options)?
+    };
+    raster.whole()
+}
+
+fn limits() -> GeoTiffOpenOptions {
+    GeoTiffOpenOptions { decode_output_bytes: MAX_CELLS as usize * 8, ..GeoTiffOpenOptions::default() }
 }
 
 /// A decoder of a TIFF that has no georeferencing.
-fn unreferenced(bytes: &[u8]) -> Option<Decoder<Cursor<&[u8]>>> {
+fn unreferenced<R: Read + Seek>(reader: R) -> Option<Decoder<R>> {
     let mut limits = Limits::default();
     limits.decoding_buffer_size = MAX_CELLS as usize * 8;
-    let mut decoder = Decoder::new(Cursor::new(bytes)).ok()?.with_limits(limits);
+    let mut decoder = Decoder::new(reader).ok()?.with_limits(limits);
     let mut has = |tag| decoder.find_tag(tag).ok().flatten().is_some();
     let tags = [Tag::ModelPixelScaleTag, Tag::ModelTransformationTag, Tag::GeoKeyDirectoryTag];
     let referenced = tags.into_iter().any(&mut has);
@@ -49,29 +66,126 @@ fn refused(error: &dyn std::error::Error) -> Refusal {
     Refusal::new(format!("is no TIFF that can be read: {error}"))
 }
 
-fn parse_georeferenced(file: &GeoTiffFile, size: u64, options: &ReadOptions) -> Result<Dem, Refusal> {
-    let ifd = file.tiff().ifd(file.base_ifd_index()).map_err(|e| refused(&e))?;
-    single_band(u64::from(file.band_count()), ifd.photometric_interpretation())?;
-    let sample_format = ifd.tag(Tag::SampleFormat.to_u16()).and_then(|tag| tag.value.as_u16());
-    if sample_format.is_some_and(|format| SAMPLE_FORMATS_COMPLEX.contains(&format)) {
-        return Err(Refusal::new("holds complex numbers, not heights"));
-    }
-    let layout = ifd.raster_layout().map_err(|e| refused(&e))?;
-    let (rows, cols) = (u64::from(file.height()), u64::from(file.width()));
-    affordable(cell_count(rows, cols)?, u64::from(layout.bits_per_sample).div_ceil(8), size)?;
+/// A TIFF of heights that is open, with nothing decoded yet.
+pub(super) struct Raster<R: Read + Seek> {
+    pixels: Pixels<R>,
+    pub geometry: Geometry,
+    pub info: DemInfo,
+    /// Rows that are decoded together: those of a strip or a tile.
+    pub block_rows: usize,
+}
 
-    let nodata = file.nodata().and_then(parse_nodata);
-    let (dtype, values) = read_samples(file, layout.sample_format, layout.bits_per_sample, nodata)?;
-    let crs = Crs::from_keys(carried_keys(file.geokeys()));
-    let mut notes = crs.unit_notes();
-    let geometry = place(file, options, &mut notes)?;
-    if values.len() != geometry.len() {
-        return Err(Refusal::new(format!("holds {} values for {rows} x {cols} cells", values.len())));
+enum Pixels<R: Read + Seek> {
+    Referenced {
+        file: Box<GeoTiffFile>,
+        /// Sample format and bits.
+        stored: (u16, u16),
+        /// The first row is the southern one.
+        south_first: bool,
+    },
+    Plain(Box<Decoder<R>>),
+}
+
+impl Raster<BufReader<File>> {
+    /// Opens a TIFF whose rows are to be read as they are needed.
+    pub fn open(path: &Path, options: &ReadOptions) -> Result<Self, DemError> {
+        let reading = |e| DemError::reading(path, e);
+        let file = File::open(path).map_err(reading)?;
+        let size = file.metadata().map_err(reading)?.len();
+        let plain = unreferenced(BufReader::new(file));
+        let raster = if plain.is_some() {
+            Self::plain(plain, size, options)
+        } else {
+            let file = GeoTiffFile::open_with_options(path, limits()).map_err(|e| refused(&e));
+            file.and_then(|file| Self::referenced(file, size, options))
+        };
+        raster.map_err(|refusal| refusal.about(path))
     }
-    let (grid, flipped) = north_up(file, Grid::new(geometry, values));
-    notes.extend(flipped);
-    let pixel_is_point = file.crs().raster_type == RASTER_PIXEL_IS_POINT;
-    Ok(Dem { grid, info: DemInfo { format: Format::GeoTiff, dtype, nodata, crs, pixel_is_point, notes } })
+}
+
+impl<R: Read + Seek> Raster<R> {
+    fn referenced(file: GeoTiffFile, size: u64, options: &ReadOptions) -> Result<Self, Refusal> {
+        let ifd = file.tiff().ifd(file.base_ifd_index()).map_err(|e| refused(&e))?;
+        single_band(u64::from(file.band_count()), ifd.photometric_interpretation())?;
+        let sample_format = ifd.tag(Tag::SampleFormat.to_u16()).and_then(|tag| tag.value.as_u16());
+        if sample_format.is_some_and(|format| SAMPLE_FORMATS_COMPLEX.contains(&format)) {
+            return Err(Refusal::new("holds complex numbers, not heights"));
+        }
+        let layout = ifd.raster_layout().map_err(|e| refused(&e))?;
+        let stored = (layout.sample_format, layout.bits_per_sample);
+        affordable(file.height(), file.width(), u64::from(stored.1).div_ceil(8), size)?;
+        let dtype = dtype(stored.0, stored.1)?;
+        let nodata = file.nodata().and_then(parse_nodata);
+        let crs = Crs::from_keys(carried_keys(file.geokeys()));
+        let mut notes = crs.unit_notes();
+        let geometry = place(&file, options, &mut notes)?;
+        let south_first = file.transform().is_some_and(|t| t.pixel_height >= 0.0);
+        if south_first {
+            notes.push("its first row is the southern one; rows were turned".to_owned());
+        }
+        let pixel_is_point = file.crs().raster_type == RASTER_PIXEL_IS_POINT;
+        let info = DemInfo { format: Format::GeoTiff, dtype, nodata, crs, pixel_is_point, notes };
+        let block_rows = ifd.tile_height().filter(|_| ifd.is_tiled()).unwrap_or_else(|| ifd.rows_per_strip());
+        let block_rows = (block_rows as usize).clamp(1, geometry.rows);
+        Ok(Self {
+            pixels: Pixels::Referenced { file: Box::new(file), stored, south_first },
+            geometry,
+            info,
+            block_rows,
+        })
+    }
+
+    /// A TIFF without any georeferencing.
+    fn plain(decoder: Option<Decoder<R>>, size: u64, options: &ReadOptions) -> Result<Self, Refusal> {
+        let mut decoder = decoder.ok_or_else(|| Refusal::new("is no TIFF that can be read"))?;
+        let mut number = |tag| decoder.find_tag_unsigned::<u64>(tag).map_err(|e| refused(&e));
+        let bands = number(Tag::SamplesPerPixel)?.unwrap_or(1);
+        let photometric = number(Tag::PhotometricInterpretation)?.and_then(|n| u16::try_from(n).ok());
+        let stored = [number(Tag::SampleFormat)?.unwrap_or(1), number(Tag::BitsPerSample)?.unwrap_or(1)];
+        single_band(bands, photometric)?;
+        let (cols, rows) = decoder.dimensions().map_err(|e| refused(&e))?;
+        affordable(rows, cols, 8, size)?;
+        let [format, bits] = stored.map(|n| u16::try_from(n).unwrap_or(u16::MAX));
+        let dtype = dtype(format, bits)?;
+        let nodata = decoder.get_tag_ascii_string(Tag::GdalNodata).ok().and_then(|text| parse_nodata(&text));
+        let mut notes = vec!["the TIFF has no georeferencing".to_owned()];
+        let geometry = unplaced(rows as usize, cols as usize, options, &mut notes);
+        let crs = Crs::default();
+        let info = DemInfo { format: Format::GeoTiff, dtype, nodata, crs, pixel_is_point: false, notes };
+        let (wide, high) = decoder.chunk_dimensions();
+        if wide == 0 || high == 0 {
+            return Err(Refusal::new("has strips or tiles without cells"));
+        }
+        let block_rows = (high as usize).min(geometry.rows);
+        Ok(Self { pixels: Pixels::Plain(Box::new(decoder)), geometry, info, block_rows })
+    }
+
+    fn whole(mut self) -> Result<Dem, Refusal> {
+        let Geometry { rows, cols, .. } = self.geometry;
+        cell_count(rows as u64, cols as u64)?;
+        let values = self.rows(0, rows)?;
+        Ok(Dem { grid: Grid::new(self.geometry, values), info: self.info })
+    }
+
+    /// Heights of rows that exist, counted from the north; `NaN` without data.
+    pub fn rows(&mut self, first: usize, count: usize) -> Result<Vec<f64>, Refusal> {
+        let (g, nodata) = (&self.geometry, self.info.nodata);
+        let values = match &mut self.pixels {
+            Pixels::Plain(decoder) => plain_rows(decoder, g, nodata, first, count)?,
+            Pixels::Referenced { file, stored, south_first: false } => {
+                stored_rows(file, *stored, nodata, first, count)?
+            }
+            Pixels::Referenced { file, stored, south_first: true } => {
+                let values = stored_rows(file, *stored, nodata, g.rows - first - count, count)?;
+                values.chunks_exact(g.cols).rev().flatten().copied().collect()
+            }
+        };
+        if values.len() != count * g.cols {
+            let found = values.len();
+            return Err(Refusal::new(format!("holds {found} values for {count} x {} cells", g.cols)));
+        }
+        Ok(values)
+    }
 }
 
 fn single_band(bands: u64, photometric: Option<u16>) -> Result<(), Refusal> {
@@ -85,42 +199,63 @@ fn single_band(bands: u64, photometric: Option<u16>) -> Result<(), Refusal> {
 }
 
 /// Refuses a raster that cannot have come from so few bytes.
-fn affordable(cells: usize, bytes_per_cell: u64, size: u64) -> Result<(), Refusal> {
-    let raster = cells as u64 * bytes_per_cell;
-    if raster > FREE_BYTES.max(size.saturating_mul(MAX_EXPANSION)) {
+fn affordable(rows: u32, cols: u32, bytes_per_cell: u64, size: u64) -> Result<(), Refusal> {
+    if rows == 0 || cols == 0 {
+        return Err(Refusal::new(format!("holds no cell ({rows} rows, {cols} columns)")));
+    }
+    let cells = u64::from(rows) * u64::from(cols);
+    if cells.saturating_mul(bytes_per_cell) > FREE_BYTES.max(size.saturating_mul(MAX_EXPANSION)) {
         return Err(Refusal::new(format!("claims {cells} cells in a file of {size} bytes")));
     }
     Ok(())
 }
 
-fn read_samples(
-    file: &GeoTiffFile,
-    format: u16,
-    bits: u16,
-    nodata: Option<f64>,
-) -> Result<(&'static str, Vec<f64>), Refusal> {
-    macro_rules! read {
-        ($t:ty, $name:literal) => {{
-            let band = file.read_band::<$t>(0).map_err(|e| refused(&e))?;
-            Ok(($name, band.iter().map(|&v| without(f64::from(v), nodata)).collect()))
-        }};
-    }
+/// Name of a type of stored heights.
+fn dtype(format: u16, bits: u16) -> Result<&'static str, Refusal> {
     match (format, bits) {
-        (3, 32) => {
-            // The text of a float32 raster's no-data value is rounded to float32 like the values.
-            let nodata = nodata.map(|v| f64::from(v as f32));
-            let band = file.read_band::<f32>(0).map_err(|e| refused(&e))?;
-            Ok(("float32", band.iter().map(|&v| without(f64::from(v), nodata)).collect()))
-        }
-        (3, 64) => read!(f64, "float64"),
-        (1, 8) => read!(u8, "uint8"),
-        (2, 8) => read!(i8, "int8"),
-        (1, 16) => read!(u16, "uint16"),
-        (2, 16) => read!(i16, "int16"),
-        (1, 32) => read!(u32, "uint32"),
-        (2, 32) => read!(i32, "int32"),
+        (3, 32) => Ok("float32"),
+        (3, 64) => Ok("float64"),
+        (1, 8) => Ok("uint8"),
+        (2, 8) => Ok("int8"),
+        (1, 16) => Ok("uint16"),
+        (2, 16) => Ok("int16"),
+        (1, 32) => Ok("uint32"),
+        (2, 32) => Ok("int32"),
         _ => Err(Refusal::new(format!("holds {bits}-bit values of TIFF sample format {format}, which are no heights"))),
     }
+}
+
+/// Rows of a georeferenced file in its own order.
+fn stored_rows(
+    file: &GeoTiffFile,
+    stored: (u16, u16),
+    nodata: Option<f64>,
+    first: usize,
+    count: usize,
+) -> Result<Vec<f64>, Refusal> {
+    let cols = file.width() as usize;
+    macro_rules! read {
+        ($t:ty, $nodata:expr) => {{
+            let band = file.read_band_window::<$t>(0, first, 0, count, cols).map_err(|e| refused(&e))?;
+            Ok(band.iter().map(|&v| without(f64::from(v), $nodata)).collect())
+        }};
+    }
+    match stored {
+        (3, 32) => read!(f32, single(nodata)),
+        (3, 64) => read!(f64, nodata),
+        (1, 8) => read!(u8, nodata),
+        (2, 8) => read!(i8, nodata),
+        (1, 16) => read!(u16, nodata),
+        (2, 16) => read!(i16, nodata),
+        (1, 32) => read!(u32, nodata),
+        (2, 32) => read!(i32, nodata),
+        (format, bits) => dtype(format, bits).map(|_| Vec::new()),
+    }
+}
+
+/// The text of a float32 raster's no-data value is rounded to float32 like the values.
+fn single(nodata: Option<f64>) -> Option<f64> {
+    nodata.map(|v| f64::from(v as f32))
 }
 
 fn without(value: f64, nodata: Option<f64>) -> f64 {
@@ -164,52 +299,49 @@ pub(super) fn unplaced(rows: usize, cols: usize, options: &ReadOptions, notes: &
     Geometry { rows, cols, cell, origin: [0.0; 2] }
 }
 
-/// Turns a raster whose first row is the southern one.
-fn north_up(file: &GeoTiffFile, grid: Grid) -> (Grid, Option<String>) {
-    if file.transform().is_none_or(|t| t.pixel_height < 0.0) {
-        return (grid, None);
+/// Rows of a file without georeferencing: the strips or tiles that hold them, cut.
+fn plain_rows<R: Read + Seek>(
+    decoder: &mut Decoder<R>,
+    g: &Geometry,
+    nodata: Option<f64>,
+    first: usize,
+    count: usize,
+) -> Result<Vec<f64>, Refusal> {
+    let (wide, high) = decoder.chunk_dimensions();
+    let (wide, high) = ((wide as usize).min(g.cols), (high as usize).min(g.rows));
+    let across = g.cols.div_ceil(wide);
+    let mut values = vec![f64::NAN; count * g.cols];
+    for band in first / high..(first + count).div_ceil(high) {
+        for k in 0..across {
+            let index = u32::try_from(band * across + k).map_err(|e| refused(&e))?;
+            let part = widened(decoder.read_chunk(index).map_err(|e| refused(&e))?, nodata)?;
+            let (col, part_cols) = (k * wide, wide.min(g.cols - k * wide));
+            for (line, row) in part.chunks_exact(part_cols).zip(band * high..) {
+                if row >= first && row < first + count {
+                    let at = (row - first) * g.cols + col;
+                    values[at..at + part_cols].copy_from_slice(line);
+                }
+            }
+        }
     }
-    let values = (0..grid.rows()).rev().flat_map(|r| grid.row(r).iter().copied()).collect();
-    (Grid::new(grid.geometry, values), Some("its first row is the southern one; rows were turned".to_owned()))
+    Ok(values)
 }
 
-/// A TIFF without any georeferencing.
-fn parse_plain(decoder: &mut Decoder<Cursor<&[u8]>>, size: u64, options: &ReadOptions) -> Result<Dem, Refusal> {
-    let bands = decoder.find_tag_unsigned::<u64>(Tag::SamplesPerPixel).map_err(|e| refused(&e))?;
-    let photometric = decoder.find_tag_unsigned(Tag::PhotometricInterpretation).map_err(|e| refused(&e))?;
-    single_band(bands.unwrap_or(1), photometric)?;
-    let (cols, rows) = decoder.dimensions().map_err(|e| refused(&e))?;
-    affordable(cell_count(u64::from(rows), u64::from(cols))?, 8, size)?;
-    let nodata = decoder.get_tag_ascii_string(Tag::GdalNodata).ok().and_then(|text| parse_nodata(&text));
-    let (dtype, values) = widened(decoder.read_image().map_err(|e| refused(&e))?, nodata)?;
-    let mut notes = vec!["the TIFF has no georeferencing".to_owned()];
-    let geometry = unplaced(rows as usize, cols as usize, options, &mut notes);
-    if values.len() != geometry.len() {
-        return Err(Refusal::new(format!("holds {} values for {rows} x {cols} cells", values.len())));
-    }
-    let crs = Crs::default();
-    let info = DemInfo { format: Format::GeoTiff, dtype, nodata, crs, pixel_is_point: false, notes };
-    Ok(Dem { grid: Grid::new(geometry, values), info })
-}
-
-fn widened(samples: DecodingResult, nodata: Option<f64>) -> Result<(&'static str, Vec<f64>), Refusal> {
+fn widened(samples: DecodingResult, nodata: Option<f64>) -> Result<Vec<f64>, Refusal> {
     macro_rules! widen {
-        ($values:expr, $name:literal) => {
-            Ok(($name, $values.into_iter().map(|v| without(f64::from(v), nodata)).collect()))
+        ($values:expr, $nodata:expr) => {
+            Ok($values.into_iter().map(|v| without(f64::from(v), $nodata)).collect())
         };
     }
     match samples {
-        DecodingResult::F32(values) => {
-            let nodata = nodata.map(|v| f64::from(v as f32));
-            Ok(("float32", values.into_iter().map(|v| without(f64::from(v), nodata)).collect()))
-        }
-        DecodingResult::F64(values) => widen!(values, "float64"),
-        DecodingResult::U8(values) => widen!(values, "uint8"),
-        DecodingResult::I8(values) => widen!(values, "int8"),
-        DecodingResult::U16(values) => widen!(values, "uint16"),
-        DecodingResult::I16(values) => widen!(values, "int16"),
-        DecodingResult::U32(values) => widen!(values, "uint32"),
-        DecodingResult::I32(values) => widen!(values, "int32"),
+        DecodingResult::F32(values) => widen!(values, single(nodata)),
+        DecodingResult::F64(values) => widen!(values, nodata),
+        DecodingResult::U8(values) => widen!(values, nodata),
+        DecodingResult::I8(values) => widen!(values, nodata),
+        DecodingResult::U16(values) => widen!(values, nodata),
+        DecodingResult::I16(values) => widen!(values, nodata),
+        DecodingResult::U32(values) => widen!(values, nodata),
+        DecodingResult::I32(values) => widen!(values, nodata),
         _ => Err(Refusal::new("holds values of a type that is no height")),
     }
 }

@@ -9,6 +9,7 @@
 //! asked for.
 
 mod ascii;
+mod blocks;
 mod crs;
 mod geotiff;
 mod hgt;
@@ -20,12 +21,13 @@ mod tiff_writer;
 #[cfg(test)]
 mod tests;
 
+pub use blocks::{BlockReader, open};
 pub use crs::{Crs, GeoKey};
 pub use png::{HeightScale, write_png_heights, write_png16};
 
 use crate::atomic;
 use crate::points::{self, GridSettings};
-use sastrugi_numeric::Grid;
+use sastrugi_numeric::{Geometry, Grid};
 use std::fs::{self, File};
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
@@ -121,7 +123,7 @@ impl Format {
     /// The format of a file: by its first bytes, and by its name where those say nothing.
     fn of_file(path: &Path, bytes: &[u8]) -> Option<Self> {
         match bytes {
-            [b'I', b'I', 42 | 43, 0, ..] | [b'M', b'M', 0, 42 | 43, ..] => Some(Self::GeoTiff),
+            _ if geotiff::looks_like(bytes) => Some(Self::GeoTiff),
             [0x93, b'N', b'U', b'M', b'P', b'Y', ..] => Some(Self::Npy),
             [0x89, b'P', b'N', b'G', ..] => Some(Self::Png),
             _ if ascii::looks_like(bytes) => Some(Self::EsriAscii),
@@ -238,6 +240,9 @@ pub fn read_gridded(path: &Path, options: &ReadOptions, settings: &GridSettings)
         let reason = "is no point cloud; statistic, filling and ground points are for .las and .laz".to_owned();
         return Err(DemError::Unfit { path: path.to_owned(), reason });
     }
+    if geotiff::looks_like(&bytes) {
+        return geotiff::read(path, options).and_then(|dem| checked(dem).map_err(|refusal| refusal.about(path)));
+    }
     file.read_to_end(&mut bytes).map_err(reading)?;
     parse(path, bytes, options).and_then(checked).map_err(|refusal| refusal.about(path))
 }
@@ -277,9 +282,7 @@ fn parse(path: &Path, bytes: Vec<u8>, options: &ReadOptions) -> Result<Dem, Refu
 /// The checks that every format shares.
 pub(crate) fn checked(mut dem: Dem) -> Result<Dem, Refusal> {
     let g = &dem.grid.geometry;
-    if !g.cell.iter().all(|c| c.is_finite() && *c > 0.0) || !g.origin.iter().all(|o| o.is_finite()) {
-        return Err(Refusal::new(format!("the cell size {:?} at {:?} is not usable", g.cell, g.origin)));
-    }
+    check_place(g)?;
     let infinite = dem.grid.values.iter().filter(|v| v.is_infinite()).count();
     if infinite > 0 {
         dem.grid.values.iter_mut().filter(|v| v.is_infinite()).for_each(|v| *v = f64::NAN);
@@ -289,6 +292,13 @@ pub(crate) fn checked(mut dem: Dem) -> Result<Dem, Refusal> {
         return Err(Refusal::new(format!("none of the {} x {} cells holds data", g.rows, g.cols)));
     }
     Ok(dem)
+}
+
+fn check_place(g: &Geometry) -> Result<(), Refusal> {
+    if g.cell.iter().all(|c| c.is_finite() && *c > 0.0) && g.origin.iter().all(|o| o.is_finite()) {
+        return Ok(());
+    }
+    Err(Refusal::new(format!("the cell size {:?} at {:?} is not usable", g.cell, g.origin)))
 }
 
 /// Number of cells of a claimed size, when it is one that can be held.

@@ -1,6 +1,5 @@
 use super::*;
 use proptest::prelude::*;
-use sastrugi_numeric::Geometry;
 use std::path::PathBuf;
 
 fn data(name: &str) -> Option<PathBuf> {
@@ -253,4 +252,200 @@ fn prop_classes_come_back() {
     assert_eq!(read_classes(&path).unwrap(), codes);
     write(&path, &hilly(3, 4), &Crs::default(), &WriteOptions::default()).unwrap();
     assert!(read_classes(&path).is_err());
+}
+
+/// Rows read a few at a time are those of the whole raster, for every file at hand.
+fn blocks_agree(path: &Path) {
+    let options = ReadOptions::default();
+    let whole = read_with(path, &options).unwrap();
+    let mut reader = open(path, &options).unwrap();
+    assert_eq!((reader.geometry(), reader.info()), (whole.grid.geometry, &whole.info), "{}", path.display());
+    let (rows, block) = (whole.grid.rows(), reader.block_rows());
+    assert!((1..=rows).contains(&block));
+    let mut ranges = vec![0..rows, 0..1, rows - 1..rows, rows / 3..rows / 3 + rows.div_ceil(3)];
+    ranges.extend((0..rows).step_by(block).map(|first| first..(first + block).min(rows)).take(40));
+    for range in ranges {
+        let part = reader.read_rows(range.clone()).unwrap();
+        let expected = whole.grid.window(range.start, 0, range.len(), whole.grid.cols());
+        assert!(same(&part, &expected), "{}: rows {range:?}", path.display());
+    }
+    for range in [0..rows + 1, rows..rows + 1, 5..5] {
+        assert!(matches!(reader.read_rows(range), Err(DemError::Unfit { .. })));
+    }
+}
+
+#[test]
+fn val_rows_of_measured_rasters() {
+    for name in [
+        "akl_lidar.tif",
+        "avaAlr.tif",
+        "N44W072_i16_tiled.tif",
+        "N44W072.hgt",
+        "otira_grid_2cm.tif",
+        "pozo_blanca_grid_50cm.tif",
+        "wbt_DEM.tif",
+        "xdem_longyearbyen_1995.tif",
+        "mars_hirise_1m.npy",
+        "srtmgl3_boulder.asc",
+    ] {
+        if let Some(path) = data(name) {
+            blocks_agree(&path);
+        }
+    }
+}
+
+#[test]
+fn val_rows_of_written_rasters() {
+    let folder = tempfile::tempdir().unwrap();
+    let grid = hilly(600, 270);
+    for compression in [Compression::None, Compression::Deflate, Compression::Zstd] {
+        let path = folder.path().join("a.tif");
+        write(&path, &grid, &Crs::wgs84(), &WriteOptions { compression }).unwrap();
+        blocks_agree(&path);
+        assert_eq!(open(&path, &ReadOptions::default()).unwrap().block_rows(), 256);
+    }
+}
+
+/// Files of strips without georeferencing, of every type of heights, compressions and predictors.
+#[test]
+fn val_rows_of_plain_tiffs() {
+    use tiff::encoder::{Compression as Packed, DeflateLevel, Predictor, TiffEncoder, colortype};
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("plain.tif");
+    let (rows, cols) = (101u32, 37u32);
+    macro_rules! strips {
+        ($color:ty, $t:ty, $packed:expr, $predictor:expr) => {{
+            let values: Vec<$t> = (0..rows * cols).map(|k| (k.wrapping_mul(2_654_435_761) >> 25) as $t).collect();
+            let file = File::create(&path).unwrap();
+            let mut encoder = TiffEncoder::new(file).unwrap().with_compression($packed).with_predictor($predictor);
+            let mut image = encoder.new_image::<$color>(cols, rows).unwrap();
+            image.rows_per_strip(16).unwrap();
+            image.write_data(&values).unwrap();
+            assert_eq!(open(&path, &ReadOptions::default()).unwrap().block_rows(), 16);
+            blocks_agree(&path);
+            let heights: Vec<f64> = values.iter().map(|&v| v as f64).collect();
+            assert_eq!(read(&path).unwrap().grid.values, heights);
+        }};
+    }
+    let deflate = || Packed::Deflate(DeflateLevel::Fast);
+    strips!(colortype::Gray32Float, f32, Packed::Uncompressed, Predictor::None);
+    strips!(colortype::Gray64Float, f64, deflate(), Predictor::None);
+    strips!(colortype::Gray16, u16, Packed::Lzw, Predictor::Horizontal);
+    strips!(colortype::GrayI16, i16, Packed::Packbits, Predictor::None);
+    strips!(colortype::Gray8, u8, deflate(), Predictor::None);
+    strips!(colortype::GrayI32, i32, Packed::Lzw, Predictor::None);
+}
+
+#[test]
+fn prop_rows_of_damaged_files_never_panic() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.tif");
+    for (name, bytes) in samples().into_iter().filter(|(name, _)| name.ends_with(".tif")) {
+        for (k, at) in (0..bytes.len()).step_by(bytes.len() / 61 + 1).enumerate() {
+            let mut damaged = bytes.clone();
+            damaged[at] ^= 1 << (k % 8);
+            if k % 2 == 0 {
+                damaged.truncate(bytes.len() - at);
+            }
+            std::fs::write(&path, damaged).unwrap();
+            if let Ok(mut reader) = open(&path, &ReadOptions::default()) {
+                let rows = reader.geometry().rows.min(50);
+                let _ = (name, reader.read_rows(0..rows));
+            }
+        }
+    }
+}
+
+/// A GeoTIFF of int16 in strips of 64 rows, all zero but one cell; its holes take no room on the disk. A point (x, y, 0, 1)
+/// is the matrix times (column, row, 0, 1).
+fn sparse(path: &Path, side: u32, matrix: [f64; 16], (row, col): (u64, u64), height: i16) {
+    use std::io::{Seek, SeekFrom, Write};
+    const STRIP_ROWS: u32 = 64;
+    const DATA: u32 = 16384;
+    let strip_bytes = STRIP_ROWS * side * 2;
+    let strips = side / STRIP_ROWS;
+    let longs = |values: Vec<u32>| values.into_iter().flat_map(u32::to_le_bytes).collect::<Vec<u8>>();
+    let doubles = |values: &[f64]| values.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>();
+    let shorts = |values: &[u16]| values.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>();
+    let one = |value: u32| longs(vec![value]);
+    // Tag, type (3 short, 4 long, 12 double), count, value.
+    let tags: Vec<(u16, u16, u32, Vec<u8>)> = vec![
+        (256, 4, 1, one(side)),
+        (257, 4, 1, one(side)),
+        (258, 3, 1, one(16)),
+        (259, 3, 1, one(1)),
+        (262, 3, 1, one(1)),
+        (273, 4, strips, longs((0..strips).map(|k| DATA + k * strip_bytes).collect())),
+        (277, 3, 1, one(1)),
+        (278, 4, 1, one(STRIP_ROWS)),
+        (279, 4, strips, longs(vec![strip_bytes; strips as usize])),
+        (339, 3, 1, one(2)),
+        (34264, 12, 16, doubles(&matrix)),
+        (34735, 3, 4, shorts(&[1, 1, 0, 0])),
+    ];
+    let (mut ifd, mut extra) = (shorts(&[tags.len() as u16]), Vec::new());
+    let extra_at = 8 + 2 + 12 * tags.len() as u32 + 4;
+    for (tag, kind, count, value) in tags {
+        ifd.extend(shorts(&[tag, kind]));
+        ifd.extend(one(count));
+        if value.len() <= 4 {
+            ifd.extend(value);
+        } else {
+            ifd.extend(one(extra_at + extra.len() as u32));
+            extra.extend(value);
+        }
+    }
+    ifd.extend(one(0));
+    let mut file = File::create(path).unwrap();
+    file.write_all(&[b"II*\0\x08\0\0\0", &ifd[..], &extra].concat()).unwrap();
+    file.set_len(u64::from(DATA) + u64::from(side) * u64::from(side) * 2).unwrap();
+    file.seek(SeekFrom::Start(u64::from(DATA) + (row * u64::from(side) + col) * 2)).unwrap();
+    file.write_all(&height.to_le_bytes()).unwrap();
+}
+
+#[rustfmt::skip]
+const NORTH_UP: [f64; 16] = [0.5, 0.0, 0.0, 1000.0,  0.0, -0.5, 0.0, 2000.0,  0.0, 0.0, 0.0, 0.0,  0.0, 0.0, 0.0, 1.0];
+
+#[test]
+fn val_rows_of_a_raster_that_starts_in_the_south() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("down.tif");
+    let mut matrix = NORTH_UP;
+    matrix[5] = 0.5;
+    sparse(&path, 768, matrix, (10, 20), 5);
+    let turned = read(&path).unwrap();
+    assert!(turned.info.notes.iter().any(|note| note.contains("southern")), "{:?}", turned.info.notes);
+    assert_eq!((turned.grid.geometry.origin, turned.grid.at(767 - 10, 20)), ([1000.0, 2000.0], 5.0));
+    blocks_agree(&path);
+}
+
+/// A raster that is not read whole (2^30 cells) is read in rows.
+#[test]
+fn val_rows_of_a_raster_larger_than_memory() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("huge.tif");
+    sparse(&path, 32768, NORTH_UP, (20_000, 31_000), -7);
+    assert!(read(&path).unwrap_err().to_string().contains("at most"));
+    let mut reader = open(&path, &ReadOptions::default()).unwrap();
+    let g = reader.geometry();
+    assert_eq!((g.rows, g.cols, g.cell, g.origin), (32768, 32768, [0.5; 2], [1000.0, 2000.0 - 16384.0]));
+    let part = reader.read_rows(19_990..20_010).unwrap();
+    assert_eq!((part.at(10, 31_000), part.values.iter().filter(|z| **z != 0.0).count()), (-7.0, 1));
+    assert!(matches!(reader.read_rows(0..32768), Err(DemError::Unfit { .. })));
+}
+
+/// All of its rows, one strip at a time: 0.2 GB of memory.
+#[test]
+#[ignore = "slow: ./test --full"]
+fn val_all_rows_of_a_raster_larger_than_memory() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("huge.tif");
+    sparse(&path, 32768, NORTH_UP, (20_000, 31_000), -7);
+    let mut reader = open(&path, &ReadOptions::default()).unwrap();
+    let (rows, step) = (reader.geometry().rows, reader.block_rows());
+    let mut sum = 0.0;
+    for first in (0..rows).step_by(step) {
+        sum += reader.read_rows(first..first + step).unwrap().values.iter().sum::<f64>();
+    }
+    assert_eq!(sum, -7.0);
 }
