@@ -160,6 +160,96 @@ fn val_rasters_that_cannot_be_fitted_say_why() {
     refused(path, &["texture", "not.json", "-o", "t.tif"], INPUT, &["no fit file"]);
 }
 
+/// An ESRI ASCII grid of 96 x 96 cells of 0.1 m.
+fn ascii(cell_m: f64, height: impl Fn(u32, u32) -> f64) -> String {
+    let mut text = format!("ncols 96\nnrows 96\nxllcorner 0\nyllcorner 0\ncellsize {cell_m}\nNODATA_value -9999\n");
+    for row in 0..96 {
+        let line: Vec<String> = (0..96).map(|col| height(row, col).to_string()).collect();
+        text.push_str(&line.join(" "));
+        text.push('\n');
+    }
+    text
+}
+
+/// Heights without any relation between neighbours.
+fn noise(row: u32, col: u32) -> f64 {
+    let mut bits = row.wrapping_mul(0x9E37_79B9) ^ col.wrapping_mul(0x85EB_CA6B);
+    for _ in 0..3 {
+        bits = (bits ^ (bits >> 15)).wrapping_mul(0x2C1B_3C6D);
+    }
+    f64::from(bits >> 16) / 65536.0
+}
+
+/// Everything that the specification lists (section 5): one sentence and the code, no file.
+#[test]
+fn val_everything_that_a_fit_refuses() {
+    let folder = area();
+    let path = folder.path();
+    write(path, "white.asc", &ascii(0.1, noise));
+    write(path, "flat.asc", &ascii(0.1, |_, _| 3.0));
+    write(path, "void.asc", &ascii(0.1, |_, _| -9999.0));
+    write(path, "sparse.asc", &ascii(0.1, |row, col| if (row + col) % 4 == 0 { noise(row, col) } else { -9999.0 }));
+    let fit = |dem: &str, more: &[&str], code: i32, words: &[&str]| {
+        let arguments = [&["fit", dem, "-o", "fit.json"], more].concat();
+        refused(path, &arguments, code, words);
+        let stderr = sastrugi_in(path, &arguments).stderr;
+        assert_eq!(stderr.lines().count(), 1, "one sentence: {stderr}");
+    };
+    let scale = |metres| ["--outer-scale", metres];
+    fit("white.asc", &scale("5"), INPUT, &["9.6", "two windows", "10 m"]);
+    fit("white.asc", &scale("4"), INPUT, &["outer scale of 4 m", "a third of the DEM", "3.2"]);
+    fit("white.asc", &scale("0.2"), INPUT, &["outer scale of 0.2 m", "three cells"]);
+    fit("white.asc", &scale("0"), USAGE, &["outer_scale_m", "above 0"]);
+    fit("white.asc", &scale("nan"), USAGE, &["outer"]);
+    fit("white.asc", &scale("1"), INPUT, &["white", "0.1 m", "no covariance to fit"]);
+    fit("white.asc", &[&scale("1")[..], &["--mode", "paper"]].concat(), INPUT, &["white"]);
+    fit("white.asc", &["--trim", "0"], USAGE, &["trim"]);
+    fit("white.asc", &["--trim", "0.5"], USAGE, &["trim"]);
+    fit("flat.asc", &scale("1"), INPUT, &["no texture", "constant", "3 m"]);
+    fit("void.asc", &scale("1"), INPUT, &["void.asc", "none of the 96 x 96 cells holds data"]);
+    fit("sparse.asc", &scale("1"), INPUT, &["0.5 of its window", "min_valid_share"]);
+    let ring = "[[-1, -1], [99, -1], [99, 99], [-1, 99], [-1, -1]]";
+    write(path, "all.geojson", &format!("{{\"type\": \"Polygon\", \"coordinates\": [{ring}]}}"));
+    fit("white.asc", &["--exclude", "all.geojson"], INPUT, &["none of the DEM's cells"]);
+}
+
+#[test]
+fn val_everything_that_a_texture_refuses() {
+    let folder = area();
+    let path = folder.path();
+    let fit = |sigma_m: f64, range_m: f64| {
+        let parameters = format!("{{\"sigma_m\": {sigma_m}, \"range_m\": {range_m}}}");
+        write(path, "fit.json", &format!("{{\"model\": \"exponential\", \"parameters\": {parameters}}}"));
+    };
+    let texture = ["texture", "fit.json", "--size", "8x8", "--cell", "0.1", "-o", "t.tif"];
+    for (sigma_m, range_m, key) in [(0.0, 0.3, "sigma_m"), (-1.0, 0.3, "sigma_m"), (0.1, 0.0, "range_m")] {
+        fit(sigma_m, range_m);
+        refused(path, &texture, USAGE, &[key, "above 0"]);
+    }
+    let notes = |arguments: &[&str]| {
+        let call = sastrugi_in(path, arguments);
+        assert_eq!(call.code, 0, "{}", call.stderr);
+        call.stdout
+    };
+    fit(0.1, 0.15);
+    assert!(notes(&texture).contains("more than half the range"), "{}", notes(&texture));
+    fit(0.1, 3.0);
+    let cropped = [&texture[..], &["--set", "periodic=false"]].concat();
+    refused(path, &texture, USAGE, &["not positive definite", "periodic = false"]);
+    assert!(!notes(&cropped).contains("half the range"));
+}
+
+/// Degrees become metres with a note that says where; a point cloud in degrees is refused by its reader.
+#[test]
+fn val_a_geographic_raster_is_converted_with_a_note() {
+    let folder = area();
+    let dem = sastrugi_fixtures::jacksboro();
+    let arguments = ["fit", dem.to_str().unwrap(), "--outer-scale", "4000", "--bootstrap", "0", "-o", "fit.json"];
+    let call = sastrugi_in(folder.path(), &arguments);
+    assert_eq!(call.code, 0, "{}", call.stderr);
+    assert!(call.stdout.contains("note: geographic raster converted to metres at its centre latitude 36."));
+}
+
 #[test]
 fn val_bad_masks_are_input_errors() {
     let folder = area();
