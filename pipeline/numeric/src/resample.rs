@@ -17,15 +17,18 @@ pub fn metres_per_degree(latitude_deg: f64) -> [f64; 2] {
     [(prime_vertical * cos).to_radians(), meridian.to_radians()]
 }
 
-/// The grid with its cells in metres instead of degrees, scaled at the latitude of its centre; its south-west corner
-/// becomes the origin. No height is resampled. The scale error towards the northern and southern edges is
-/// `tan(latitude) * half height`: about 0.9 % for a 1 degree tile at 45 degrees.
+/// The grid with its cells in metres instead of degrees ([`in_metres`]). No height is resampled.
 pub fn geographic_to_metres(grid: &Grid) -> Grid {
-    let g = grid.geometry;
+    Grid { geometry: in_metres(&grid.geometry), values: grid.values.clone() }
+}
+
+/// A geographic geometry with its cells in metres instead of degrees, scaled at the latitude of its centre; its south-west
+/// corner becomes the origin. The scale error towards the northern and southern edges is `tan(latitude) * half height`:
+/// about 0.9 % for a 1 degree tile at 45 degrees.
+pub fn in_metres(g: &Geometry) -> Geometry {
     let centre = g.origin[1] + 0.5 * g.size()[1];
     let [east, north] = metres_per_degree(centre);
-    let geometry = Geometry { cell: [g.cell[0] * east, g.cell[1] * north], origin: [0.0; 2], ..g };
-    Grid { geometry, values: grid.values.clone() }
+    Geometry { cell: [g.cell[0] * east, g.cell[1] * north], origin: [0.0; 2], ..*g }
 }
 
 /// The cells whose centres lie in the closed rectangle `[x0, y0, x1, y1]`, or `None` when there is none.

@@ -233,14 +233,18 @@ pub fn to_metres(dem: Dem) -> (Dem, Vec<String>) {
     if !dem.info.crs.geographic {
         return (dem, notes);
     }
-    let before = dem.grid.geometry;
     let grid = resample::geographic_to_metres(&dem.grid);
-    let latitude = before.origin[1] + 0.5 * before.size()[1];
-    notes.push(format!(
-        "geographic raster converted to metres at its centre latitude {latitude:.4} deg: cells of {:.3} x {:.3} m",
-        grid.geometry.cell[0], grid.geometry.cell[1]
-    ));
+    notes.push(metres_note(&dem.grid.geometry, &grid.geometry));
     (Dem { grid, info: dem::DemInfo { crs: Crs::default(), ..dem.info } }, notes)
+}
+
+/// The sentence on a geographic raster that was brought to metres.
+pub fn metres_note(degrees: &Geometry, metres: &Geometry) -> String {
+    let latitude = degrees.origin[1] + 0.5 * degrees.size()[1];
+    let [x, y] = metres.cell;
+    format!(
+        "geographic raster converted to metres at its centre latitude {latitude:.4} deg: cells of {x:.3} x {y:.3} m"
+    )
 }
 
 /// A store error as a job's.

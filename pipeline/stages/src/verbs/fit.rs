@@ -2,15 +2,19 @@
 
 use super::{Read, Reading, parameters, read, transects};
 use crate::error::Error;
+use crate::jobs::dem::{input_error, metres_note};
 use crate::jobs::fit::{STAGE, to_json};
-use sastrugi_numeric::Streams;
+use sastrugi_numeric::resample::in_metres;
+use sastrugi_numeric::{Geometry, Streams};
 use sastrugi_schemas::fit::{FitFile, MaskSource, Source};
 use sastrugi_schemas::kind::{read_parameters, schema_of};
-use sastrugi_store::dem::Dem;
+use sastrugi_store::dem::{self, BlockReader, Dem, Format, ReadOptions};
 use sastrugi_store::{atomic, digest};
-use sastrugi_texture::{FitError, FitParameters, FitSettings};
+use sastrugi_texture::{FitError, FitOutcome, FitParameters, FitSettings, Heights, Profiles};
 use serde_json::Value;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
+use std::sync::Mutex;
 
 /// What to fit.
 pub struct Request<'a> {
@@ -34,18 +38,88 @@ pub fn fit(request: &Request<'_>) -> Result<(FitFile, Vec<String>), Error> {
     parameters::check_schema(&request.parameters, &schema_of::<FitParameters>(), "fit")?;
     let raw: FitParameters = read_parameters(&request.parameters)?;
     let settings = FitSettings::try_from(raw)?;
-    if let Some(found) = transects(request.dem, &request.reading)? {
-        let (path, count) = (request.dem.display(), found.profiles.len());
-        return Err(Error::Input(format!("{path}: holds {count} transects; a fit takes a DEM")));
-    }
-    let Read { dem, notes, masked_share } = read(request.dem, &request.reading)?;
-    let outcome =
-        sastrugi_texture::fit(&dem.grid, &settings, &Streams::for_seed(request.seed, STAGE)).map_err(refused)?;
+    let Fitted { outcome, notes, masked_share } = fitted(request, &settings)?;
     let source = Source { masked_share, ..source_of(request)? };
     let fit = FitFile { source: Some(source), ..outcome.fit };
     atomic::write(request.output, to_json(&fit)?.as_bytes())
         .map_err(|e| Error::failed(format!("{}: {e}", request.output.display())))?;
     Ok((fit, notes))
+}
+
+struct Fitted {
+    outcome: FitOutcome,
+    notes: Vec<String>,
+    masked_share: Option<f64>,
+}
+
+/// The fit of transects, of a raster that is read in parts, or of a DEM in memory.
+fn fitted(request: &Request<'_>, settings: &FitSettings) -> Result<Fitted, Error> {
+    let streams = Streams::for_seed(request.seed, STAGE);
+    let whole = |heights: &dyn Heights, notes: Vec<String>| {
+        let outcome = sastrugi_texture::fit(heights, settings, &streams).map_err(refused)?;
+        Ok(Fitted { outcome, notes, masked_share: None })
+    };
+    if let Some(found) = transects(request.dem, &request.reading)? {
+        let profiles = Profiles::new(found.spacing_m, &found.profiles).map_err(refused)?;
+        return whole(
+            &profiles,
+            vec![format!("{} transects, a height every {} m", found.names.len(), found.spacing_m)],
+        );
+    }
+    if let Some((parts, notes)) = Parts::of_large(request.dem, &request.reading)? {
+        return whole(&parts, notes);
+    }
+    let Read { dem, notes, masked_share } = read(request.dem, &request.reading)?;
+    Ok(Fitted { masked_share, ..whole(&dem.grid, notes)? })
+}
+
+/// Cells above which a GeoTIFF is read in parts: half a gigabyte of heights.
+const PARTS_CELLS: usize = 1 << 26;
+/// Rows that are decoded at once, whatever part of them is wanted.
+const PARTS_ROWS: usize = 64;
+
+/// A raster of which parts are read as they are needed.
+struct Parts {
+    reader: Mutex<BlockReader>,
+    geometry: Geometry,
+}
+
+impl Parts {
+    /// A GeoTIFF that is better not held in memory, with sentences on how it is read.
+    fn of_large(path: &Path, reading: &Reading) -> Result<Option<(Self, Vec<String>)>, Error> {
+        if Format::of_name(path) != Some(Format::GeoTiff) || reading.window.is_some() || !reading.masks.is_empty() {
+            return Ok(None);
+        }
+        let options = ReadOptions { cell_m: reading.cell_m };
+        let reader = dem::open(path, &options).map_err(|e| Error::from(input_error(&e)))?;
+        let (own, mut notes) = (reader.geometry(), reader.info().notes.clone());
+        if own.len() <= PARTS_CELLS {
+            return Ok(None);
+        }
+        let mut geometry = own;
+        if reader.info().crs.geographic {
+            geometry = in_metres(&own);
+            notes.push(metres_note(&own, &geometry));
+        }
+        notes.push(format!("{} x {} cells, read in parts", own.rows, own.cols));
+        Ok(Some((Self { reader: Mutex::new(reader), geometry }, notes)))
+    }
+}
+
+impl Heights for Parts {
+    fn geometry(&self) -> Geometry {
+        self.geometry
+    }
+
+    fn part(&self, rows: Range<usize>, cols: Range<usize>) -> Result<Vec<f64>, String> {
+        let mut reader = self.reader.lock().map_err(|_| "reading of the raster was given up".to_owned())?;
+        let mut part = Vec::with_capacity(rows.len() * cols.len());
+        for first in rows.clone().step_by(PARTS_ROWS) {
+            let some = reader.read_rows(first..(first + PARTS_ROWS).min(rows.end)).map_err(|e| e.to_string())?;
+            (0..some.rows()).for_each(|r| part.extend_from_slice(&some.row(r)[cols.clone()]));
+        }
+        Ok(part)
+    }
 }
 
 /// What the fit file says of the files it was made from.
