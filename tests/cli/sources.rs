@@ -119,6 +119,29 @@ fn val_masks_go_into_the_release() {
     assert_eq!(stale.len(), 2, "{plan}");
 }
 
+/// A generated terrain has its own place.
+#[test]
+fn val_a_terrain_is_masked_in_its_own_metres() {
+    let folder = area();
+    let path = folder.path();
+    write(
+        path,
+        "west.geojson",
+        r#"{"type": "Polygon", "coordinates": [[[-1, -1], [11.3, -1], [9.7, 99], [-1, 99], [-1, -1]]]}"#,
+    );
+    let study = "[study]\nname = \"t\"\nseed = 7\ndate = \"2026-01-01\"\n\n[[terrain]]\nid = \"rough\"\nkind = \"multifractal\"\n\
+                 size_px = [256, 200]\n\n[[fit]]\nid = \"fit\"\ndem = \"rough\"\nouter_scale_m = 2.0\nbootstrap = 0\nmask = \"west.geojson\"\n";
+    write(path, "study.toml", study);
+    json_of(path, &["run", "study.toml", "-o", "release"]);
+    let text = std::fs::read_to_string(path.join("release/fit/fit.json")).unwrap();
+    let (ours, source) = parted(serde_json::from_str(&text).unwrap());
+    let arguments = ["--mask", "west.geojson", "--outer-scale", "2", "--bootstrap", "0", "-o", "fit.json"];
+    let (theirs, _) = parted(json_of(path, &[&["fit", "release/terrain/rough.tif"], &arguments[..]].concat()));
+    assert_eq!(ours, theirs);
+    let share = source["masked_share"].as_f64().unwrap();
+    assert!(share > 0.1 && share < 0.9, "{share}");
+}
+
 #[test]
 fn val_clouds_are_fitted_from_the_file() {
     let Some(cloud) = sastrugi_fixtures::measured("Otira_1cm_grains_G3POINT.laz") else {

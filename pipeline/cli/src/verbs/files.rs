@@ -29,10 +29,9 @@ pub fn convert(args: &Convert, common: &Common) -> Verdict {
     }
     let window = args.window.as_deref().map(|w| numbers::<4>("--window", w)).transpose()?;
     let reading = Reading { window, masks: args.masks.all(), ..reading(&args.reading)? };
-    let Read { dem: Dem { grid, info }, masked_share, .. } = read_as_it_is(&args.input, &reading)?;
+    let Read { dem: Dem { grid, info }, notes, .. } = read_as_it_is(&args.input, &reading)?;
     let lost = dem::write(&args.output, &grid, &info.crs, &options(args.compress)).map_err(failure)?;
-    let masked = masked_share.map(|share| format!("masks dropped {:.2} % of the cells with data", 100.0 * share));
-    let notes: Vec<&String> = info.notes.iter().chain(&masked).chain(&lost).collect();
+    let notes: Vec<&String> = notes.iter().chain(&lost).collect();
     let mut text = format!("{}: {} x {} cells", args.output.display(), grid.rows(), grid.cols());
     notes.iter().for_each(|note| text.push_str(&format!("\n  note: {note}")));
     let result = json!({ "file": args.output, "grid": describe_grid(&grid), "notes": notes });

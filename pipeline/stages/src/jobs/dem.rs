@@ -207,7 +207,9 @@ fn import(path: &Path, item: &DemItem) -> Result<Imported, JobError> {
         None => read.grid.clone(),
     };
     let place = Place::of(&read.grid.geometry, &cut.geometry);
-    let (metric, notes) = to_metres(Dem { grid: cut, info: read.info });
+    let mut notes = read.info.notes.clone();
+    let (metric, converted) = to_metres(Dem { grid: cut, info: read.info });
+    notes.extend(converted);
     Ok(Imported { metric, place, notes })
 }
 
@@ -228,14 +230,13 @@ pub fn window_of(grid: &Grid, window: [f64; 4]) -> Result<Grid, JobError> {
 }
 
 /// A DEM in metres, and a warning where it was in degrees.
-pub fn to_metres(dem: Dem) -> (Dem, Vec<String>) {
-    let mut notes = dem.info.notes.clone();
+pub fn to_metres(dem: Dem) -> (Dem, Option<String>) {
     if !dem.info.crs.geographic {
-        return (dem, notes);
+        return (dem, None);
     }
     let grid = resample::geographic_to_metres(&dem.grid);
-    notes.push(metres_note(&dem.grid.geometry, &grid.geometry));
-    (Dem { grid, info: dem::DemInfo { crs: Crs::default(), ..dem.info } }, notes)
+    let note = metres_note(&dem.grid.geometry, &grid.geometry);
+    (Dem { grid, info: dem::DemInfo { crs: Crs::default(), ..dem.info } }, Some(note))
 }
 
 /// The sentence on a geographic raster that was brought to metres.

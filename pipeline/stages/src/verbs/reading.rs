@@ -36,8 +36,9 @@ pub struct Read {
 /// # Errors
 /// A DEM or a mask that cannot be read, settings that it does not take, a window or masks that leave no data.
 pub fn read(path: &Path, reading: &Reading) -> Result<Read, Error> {
-    let Read { dem, masked_share, .. } = read_as_it_is(path, reading)?;
-    let (dem, notes) = to_metres(dem);
+    let Read { dem, mut notes, masked_share } = read_as_it_is(path, reading)?;
+    let (dem, converted) = to_metres(dem);
+    notes.extend(converted);
     Ok(Read { dem, notes, masked_share })
 }
 
@@ -55,7 +56,8 @@ pub fn read_as_it_is(path: &Path, reading: &Reading) -> Result<Read, Error> {
     };
     let place = Place::of(&whole, &grid.geometry);
     let masked_share = mask::of_files(&mut grid, &place, &reading.masks)?;
-    let notes = info.notes.clone();
+    let masked = masked_share.map(|share| format!("masks dropped {:.2} % of the cells with data", 100.0 * share));
+    let notes = info.notes.iter().cloned().chain(masked).collect();
     Ok(Read { dem: Dem { grid, info }, notes, masked_share })
 }
 

@@ -3,7 +3,7 @@
 use super::parameters;
 use crate::error::Error;
 use crate::jobs::texture::{STAGE, kinds, lay_onto};
-use crate::verbs::{Reading, read};
+use crate::verbs::{Read, Reading, read};
 use sastrugi_numeric::Streams;
 use sastrugi_schemas::fit::FitFile;
 use sastrugi_store::dem::{self, Crs, WriteOptions};
@@ -42,18 +42,19 @@ pub fn texture(request: &Request<'_>) -> Result<Value, Error> {
     let synthesis = sastrugi_texture::prepare(request.method, &request.parameters, &fit)?;
     super::check_output(request.output)?;
     let streams = Streams::for_seed(request.seed, STAGE);
+    let mut notes = synthesis.notes();
     let outcome = synthesis.generate(&streams).map_err(|e| Error::Usage(e.to_string()))?;
     let (heights, crs) = match request.onto {
         None => (outcome.grid, Crs::default()),
         Some(path) => {
             // A point cloud is gridded to the texture's cells.
             let gridding = GridSettings { cell_m: Some(outcome.grid.geometry.cell[0]), ..GridSettings::default() };
-            let base = read(path, &Reading { gridding, ..Reading::default() })?.dem;
+            let Read { dem: base, notes: read_notes, .. } = read(path, &Reading { gridding, ..Reading::default() })?;
+            notes.extend(read_notes);
             let sum = lay_onto(&base.grid, &outcome.grid, &synthesis.parameters());
             (sum.map_err(|e| Error::Usage(e.message))?, base.info.crs)
         }
     };
-    let mut notes = synthesis.notes();
     notes.extend(dem::write(request.output, &heights, &crs, &request.options).map_err(super::write_error)?);
     Ok(json!({
         "file": request.output.display().to_string(),
