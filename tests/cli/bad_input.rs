@@ -244,7 +244,7 @@ fn val_everything_that_a_texture_refuses() {
 fn val_a_geographic_raster_is_converted_with_a_note() {
     let folder = area();
     let dem = sastrugi_fixtures::jacksboro();
-    let arguments = ["fit", dem.to_str().unwrap(), "--outer-scale", "4000", "--bootstrap", "0", "-o", "fit.json"];
+    let arguments = ["fit", dem.to_str().unwrap(), "--outer-scale", "4000", "--mode", "paper", "-o", "fit.json"];
     let call = sastrugi_in(folder.path(), &arguments);
     assert_eq!(call.code, 0, "{}", call.stderr);
     assert!(call.stdout.contains("note: geographic raster converted to metres at its centre latitude 36."));

@@ -10,7 +10,8 @@ const PLOT: &str = r#"{"type": "Polygon", "coordinates":
 const LAKE: &str = r#"{"type": "Feature", "properties": {}, "geometry": {"type": "Polygon", "coordinates":
     [[[-84.37, 36.52], [-84.33, 36.51], [-84.31, 36.55], [-84.35, 36.57], [-84.37, 36.52]]]}}"#;
 const WINDOW: &str = "-84.40,36.46,-84.20,36.66";
-const PLAIN: [&str; 6] = ["--outer-scale", "4000", "--bootstrap", "0", "-o", "fit.json"];
+/// The quick kind of fit: what is fitted is the same.
+const PLAIN: [&str; 6] = ["--outer-scale", "1000", "--mode", "paper", "-o", "fit.json"];
 
 fn with_masks() -> tempfile::TempDir {
     let folder = area();
@@ -84,7 +85,7 @@ fn val_masks_go_into_the_release() {
     let path = folder.path();
     let study = format!(
         "[study]\nname = \"masked\"\nseed = 7\ndate = \"2026-01-01\"\n\n[[dem]]\nid = \"site\"\nfile = \"site.tif\"\n\
-         window = [{WINDOW}]\n\n[[fit]]\nid = \"fit\"\ndem = \"site\"\nouter_scale_m = 4000.0\nbootstrap = 0\n\
+         window = [{WINDOW}]\n\n[[fit]]\nid = \"fit\"\ndem = \"site\"\nouter_scale_m = 1000.0\nmode = \"paper\"\n\
          mask = 'plot.geojson' # the plot\nexclude = [\"lake.geojson\"]\n"
     );
     write(path, "study.toml", &study);
@@ -130,12 +131,12 @@ fn val_a_terrain_is_masked_in_its_own_metres() {
         r#"{"type": "Polygon", "coordinates": [[[-1, -1], [11.3, -1], [9.7, 99], [-1, 99], [-1, -1]]]}"#,
     );
     let study = "[study]\nname = \"t\"\nseed = 7\ndate = \"2026-01-01\"\n\n[[terrain]]\nid = \"rough\"\nkind = \"multifractal\"\n\
-                 size_px = [256, 200]\n\n[[fit]]\nid = \"fit\"\ndem = \"rough\"\nouter_scale_m = 2.0\nbootstrap = 0\nmask = \"west.geojson\"\n";
+                 size_px = [256, 200]\n\n[[fit]]\nid = \"fit\"\ndem = \"rough\"\nouter_scale_m = 2.0\nmode = \"paper\"\nmask = \"west.geojson\"\n";
     write(path, "study.toml", study);
     json_of(path, &["run", "study.toml", "-o", "release"]);
     let text = std::fs::read_to_string(path.join("release/fit/fit.json")).unwrap();
     let (ours, source) = parted(serde_json::from_str(&text).unwrap());
-    let arguments = ["--mask", "west.geojson", "--outer-scale", "2", "--bootstrap", "0", "-o", "fit.json"];
+    let arguments = ["--mask", "west.geojson", "--outer-scale", "2", "--mode", "paper", "-o", "fit.json"];
     let (theirs, _) = parted(json_of(path, &[&["fit", "release/terrain/rough.tif"], &arguments[..]].concat()));
     assert_eq!(ours, theirs);
     let share = source["masked_share"].as_f64().unwrap();
@@ -152,7 +153,7 @@ fn val_clouds_are_fitted_from_the_file() {
     let (path, cloud) = (folder.path(), cloud.to_str().unwrap());
     let gridding = ["--cell", "0.02", "--statistic", "p75", "--fill", "2"];
     json_of(path, &[&["convert", cloud, "grid.npy"], &gridding[..]].concat());
-    let settings = ["--outer-scale", "1", "--bootstrap", "0", "-o", "fit.json"];
+    let settings = ["--outer-scale", "1", "--mode", "paper", "--set", "min_valid_share=0.3", "-o", "fit.json"];
     let direct = parted(json_of(path, &[&["fit", cloud], &gridding[..], &settings].concat()));
     let gridded = parted(json_of(path, &[&["fit", "grid.npy", "--cell", "0.02"], &settings[..]].concat()));
     assert_eq!(direct.0["covariance_m2"], gridded.0["covariance_m2"]);
@@ -160,7 +161,7 @@ fn val_clouds_are_fitted_from_the_file() {
     let study = format!(
         "[study]\nname = \"cloud\"\nseed = 7\ndate = \"2026-01-01\"\n\n[[dem]]\nid = \"bar\"\nfile = \"{cloud}\"\n\
          cell_m = [0.02, 0.02]\nstatistic = \"p75\"\nfill_cells = 2\n\n[[fit]]\nid = \"fit\"\ndem = \"bar\"\n\
-         outer_scale_m = 1.0\nbootstrap = 0\n"
+         outer_scale_m = 1.0\nmode = \"paper\"\nmin_valid_share = 0.3\n"
     );
     write(path, "study.toml", &study);
     json_of(path, &["run", "study.toml", "-o", "release"]);
