@@ -5,8 +5,10 @@
 
 pub mod bootstrap;
 pub mod correlation;
+pub mod multiple;
 pub mod normal;
 pub mod summary;
 
 pub use bootstrap::{Interval, cluster_median};
+pub use multiple::holm;
 pub use summary::BoxPlot;

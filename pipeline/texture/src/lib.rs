@@ -12,6 +12,7 @@
 //! which covariances are filtered or fields are made.
 
 mod bitmap;
+pub mod compare;
 pub mod covariance;
 pub mod detrend;
 pub mod fit;

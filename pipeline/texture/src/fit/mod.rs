@@ -20,19 +20,19 @@
 //! strips of `survey.rs`, which do not grow with the raster but for two bits per cell, and 300 bytes per cell of up to a
 //! million for each replicate at work. Heights are read in parts, a few times ([`Heights`]).
 
-mod case;
+pub(crate) mod case;
 mod error;
-mod estimator;
+pub(crate) mod estimator;
 mod expectation;
 mod heights;
 mod least_squares;
 mod params;
 mod profile;
 mod report;
-mod resampling;
+pub(crate) mod resampling;
 mod search;
 pub(crate) mod simulate;
-mod survey;
+pub(crate) mod survey;
 mod verdicts;
 
 pub use error::FitError;

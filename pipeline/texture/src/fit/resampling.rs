@@ -91,18 +91,18 @@ fn means(sums: &[(f64, u64)]) -> Vec<f64> {
 }
 
 /// The part of a raster that is simulated.
-struct Part {
-    rows: usize,
-    cols: usize,
+pub struct Part {
+    pub rows: usize,
+    pub cols: usize,
     /// Cells with trusted data.
-    mask: Vec<bool>,
+    pub mask: Vec<bool>,
     /// Scatter of the whole over scatter of the part.
-    scale: f64,
+    pub scale: f64,
 }
 
 impl Part {
     /// The whole, or a window about the middle with as much of it as may be.
-    fn of(case: &Case) -> Self {
+    pub fn of(case: &Case) -> Self {
         let (rows, cols) = (case.geometry.rows, case.geometry.cols);
         let shrink = (CELLS_MAX as f64 / (rows * cols) as f64).sqrt().min(1.0);
         let part = [rows, cols].map(|n| ((n as f64 * shrink) as usize).max(3 * case.window.cells()[0]).min(n));

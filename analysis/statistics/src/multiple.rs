@@ -1,0 +1,32 @@
+//! Several tests at once.
+
+/// Holm's (1979) step-down adjustment: with `adjusted <= alpha` as the rule, the probability that any true hypothesis of
+/// the family is rejected is at most alpha, however the tests depend on each other. NaN stays NaN and counts as no test.
+pub fn holm(p: &[f64]) -> Vec<f64> {
+    let mut order: Vec<usize> = (0..p.len()).filter(|&k| !p[k].is_nan()).collect();
+    order.sort_by(|&a, &b| p[a].total_cmp(&p[b]));
+    let mut adjusted = vec![f64::NAN; p.len()];
+    let mut largest = 0.0f64;
+    for (rank, &k) in order.iter().enumerate() {
+        largest = largest.max((p[k] * (order.len() - rank) as f64).min(1.0));
+        adjusted[k] = largest;
+    }
+    adjusted
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// By hand: 4 x 0.01, 3 x 0.02, 2 x 0.03 raised to what came before it, 1 x 0.5.
+    #[test]
+    fn val_holm_by_hand() {
+        let adjusted = holm(&[0.5, 0.01, f64::NAN, 0.03, 0.02]);
+        let expected = [0.5, 0.04, f64::NAN, 0.06, 0.06];
+        for (a, e) in adjusted.iter().zip(expected) {
+            assert!((a - e).abs() < 1e-15 || a.is_nan() && e.is_nan(), "{adjusted:?}");
+        }
+        assert_eq!(holm(&[0.9, 0.8]), vec![1.0, 1.0]);
+        assert!(holm(&[]).is_empty());
+    }
+}

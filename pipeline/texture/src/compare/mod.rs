@@ -1,0 +1,173 @@
+//! Are two textures statistically the same?
+//!
+//! # What
+//! Every quantity gets one of three answers:
+//! * `same`: the interval of the difference lies within stated bounds (equivalence; Schuirmann, 1987);
+//! * `different`: equality is ruled out, and equivalence is not shown;
+//! * `cannot tell`: neither, with the reason.
+//!
+//! Quantities of two DEMs: sigma, b (and a model's shape) as the logarithm of their ratio; anisotropy as the distance of
+//! the two elongations `ln(1 / ratio) (cos 2 a, sin 2 a)`, a the azimuth of the long axis, which has no seam and is 0 for an
+//! isotropic surface; the distribution of heights as the root mean square distance of the quantiles of standardised
+//! residuals (a Wasserstein distance of order 2). Of two fits: what they hold.
+//!
+//! # Nulls
+//! Cells of one surface are correlated, so no table of a test for independent values holds (Kolmogorov-Smirnov, F,
+//! chi-squared). The null is simulated: surfaces with the pooled fitted covariance and Gaussian phases, on each side's own
+//! grid and mask, through the same moving average, trimming, correlation and fit (Davison and Hinkley, 1997, section 4.2).
+//! The heights' null also takes the pooled quantiles for its marginal (normal score), so that heavy tails that both sides
+//! share scatter as they do. Where the blocks of a site scatter more than surfaces of the model do, the null of sigma, b and
+//! anisotropy is widened by that factor: a site that is not one surface tells less. Two fits without fields: the null
+//! is normal, with the standard errors that their bootstrapped intervals imply.
+//!
+//! Intervals come from the same simulations, as differences less quantiles of the null's; they hold near
+//! equality, which is where equivalence is decided, and are approximate for surfaces far apart.
+//!
+//! # Errors
+//! Equality: Holm's (1979) adjustment, so that the probability of any wrong `different` is at most alpha (0.05) over all
+//! quantities. Equivalence: two one-sided tests, each wrong `same` has a probability of at most alpha; that all are the
+//! same together too (intersection-union test; Berger, 1982), so no adjustment is needed for that.
+//!
+//! # Cost
+//! One fit of each side, and per simulation a surface of at most a million cells and two searches for each side.
+
+mod fits;
+mod heights;
+mod params;
+mod surfaces;
+mod verdict;
+
+pub use fits::fits;
+pub use params::{CompareParameters, CompareSettings};
+pub use surfaces::surfaces;
+
+use crate::fit::FitError;
+use sastrugi_schemas::ParameterError;
+use serde::Serialize;
+
+/// An answer about one quantity, or about all of them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Answer {
+    /// Equivalent within the bounds.
+    Same,
+    /// Not equal, and not shown to be equivalent.
+    Different,
+    /// The data rules out neither.
+    CannotTell,
+}
+
+impl Answer {
+    /// In words.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Same => "same",
+            Self::Different => "different",
+            Self::CannotTell => "cannot tell",
+        }
+    }
+}
+
+/// How a difference is measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Measure {
+    /// `ln(B / A)`.
+    LogRatio,
+    /// A distance, never negative.
+    Distance,
+}
+
+/// One quantity of A and B.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Quantity {
+    /// Name and unit, as `sigma_m`.
+    pub name: String,
+    /// Value of A.
+    pub a: Option<f64>,
+    /// Value of B.
+    pub b: Option<f64>,
+    /// How the difference is measured.
+    pub measure: Measure,
+    /// Difference.
+    pub difference: Option<f64>,
+    /// Interval of the difference at level `1 - 2 alpha`.
+    pub interval: Option<[f64; 2]>,
+    /// Largest absolute difference that counts as the same.
+    pub bound: f64,
+    /// p-value of equality.
+    pub p: Option<f64>,
+    /// The same, adjusted for the number of quantities (Holm).
+    pub p_adjusted: Option<f64>,
+    /// Null.
+    pub null: Option<NullSummary>,
+    /// Answer.
+    pub answer: Answer,
+    /// Why.
+    pub why: String,
+}
+
+/// What a null was made of.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct NullSummary {
+    /// `simulated surfaces`, or `intervals of the fits`.
+    pub kind: &'static str,
+    /// Number of draws.
+    pub draws: usize,
+    /// Mean of the difference under equality.
+    pub mean: f64,
+    /// Its standard deviation.
+    pub standard_deviation: f64,
+    /// Factor by which it was widened because blocks of the sites scatter more than the model does.
+    pub widened: f64,
+}
+
+/// A comparison of two textures.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Comparison {
+    /// What was compared: `surfaces` or `fits`.
+    pub what: &'static str,
+    /// Every quantity.
+    pub quantities: Vec<Quantity>,
+    /// `different` when any is, `same` when all are.
+    pub answer: Answer,
+    /// The answer in a sentence.
+    pub sentence: String,
+    /// Largest probability of any wrong `different`, and of each wrong `same`.
+    pub alpha: f64,
+    /// Covariance model.
+    pub model: String,
+    /// Simulated surfaces of each side.
+    pub simulations: usize,
+    /// Name of the random streams.
+    pub streams: String,
+    /// What a reader must know.
+    pub notes: Vec<String>,
+}
+
+/// Two textures that cannot be compared.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum CompareError {
+    /// A parameter is out of its range.
+    #[error(transparent)]
+    Parameter(#[from] ParameterError),
+    /// One side cannot be fitted.
+    #[error("{side}: {error}")]
+    Side {
+        /// `A` or `B`.
+        side: &'static str,
+        /// Why.
+        error: FitError,
+    },
+    /// The likelihood of one side has no shape.
+    #[error(
+        "{side}: the covariance of its lags cannot be inverted, so that its parameters have no weights; mask what is no texture, or take a larger outer scale"
+    )]
+    NoLikelihood {
+        /// `A` or `B`.
+        side: &'static str,
+    },
+}
+
+#[cfg(test)]
+mod tests;

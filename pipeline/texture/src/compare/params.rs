@@ -1,0 +1,118 @@
+//! Parameters of a comparison.
+
+use crate::covariance::Form;
+use crate::fit::{FitParameters, FitSettings, Mode};
+use sastrugi_schemas::ParameterError;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Fewest simulations: at 0.05 over four or five quantities, Holm's first step needs a p-value of 0.0125 or 0.01.
+const SIMULATIONS_MIN: u32 = 99;
+/// Most simulations.
+const SIMULATIONS_MAX: u32 = 100_000;
+
+/// Raw parameters of a comparison.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct CompareParameters {
+    /// Outer scale of both fits, m. Default 2.
+    pub outer_scale_m: f64,
+    /// Significance level at which residuals are trimmed. Default 0.05.
+    pub trim: f64,
+    /// Covariance model of both, one term, with `+nugget` where wanted. Default `exponential`.
+    pub model: String,
+    /// Relative difference of sigma that still counts as the same. Default 0.1.
+    pub equivalence_sigma: f64,
+    /// Relative difference of b. Default 0.25.
+    pub equivalence_range: f64,
+    /// Relative difference of a shape (smoothness, Hurst exponent). Default 0.25.
+    pub equivalence_shape: f64,
+    /// Relative difference of the ratio of axes. Default 0.25.
+    pub equivalence_anisotropy: f64,
+    /// Root mean square distance of the quantiles of standardised heights, standard deviations. Default 0.1.
+    pub equivalence_heights: f64,
+    /// Simulated surfaces of each side. Default 199.
+    pub simulations: u32,
+    /// Largest probability of any wrong `different`, and of each wrong `same`. Default 0.05.
+    pub alpha: f64,
+}
+
+impl Default for CompareParameters {
+    fn default() -> Self {
+        let fit = FitParameters::default();
+        Self {
+            outer_scale_m: fit.outer_scale_m,
+            trim: fit.trim,
+            model: fit.model,
+            equivalence_sigma: 0.1,
+            equivalence_range: 0.25,
+            equivalence_shape: 0.25,
+            equivalence_anisotropy: 0.25,
+            equivalence_heights: 0.1,
+            simulations: 199,
+            alpha: 0.05,
+        }
+    }
+}
+
+/// Checked parameters of a comparison.
+#[derive(Clone)]
+pub struct CompareSettings {
+    parameters: CompareParameters,
+    pub(super) form: Form,
+    pub(super) fit: FitSettings,
+}
+
+impl TryFrom<CompareParameters> for CompareSettings {
+    type Error = ParameterError;
+
+    fn try_from(parameters: CompareParameters) -> Result<Self, ParameterError> {
+        let p = &parameters;
+        for (name, bound) in [
+            ("equivalence_sigma", p.equivalence_sigma),
+            ("equivalence_range", p.equivalence_range),
+            ("equivalence_shape", p.equivalence_shape),
+            ("equivalence_anisotropy", p.equivalence_anisotropy),
+            ("equivalence_heights", p.equivalence_heights),
+        ] {
+            ParameterError::positive(name, bound)?;
+        }
+        ParameterError::between("alpha", p.alpha, 0.0, 0.5)?;
+        if !(SIMULATIONS_MIN..=SIMULATIONS_MAX).contains(&p.simulations) {
+            let message = format!("is {}; it must lie in [{SIMULATIONS_MIN}, {SIMULATIONS_MAX}]", p.simulations);
+            return Err(ParameterError::new("simulations", message));
+        }
+        let form = one_term(&p.model)?;
+        let fit = FitParameters {
+            mode: Mode::Corrected,
+            outer_scale_m: p.outer_scale_m,
+            trim: p.trim,
+            model: form.name().to_owned(),
+            bootstrap: 0,
+            ..FitParameters::default()
+        };
+        Ok(Self { fit: fit.try_into()?, form, parameters })
+    }
+}
+
+/// A form whose parameters mean the same on both sides.
+fn one_term(model: &str) -> Result<Form, ParameterError> {
+    let refuse = || {
+        let message =
+            format!("is `{model}`; a comparison takes one model of one term, as `exponential` or `matern+nugget`");
+        ParameterError::new("model", message)
+    };
+    if model.contains(',') || model.trim() == "auto" {
+        return Err(refuse());
+    }
+    let form = Form::parse(model.trim())?;
+    // An axis is fitted in any case.
+    if form.terms().len() == 1 { Ok(form.isotropic()) } else { Err(refuse()) }
+}
+
+impl CompareSettings {
+    /// The parameters with every default written out.
+    pub fn parameters(&self) -> &CompareParameters {
+        &self.parameters
+    }
+}

@@ -1,0 +1,157 @@
+use super::*;
+use crate::covariance::Covariance;
+use crate::covariance::filtered::Measurement;
+use crate::fit::simulate::{Shape, Simulator};
+use sastrugi_numeric::{Geometry, Grid, Streams};
+use sastrugi_schemas::fit::{FitFile, Intervals};
+
+const CELL_M: f64 = 0.06;
+
+fn exponential(sigma_m: f64, range_m: f64) -> Covariance {
+    Covariance::new(crate::covariance::model("exponential").unwrap(), sigma_m, range_m).unwrap()
+}
+
+/// A normal surface cut from a torus twice as wide.
+fn surface(covariance: &Covariance, cells: usize, name: &str) -> Grid {
+    let quiet = Measurement { inner_scale_m: 0.0, noise_sigma_m: 0.0 };
+    let simulator =
+        Simulator::new(covariance, quiet, Shape { rows: cells, cols: cells, profiles: false }, [CELL_M; 2], 16.0);
+    let values = simulator.surface(&Streams::for_seed(1, "compare-test").child(name));
+    Grid::new(Geometry::square(cells, cells, CELL_M), values)
+}
+
+/// A window of 17 cells.
+const WINDOW_M: f64 = 1.0;
+
+fn settings(simulations: u32) -> CompareSettings {
+    CompareParameters { simulations, outer_scale_m: WINDOW_M, ..CompareParameters::default() }.try_into().unwrap()
+}
+
+fn compared(a: &Grid, b: &Grid, simulations: u32, name: &str) -> Comparison {
+    surfaces(a, b, &settings(simulations), &Streams::for_seed(2, "compare-test").child(name)).unwrap()
+}
+
+fn answer(comparison: &Comparison, name: &str) -> Answer {
+    comparison.quantities.iter().find(|q| q.name == name).unwrap().answer
+}
+
+/// A surface and one of 1.3 times its heights: sigma is different; the other three quantities are those of one surface.
+#[test]
+fn val_a_taller_surface_is_different() {
+    let covariance = exponential(0.1, 0.12);
+    let (a, b) = (surface(&covariance, 160, "a"), surface(&covariance, 160, "b"));
+    let taller = b.map(|z| 1.3 * z);
+    let comparison = compared(&a, &taller, 99, "taller");
+    assert_eq!(answer(&comparison, "sigma_m"), Answer::Different, "{comparison:#?}");
+    assert!(comparison.differs() && comparison.sentence.contains("sigma_m"));
+}
+
+/// A surface against itself is the same in everything that its own size can show, and never different.
+#[test]
+#[ignore = "slow: ./test --full"]
+fn val_a_surface_is_like_itself() {
+    let a = surface(&exponential(0.1, 0.12), 200, "self");
+    let comparison = compared(&a, &a, 99, "self");
+    assert_eq!(answer(&comparison, "sigma_m"), Answer::Same, "{comparison:#?}");
+    assert!(!comparison.differs());
+    assert!(comparison.quantities.iter().all(|q| q.difference == Some(0.0)));
+}
+
+/// Different cells, shapes and masks on the two sides are no difference of the surfaces.
+#[test]
+#[ignore = "slow: ./test --full"]
+fn val_grids_may_differ() {
+    let covariance = exponential(0.1, 0.12);
+    let quiet = Measurement { inner_scale_m: 0.0, noise_sigma_m: 0.0 };
+    let simulator =
+        Simulator::new(&covariance, quiet, Shape { rows: 120, cols: 90, profiles: false }, [0.1, 0.08], 16.0);
+    let values = simulator.surface(&Streams::for_seed(1, "compare-test").child("oblong"));
+    let geometry = Geometry { rows: 120, cols: 90, cell: [0.1, 0.08], origin: [5.0, 7.0] };
+    let mut b = Grid::new(geometry, values);
+    b.values[2000..2600].fill(f64::NAN);
+    let comparison = compared(&surface(&covariance, 160, "square"), &b, 99, "grids");
+    assert!(!comparison.differs(), "{comparison:#?}");
+}
+
+/// Null: both sides are one exponential. 60 pairs of 128 x 128 cells, 99 simulations each; a pair has any wrong `different`
+/// with probability 0.05 at most, so that more than 11 of 60 has a false-alarm probability of 3e-5 (binomial). A null that
+/// took cells as independent would call nearly all pairs different. Power: 1.3 times the sigma is found in at least 40 of 60
+/// (the truth is near 58), and its interval of sigma holds 1.3 in all but 12 of 60 (90 % nominal; 4e-3 were it exact, and
+/// blocks only widen it).
+#[test]
+#[ignore = "slow: ./test --full"]
+fn stat_false_alarms_and_power() {
+    let covariance = exponential(0.1, 0.12);
+    let (mut wrong, mut found, mut covered) = (0, 0, 0);
+    for k in 0..60 {
+        let (a, b) = (surface(&covariance, 128, &format!("a{k}")), surface(&covariance, 128, &format!("b{k}")));
+        wrong += usize::from(compared(&a, &b, 99, &format!("null{k}")).differs());
+        let taller = compared(&a, &b.map(|z| 1.3 * z), 99, &format!("power{k}"));
+        found += usize::from(answer(&taller, "sigma_m") == Answer::Different);
+        let [low, high] = taller.quantities[0].interval.unwrap();
+        covered += usize::from(low <= libm::log(1.3) && libm::log(1.3) <= high);
+    }
+    println!("wrong {wrong} of 60, found {found} of 60, covered {covered} of 60");
+    assert!(wrong <= 11 && found >= 40 && covered >= 48, "{wrong} {found} {covered}");
+}
+
+fn fit_file(model: &str, values: &[(&str, f64, [f64; 2])]) -> FitFile {
+    let intervals = values.iter().map(|(name, _, interval)| ((*name).to_owned(), interval.map(Some))).collect();
+    FitFile {
+        model: model.to_owned(),
+        parameters: values.iter().map(|(name, value, _)| ((*name).to_owned(), *value)).collect(),
+        intervals: Some(Intervals { level: 0.95, replicates: 99, from_profile: false, values: intervals }),
+        ..FitFile::default()
+    }
+}
+
+fn compared_fits(a: &FitFile, b: &FitFile) -> Comparison {
+    fits(a, b, &settings(99), &Streams::for_seed(3, "compare-test")).unwrap()
+}
+
+/// By hand: intervals of 0.95 and factors of 1.0198 (2 % each way) are standard errors of 0.01; the difference of two has
+/// 0.01414, so that a ratio of 1.04 (0.0392) is 2.77 of them (p = 0.0056), and its 90 % interval is exp(0.0392 +- 0.02326).
+#[test]
+fn val_fits_by_hand() {
+    let e = libm::exp(1.959_964 * 0.01);
+    let sigma = |v: f64| ("sigma_m", v, [v / e, v * e]);
+    let range = ("range_m", 0.3, [0.15, 0.6]);
+    let a = fit_file("exponential", &[sigma(0.1), range]);
+    let comparison = compared_fits(&a, &fit_file("exponential", &[sigma(0.104), range]));
+    let q = &comparison.quantities[0];
+    let [low, high] = q.interval.unwrap().map(libm::exp);
+    assert!((low - 1.0161).abs() < 5e-4 && (high - 1.0645).abs() < 5e-4, "{q:?}");
+    assert!((q.p.unwrap() - 0.0056).abs() < 2e-3, "{q:?}");
+    assert_eq!(q.answer, Answer::Same, "{q:?}");
+    assert!(q.why.contains("though not equal"));
+    assert_eq!(comparison.quantities[1].answer, Answer::CannotTell);
+    assert_eq!(compared_fits(&a, &fit_file("exponential", &[sigma(0.13), range])).answer, Answer::Different);
+}
+
+/// What two files do not hold is `cannot tell`, with the reason.
+#[test]
+fn val_fits_say_what_they_lack() {
+    let a = fit_file("exponential", &[("sigma_m", 0.1, [0.09, 0.11]), ("range_m", 0.3, [0.2, 0.4])]);
+    let bare = FitFile { intervals: None, ..a.clone() };
+    let why = |c: &Comparison, k: usize| c.quantities[k].why.clone();
+    let comparison = compared_fits(&a, &bare);
+    assert_eq!(comparison.answer, Answer::CannotTell);
+    assert!(why(&comparison, 0).contains("B holds no interval of sigma_m"), "{comparison:?}");
+    assert!(why(&comparison, 2).contains("anisotropic:exponential"));
+    assert!(why(&comparison, 3).contains("no heights"));
+    let mut open = a.clone();
+    open.intervals.as_mut().unwrap().values.insert("range_m".to_owned(), [Some(0.2), None]);
+    assert!(why(&compared_fits(&a, &open), 1).contains("is open"));
+    let gaussian = FitFile { model: "gaussian".to_owned(), ..a.clone() };
+    assert!(why(&compared_fits(&a, &gaussian), 0).contains("one model"));
+}
+
+#[test]
+fn val_settings_are_checked() {
+    let refused = |p: CompareParameters| CompareSettings::try_from(p).err().unwrap().to_string();
+    let base = CompareParameters::default;
+    assert!(refused(CompareParameters { model: "auto".to_owned(), ..base() }).contains("one model"));
+    assert!(refused(CompareParameters { model: "exponential+gaussian".to_owned(), ..base() }).contains("one term"));
+    assert!(refused(CompareParameters { simulations: 10, ..base() }).contains("99"));
+    assert!(refused(CompareParameters { equivalence_sigma: 0.0, ..base() }).contains("equivalence_sigma"));
+}
