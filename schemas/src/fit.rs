@@ -1,5 +1,6 @@
 //! The fit file (JSON): what `fit` writes and `texture` reads.
 
+use crate::coregistration::Minus;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -80,6 +81,9 @@ pub struct Source {
     /// Share of the window's cells with data that the masks dropped.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub masked_share: Option<f64>,
+    /// The DEM that was subtracted, when one was, and how it was laid onto this one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub minus: Option<Minus>,
 }
 
 /// A mask of a fit.

@@ -2,6 +2,7 @@
 //! the manifest, MCAP topics and roughness classes. No algorithms, no file formats.
 
 pub mod class;
+pub mod coregistration;
 pub mod fit;
 pub mod kind;
 pub mod manifest;

@@ -127,6 +127,9 @@ pub struct FitItem {
     /// As `mask`, for cells that take no part.
     #[serde(default)]
     pub exclude: Files,
+    /// Id of a DEM that is laid onto the first and subtracted (snow depth), both in one metric coordinate system.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub minus: Option<String>,
     /// Seed of the replicates' random streams; follows from the study's seed and the id when absent.
     #[serde(default)]
     pub seed: Option<u64>,

@@ -3,5 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may end where it stands")]
 
 mod bad_input;
+mod compare;
+mod minus;
 mod sources;
 mod verbs;

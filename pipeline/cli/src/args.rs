@@ -9,8 +9,8 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, Parser)]
 #[command(name = "sastrugi", version, propagate_version = true, max_term_width = 100)]
 #[command(
-    after_help = "Exit codes: 0 done, 1 failed, 2 bad usage or study, 3 done but some items failed, 4 verification found a \
-difference, 65 input data missing or unusable, 75 interrupted or retryable.\n\nExample:\n  sastrugi run fixtures/studies/quickstart.toml -o release"
+    after_help = "Exit codes: 0 done, 1 failed, 2 bad usage or study, 3 done but some items failed, 4 verification (or compare \
+--fail-on-difference) found a difference, 65 input data missing or unusable, 75 interrupted or retryable.\n\nExample:\n  sastrugi run fixtures/studies/quickstart.toml -o release"
 )]
 pub struct Arguments {
     /// What to do.
@@ -60,7 +60,8 @@ pub enum Verb {
     #[command(after_help = "Examples:\n  sastrugi fit snow.tif --outer-scale 2 -o fit.json\n  \
         sastrugi fit snow.tif --outer-scale 2 --model auto --bootstrap 199 -o fit.json\n  \
         sastrugi fit snow.tif --outer-scale 2 --mask plot.geojson --exclude trees.geojson -o fit.json\n  \
-        sastrugi fit scan.laz --cell 0.05 --statistic median --outer-scale 2 -o fit.json")]
+        sastrugi fit scan.laz --cell 0.05 --statistic median --outer-scale 2 -o fit.json\n  \
+        sastrugi fit snow_on.tif --minus snow_off.tif --outer-scale 2 -o depth.json")]
     Fit(Fit),
     /// Synthesise a texture that matches a fit.
     #[command(
@@ -77,6 +78,11 @@ pub enum Verb {
     /// Write the report of a release: one offline HTML page, figures as SVG, numbers as JSON.
     #[command(after_help = "Example:\n  sastrugi report release -o release-report")]
     Report(Report),
+    /// Say whether two DEMs or two fits are statistically the same.
+    #[command(after_help = "Answers per quantity: same (within the bounds), different, cannot tell.\n\nExamples:\n  \
+        sastrugi compare site.tif synthetic.tif --outer-scale 2\n  \
+        sastrugi compare site.json synthetic.json --equivalence-sigma 0.05 --fail-on-difference")]
+    Compare(Compare),
     /// Convert between DEM formats, by file name ending (.tif .asc .hgt .png .npy .obj), and grid point clouds (.las .laz).
     #[command(
         after_help = "Examples:\n  sastrugi convert N44W072.hgt tile.tif\n  sastrugi convert scan.laz scan.tif --cell 0.05 --fill 2"
@@ -281,6 +287,9 @@ pub struct Fit {
     /// How the DEM is read.
     #[command(flatten)]
     pub reading: Reading,
+    /// DEM that is laid onto the first (shift, raise, tilt) and subtracted, as for snow depth.
+    #[arg(long, value_name = "DEM")]
+    pub minus: Option<PathBuf>,
     /// Any other parameter of the fit (see `kinds fit`), `name=value`.
     #[arg(long = "set", value_name = "K=V")]
     pub set: Vec<String>,
@@ -372,6 +381,54 @@ pub struct Report {
     /// Folder to write, never inside of the release; ./NAME-report when absent.
     #[arg(short, long, value_name = "DIR")]
     pub output: Option<PathBuf>,
+}
+
+/// `compare`.
+#[derive(Debug, Args)]
+pub struct Compare {
+    /// DEM or fit file.
+    pub a: PathBuf,
+    /// DEM or fit file.
+    pub b: PathBuf,
+    /// End with exit code 4 when any quantity is different.
+    #[arg(long)]
+    pub fail_on_difference: bool,
+    /// Window of the moving average that separates background from texture, m.
+    #[arg(long, value_name = "M", allow_negative_numbers = true)]
+    pub outer_scale: Option<f64>,
+    /// Covariance model of both, of one term.
+    #[arg(long, value_name = "MODEL")]
+    pub model: Option<String>,
+    /// Relative difference of sigma that counts as the same (0.1).
+    #[arg(long, value_name = "SHARE", allow_negative_numbers = true)]
+    pub equivalence_sigma: Option<f64>,
+    /// Relative difference of b that counts as the same (0.25).
+    #[arg(long, value_name = "SHARE", allow_negative_numbers = true)]
+    pub equivalence_range: Option<f64>,
+    /// Relative difference of the ratio of axes that counts as the same (0.25).
+    #[arg(long, value_name = "SHARE", allow_negative_numbers = true)]
+    pub equivalence_anisotropy: Option<f64>,
+    /// Distance of the height distributions that counts as the same, standard deviations (0.1).
+    #[arg(long, value_name = "SHARE", allow_negative_numbers = true)]
+    pub equivalence_heights: Option<f64>,
+    /// Simulated surfaces of each DEM (199).
+    #[arg(long, value_name = "N")]
+    pub simulations: Option<u32>,
+    /// Seed of the simulations' random streams.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u64,
+    /// Part of A, x0,y0,x1,y1 in its own coordinates.
+    #[arg(long, value_name = "X0,Y0,X1,Y1", allow_hyphen_values = true)]
+    pub window_a: Option<String>,
+    /// Part of B.
+    #[arg(long, value_name = "X0,Y0,X1,Y1", allow_hyphen_values = true)]
+    pub window_b: Option<String>,
+    /// Cell size for files that carry none, m: one number, or east-west,north-south.
+    #[arg(long, value_name = "M", allow_hyphen_values = true)]
+    pub cell: Option<String>,
+    /// Any other parameter: trim, alpha, equivalence_shape; `name=value`.
+    #[arg(long = "set", value_name = "K=V")]
+    pub set: Vec<String>,
 }
 
 /// `convert`.

@@ -13,6 +13,7 @@
 
 mod bitmap;
 pub mod compare;
+pub mod coregister;
 pub mod covariance;
 pub mod detrend;
 pub mod fit;

@@ -83,8 +83,14 @@ pub fn fit(args: &Fit, common: &Common) -> Verdict {
     put("inner_scale_m", args.inner_scale.map(|v| json!(v)));
     let window = args.window.as_deref().map(|w| numbers::<4>("--window", w)).transpose()?;
     let reading = Reading { window, masks: args.masks.all(), ..reading(&args.reading)? };
-    let request =
-        verbs::fit::Request { dem: &args.dem, output: &args.output, parameters: params, seed: args.seed, reading };
+    let request = verbs::fit::Request {
+        dem: &args.dem,
+        output: &args.output,
+        parameters: params,
+        seed: args.seed,
+        reading,
+        minus: args.minus.as_deref(),
+    };
     let (fit, read_notes) = verbs::fit::fit(&request)?;
     let interval = |name: &str| {
         let [low, high] = fit.intervals.as_ref()?.values.get(name)?;

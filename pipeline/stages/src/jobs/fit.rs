@@ -7,14 +7,18 @@ use super::{Estimate, ItemRef, Job, JobError, Outcome, Product, Rows, Work};
 use crate::registry::{BuildError, Builder, unknown_id};
 use crate::revision::Room;
 use crate::runner::graph::Node;
-use sastrugi_numeric::Streams;
+use crate::study::Entry;
+use sastrugi_numeric::{Grid, Streams};
 use sastrugi_roughness::{histogram, power_spectrum};
 use sastrugi_schemas::Kind;
+use sastrugi_schemas::coregistration::Minus;
 use sastrugi_schemas::fit::{FitFile, Source};
 use sastrugi_schemas::kind::{read_parameters, schema_of};
 use sastrugi_schemas::study::FitItem;
 use sastrugi_schemas::tables::{CovarianceRow, FitRow};
+use sastrugi_store::dem::Dem;
 use sastrugi_store::{atomic, dem, digest};
+use sastrugi_texture::coregister::coregister;
 use sastrugi_texture::{FitParameters, FitSettings};
 use serde_json::{Value, json};
 
@@ -44,9 +48,62 @@ struct FitJob {
     dem: ItemRef,
     masks: Vec<Mask>,
     source: Source,
+    minus: Option<Subtrahend>,
     settings: FitSettings,
     streams: Streams,
     cells: u64,
+}
+
+/// A DEM that is laid onto the fitted one and subtracted.
+#[derive(Clone)]
+struct Subtrahend {
+    id: String,
+    dem: ItemRef,
+    source: Source,
+}
+
+impl Subtrahend {
+    fn of(builder: &Builder<'_>, entry: &Entry<'_>, id: &str) -> Result<Self, BuildError> {
+        let Some(field) = builder.heightfields.get(id) else {
+            return Err(unknown_id(entry, "minus", id, builder.heightfields.keys()).into());
+        };
+        Ok(Self { id: id.to_owned(), dem: field.item.clone(), source: builder.source_of(id, field) })
+    }
+
+    /// The DEM less this one.
+    fn subtract(&self, dem: &Dem, work: &Work<'_>) -> Result<(Grid, Minus), JobError> {
+        let other = dem::read(&work.parent(&self.dem, HEIGHTS)?).map_err(|e| input_error(&e))?;
+        subtract(dem, &other, &self.source.file, &self.source.sha256)
+    }
+}
+
+/// One DEM less another, laid onto it, and the record of that.
+///
+/// # Errors
+/// DEMs in different coordinate systems, or that cannot be laid onto each other.
+pub fn subtract(dem: &Dem, other: &Dem, file: &str, sha256: &str) -> Result<(Grid, Minus), JobError> {
+    let (one, two) = (dem.info.crs.epsg, other.info.crs.epsg);
+    if let (Some(one), Some(two)) = (one, two)
+        && one != two
+    {
+        return Err(JobError::input(format!(
+            "the DEMs are in EPSG:{one} and EPSG:{two}; bring the second to the first: gdalwarp -t_srs EPSG:{one} -r bilinear"
+        )));
+    }
+    let laid = coregister(&dem.grid, &other.grid).map_err(JobError::input)?;
+    let minus = Minus { file: file.to_owned(), sha256: sha256.to_owned(), coregistration: laid.coregistration };
+    Ok((laid.difference, minus))
+}
+
+/// What was subtracted, for people.
+pub fn minus_note(minus: &Minus) -> String {
+    let c = &minus.coregistration;
+    let slow = if c.converged { "" } else { ", and did not come to rest" };
+    format!(
+        "{} was moved {:.3} m east and {:.3} m north, raised {:.3} m and subtracted on {} cells: NMAD {:.4} m before, {:.4} m \
+         after; {} rounds{slow}",
+        minus.file, c.shift_m[0], c.shift_m[1], c.raise_m, c.cells, c.nmad_before_m, c.nmad_after_m, c.iterations
+    )
 }
 
 /// Adds the items of `[[fit]]`.
@@ -63,7 +120,9 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
         let masks = mask::add(builder, &entry, &item)?;
         let mask_sources = masks.iter().map(|m| m.source.clone()).collect();
         let source = Source { masks: mask_sources, ..builder.source_of(&item.dem, &field) };
-        let parents: Vec<ItemRef> = [&field.item].into_iter().chain(masks.iter().map(|m| &m.item)).cloned().collect();
+        let minus = item.minus.as_ref().map(|id| Subtrahend::of(builder, &entry, id)).transpose()?;
+        let others = masks.iter().map(|m| &m.item).chain(minus.iter().map(|m| &m.dem));
+        let parents: Vec<ItemRef> = [&field.item].into_iter().chain(others).cloned().collect();
         for one in entry.expand(&item.id, None, &item.sweep, &params)? {
             builder.claim(&entry, STAGE, &one.id)?;
             let raw: FitParameters = read_parameters(&one.params).map_err(|e| entry.refuse(e))?;
@@ -74,6 +133,7 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
                 dem: field.item.clone(),
                 masks: masks.clone(),
                 source: source.clone(),
+                minus: minus.clone(),
                 settings,
                 streams: builder.streams(STAGE, &one.id, item.seed, 0),
                 cells: field.cells,
@@ -94,7 +154,8 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
 
 impl Job for FitJob {
     fn recipe(&self) -> Value {
-        json!({ "dem": self.dem_id, "source": self.source, "fit": self.settings.parameters() })
+        let minus = self.minus.as_ref().map(|m| json!({ "dem": m.id, "source": m.source }));
+        json!({ "dem": self.dem_id, "source": self.source, "minus": minus, "fit": self.settings.parameters() })
     }
 
     fn rooms(&self) -> &'static [Room] {
@@ -116,9 +177,15 @@ impl Job for FitJob {
     fn run(&self, work: &Work<'_>) -> Result<Outcome, JobError> {
         let mut read = dem::read(&work.parent(&self.dem, HEIGHTS)?).map_err(|e| input_error(&e))?;
         let masked_share = mask::of_item(&mut read.grid, &self.dem, &self.masks, work)?;
+        let mut source = Source { masked_share, ..self.source.clone() };
+        if let Some(subtrahend) = &self.minus {
+            let (difference, minus) = subtrahend.subtract(&read, work)?;
+            read.grid = difference;
+            source.minus = Some(minus);
+        }
+        let notes = source.minus.as_ref().map(minus_note);
         let outcome = sastrugi_texture::fit(&read.grid, &self.settings, &self.streams).map_err(JobError::new)?;
         let [background, residual] = outcome.rasters(&read.grid).map_err(JobError::new)?;
-        let source = Source { masked_share, ..self.source.clone() };
         let fit = FitFile { source: Some(source), ..outcome.fit };
         atomic::write(&work.output(FIT), to_json(&fit)?.as_bytes()).map_err(JobError::new)?;
         let id = &self.id;
@@ -134,7 +201,7 @@ impl Job for FitJob {
             height_distribution: height_rows(id, &histogram(&residual, HISTOGRAM_BINS)),
             ..Rows::default()
         };
-        Ok(Outcome { products, rows, notes: fit.warnings })
+        Ok(Outcome { products, rows, notes: notes.into_iter().chain(fit.warnings).collect() })
     }
 }
 

@@ -3,9 +3,10 @@
 use super::{Read, Reading, parameters, read, transects};
 use crate::error::Error;
 use crate::jobs::dem::{input_error, metres_note};
-use crate::jobs::fit::{STAGE, to_json};
+use crate::jobs::fit::{STAGE, minus_note, subtract, to_json};
 use sastrugi_numeric::resample::in_metres;
 use sastrugi_numeric::{Geometry, Streams};
+use sastrugi_schemas::coregistration::Minus;
 use sastrugi_schemas::fit::{FitFile, MaskSource, Source};
 use sastrugi_schemas::kind::{read_parameters, schema_of};
 use sastrugi_store::dem::{self, BlockReader, Dem, Format, ReadOptions};
@@ -28,6 +29,8 @@ pub struct Request<'a> {
     pub seed: u64,
     /// What of the DEM to take, and how.
     pub reading: Reading,
+    /// DEM that is laid onto the first and subtracted.
+    pub minus: Option<&'a Path>,
 }
 
 /// Fits a DEM and writes the fit file. Returns it with sentences on how the DEM was read.
@@ -38,8 +41,8 @@ pub fn fit(request: &Request<'_>) -> Result<(FitFile, Vec<String>), Error> {
     parameters::check_schema(&request.parameters, &schema_of::<FitParameters>(), "fit")?;
     let raw: FitParameters = read_parameters(&request.parameters)?;
     let settings = FitSettings::try_from(raw)?;
-    let Fitted { outcome, notes, masked_share } = fitted(request, &settings)?;
-    let source = Source { masked_share, ..source_of(request)? };
+    let Fitted { outcome, notes, masked_share, minus } = fitted(request, &settings)?;
+    let source = Source { masked_share, minus, ..source_of(request)? };
     let fit = FitFile { source: Some(source), ..outcome.fit };
     atomic::write(request.output, to_json(&fit)?.as_bytes())
         .map_err(|e| Error::failed(format!("{}: {e}", request.output.display())))?;
@@ -50,6 +53,7 @@ struct Fitted {
     outcome: FitOutcome,
     notes: Vec<String>,
     masked_share: Option<f64>,
+    minus: Option<Minus>,
 }
 
 /// The fit of transects, of a raster that is read in parts, or of a DEM in memory.
@@ -57,8 +61,14 @@ fn fitted(request: &Request<'_>, settings: &FitSettings) -> Result<Fitted, Error
     let streams = Streams::for_seed(request.seed, STAGE);
     let whole = |heights: &dyn Heights, notes: Vec<String>| {
         let outcome = sastrugi_texture::fit(heights, settings, &streams).map_err(refused)?;
-        Ok(Fitted { outcome, notes, masked_share: None })
+        Ok(Fitted { outcome, notes, masked_share: None, minus: None })
     };
+    if let Some(path) = request.minus {
+        let Read { mut dem, mut notes, masked_share } = read(request.dem, &request.reading)?;
+        let minus = subtracted(&mut dem, request, path)?;
+        notes.push(minus_note(&minus));
+        return Ok(Fitted { masked_share, minus: Some(minus), ..whole(&dem.grid, notes)? });
+    }
     if let Some(found) = transects(request.dem, &request.reading)? {
         let profiles = Profiles::new(found.spacing_m, &found.profiles).map_err(refused)?;
         return whole(
@@ -133,7 +143,25 @@ fn source_of(request: &Request<'_>) -> Result<Source, Error> {
     };
     let (file, sha256) = hashed(request.dem)?;
     let masks = request.reading.masks.iter().map(mask).collect::<Result<_, _>>()?;
-    Ok(Source { file, sha256, window: request.reading.window, masks, masked_share: None })
+    Ok(Source { file, sha256, window: request.reading.window, masks, ..Source::default() })
+}
+
+/// Replaces a DEM by its difference from another.
+fn subtracted(read: &mut Dem, request: &Request<'_>, path: &Path) -> Result<Minus, Error> {
+    let options = ReadOptions { cell_m: request.reading.cell_m };
+    let metric = |path: &Path| {
+        let dem = dem::read_with(path, &options).map_err(|e| Error::from(input_error(&e)))?;
+        // Degrees become metres from each DEM's own corner, and their places are lost.
+        let message = "is in degrees; DEMs are subtracted in metres: reproject both (gdalwarp -t_srs EPSG:...)";
+        if dem.info.crs.geographic { Err(Error::Input(format!("{}: {message}", path.display()))) } else { Ok(dem) }
+    };
+    metric(request.dem)?;
+    let other = metric(path)?;
+    let (_, sha256) = digest::of_file(path).map_err(|e| Error::Input(format!("{}: {e}", path.display())))?;
+    let file = path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
+    let (difference, minus) = subtract(read, &other, &file, &sha256)?;
+    read.grid = difference;
+    Ok(minus)
 }
 
 /// As [`read`], without masks.

@@ -1,5 +1,6 @@
 //! Verbs that work on single files: the same kernels as in a study, without a study.
 
+pub mod compare;
 pub mod fit;
 pub mod parameters;
 mod reading;

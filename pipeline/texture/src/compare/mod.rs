@@ -107,6 +107,24 @@ pub struct Quantity {
     pub why: String,
 }
 
+impl Quantity {
+    /// A difference in words: ratios as ratios.
+    pub fn shown(&self, difference: f64) -> String {
+        match self.measure {
+            Measure::LogRatio => format!("x{:.3}", libm::exp(difference)),
+            Measure::Distance => format!("{difference:.3}"),
+        }
+    }
+
+    /// The differences that count as the same, in words.
+    pub fn bounds_shown(&self) -> String {
+        match self.measure {
+            Measure::LogRatio => format!("{} to {}", self.shown(-self.bound), self.shown(self.bound)),
+            Measure::Distance => self.shown(self.bound),
+        }
+    }
+}
+
 /// What a null was made of.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct NullSummary {

@@ -25,7 +25,7 @@ mod error;
 pub(crate) mod estimator;
 mod expectation;
 mod heights;
-mod least_squares;
+pub(crate) mod least_squares;
 mod params;
 mod profile;
 mod report;
