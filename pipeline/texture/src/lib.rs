@@ -23,6 +23,9 @@ pub mod registry;
 mod sizes;
 pub mod synth;
 
+#[cfg(test)]
+mod gstools_tests;
+
 pub use fit::{FitError, FitOutcome, FitParameters, FitSettings, Heights, Profiles, fit};
 pub use onto::{OntoError, onto};
 pub use registry::{kinds, prepare};

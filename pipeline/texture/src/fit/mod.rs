@@ -28,7 +28,7 @@ mod heights;
 pub(crate) mod least_squares;
 mod params;
 mod profile;
-mod report;
+pub(crate) mod report;
 pub(crate) mod resampling;
 mod search;
 pub(crate) mod simulate;

@@ -91,7 +91,7 @@ pub fn directions(estimator: &Estimator, estimate: &Estimate) -> Vec<DirectionBi
 }
 
 /// The model in the words of GSTools; `None` for sums and self-affine surfaces, which it has no class for.
-fn gstools(form: &Form, covariance: &Covariance) -> Option<GsTools> {
+pub fn gstools(form: &Form, covariance: &Covariance) -> Option<GsTools> {
     let [term] = covariance.structures.as_slice() else { return None };
     let (model, len_scale, more) = match form.terms()[0].kind().kind {
         "exponential" => ("Exponential", term.range_m, vec![("rescale", 1.0)]),
