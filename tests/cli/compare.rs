@@ -61,13 +61,22 @@ fn prop_dems_are_compared_whatever_the_threads() {
         let call = sastrugi_in(path, &[&made[..], &["-o", name]].concat());
         assert_eq!(call.code, 0, "{}", call.stderr);
     }
-    let compare = ["compare", "a.tif", "b.tif", "--outer-scale", "0.9", "--simulations", "99", "--seed", "7"];
+    let compare = ["compare", "a.tif", "b.tif", "--outer-scale", "0.9", "--simulations", "119", "--seed", "7"];
     let one = json(path, &[&compare[..], &["--threads", "1"]].concat(), 0);
     assert_eq!(one, json(path, &[&compare[..], &["--threads", "2"]].concat(), 0));
-    assert_eq!((one["what"].as_str(), one["simulations"].as_u64()), (Some("surfaces"), Some(99)));
+    assert_eq!((one["what"].as_str(), one["simulations"].as_u64()), (Some("surfaces"), Some(119)));
     assert_ne!(one["answer"], "different", "{one}");
-    let mixed = json(path, &["compare", "a.tif", "fit.json", "--outer-scale", "0.9", "--simulations", "99"], 0);
+    let mixed = json(path, &["compare", "a.tif", "fit.json", "--outer-scale", "0.9", "--simulations", "119"], 0);
     assert_eq!((mixed["a"]["what"].as_str(), mixed["b"]["what"].as_str()), (Some("dem"), Some("fit")));
+    let halves = json(path, &["compare", "a.tif", "--split-half", "--outer-scale", "0.9", "--simulations", "119"], 0);
+    let names: Vec<&str> = halves["quantities"].as_array().unwrap().iter().filter_map(|q| q["name"].as_str()).collect();
+    assert!(names.contains(&"third_order_structure") && !names.contains(&"sigma_m"), "{names:?}");
+    assert_eq!((halves["what"].as_str(), halves["b"].is_null()), (Some("halves"), true));
+    // A fit and its own DEM agree by construction.
+    let call = sastrugi_in(path, &["fit", "a.tif", "--outer-scale", "0.9", "--bootstrap", "0", "-o", "own.json"]);
+    assert_eq!(call.code, 0, "{}", call.stderr);
+    let call = sastrugi_in(path, &["compare", "own.json", "a.tif"]);
+    assert!(call.code == 2 && call.stderr.contains("says nothing"), "{}", call.stderr);
 }
 
 #[test]
@@ -76,7 +85,9 @@ fn val_what_cannot_be_compared_is_refused() {
     let path = folder.path();
     fit_file(path, "a.json", 0.1);
     std::fs::create_dir(path.join("release")).unwrap();
-    let cases: [(&[&str], i32, &str); 5] = [
+    let cases: [(&[&str], i32, &str); 7] = [
+        (&["compare", "a.json"], 2, "<B>"),
+        (&["compare", "a.json", "--split-half"], 2, "takes a DEM"),
         (&["compare", "release", "a.json"], 2, "not releases"),
         (&["compare", "a.json", "missing.tif"], 65, "missing.tif"),
         (&["compare", "a.json", "a.json", "--window-a", "0,0,1,1"], 2, "no window"),

@@ -78,7 +78,7 @@ pub enum Verb {
     /// Write the report of a release: one offline HTML page, figures as SVG, numbers as JSON.
     #[command(after_help = "Example:\n  sastrugi report release -o release-report")]
     Report(Report),
-    /// Say whether two DEMs or two fits are statistically the same.
+    /// Say whether two DEMs or two fits are statistically the same, or a texture like its site.
     #[command(after_help = "Answers per quantity: same (within the bounds), different, cannot tell.\n\nExamples:\n  \
         sastrugi compare site.tif synthetic.tif --outer-scale 2\n  \
         sastrugi compare site.json synthetic.json --equivalence-sigma 0.05 --fail-on-difference")]
@@ -389,7 +389,11 @@ pub struct Compare {
     /// DEM or fit file.
     pub a: PathBuf,
     /// DEM or fit file.
-    pub b: PathBuf,
+    #[arg(required_unless_present = "split_half")]
+    pub b: Option<PathBuf>,
+    /// Fit one half of A, and compare textures of that fit with the other half, on what was not fitted.
+    #[arg(long, conflicts_with_all = ["b", "window_b"])]
+    pub split_half: bool,
     /// End with exit code 4 when any quantity is different.
     #[arg(long)]
     pub fail_on_difference: bool,
@@ -426,7 +430,7 @@ pub struct Compare {
     /// Cell size for files that carry none, m: one number, or east-west,north-south.
     #[arg(long, value_name = "M", allow_hyphen_values = true)]
     pub cell: Option<String>,
-    /// Any other parameter: trim, alpha, equivalence_shape; `name=value`.
+    /// Any other parameter: trim, alpha, equivalence_shape, equivalence_agreement; `name=value`.
     #[arg(long = "set", value_name = "K=V")]
     pub set: Vec<String>,
 }

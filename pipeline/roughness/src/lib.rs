@@ -4,6 +4,7 @@
 //! Every function takes a DEM in metres with NaN where there is no data, and says what it does with such cells.
 //! Roughness classes are the codes [`LOW`], [`SEMI`], [`HIGH`] and [`NO_CLASS`].
 
+mod agreement;
 mod band;
 mod classes;
 mod closing;
@@ -13,6 +14,7 @@ pub mod multifractality;
 mod spectrum;
 mod summary;
 
+pub use agreement::{Statistic, unfitted_statistics};
 pub use band::{band_rms, moving_average, odd_cells};
 pub use classes::{ClassThresholds, HIGH, LOW, NO_CLASS, SEMI, Shares, ThresholdError, classify, shares};
 pub use closing::close_disk;

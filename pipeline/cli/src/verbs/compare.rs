@@ -24,15 +24,12 @@ pub fn compare(args: &Compare, common: &Common) -> Verdict {
     args.simulations.iter().for_each(|n| params["simulations"] = json!(n));
     args.model.iter().for_each(|m| params["model"] = json!(m));
     let window = |option: &str, text: &Option<String>| text.as_deref().map(|w| numbers::<4>(option, w)).transpose();
-    let request = Request {
-        sides: [
-            Side { path: &args.a, window: window("--window-a", &args.window_a)? },
-            Side { path: &args.b, window: window("--window-b", &args.window_b)? },
-        ],
-        parameters: params,
-        seed: args.seed,
-        cell_m: cell(args.cell.as_deref())?,
+    let a = Side { path: &args.a, window: window("--window-a", &args.window_a)? };
+    let b = match &args.b {
+        Some(path) => Some(Side { path, window: window("--window-b", &args.window_b)? }),
+        None => None,
     };
+    let request = Request { a, b, parameters: params, seed: args.seed, cell_m: cell(args.cell.as_deref())? };
     let (comparison, record) = compare::compare(&request)?;
     print(common.json, &record, &text(&comparison))?;
     Ok(if args.fail_on_difference && comparison.differs() { Code::Difference } else { Code::Done })

@@ -7,7 +7,8 @@ use crate::verbs::fit::read_metric;
 use sastrugi_numeric::{Grid, Streams};
 use sastrugi_schemas::fit::FitFile;
 use sastrugi_schemas::kind::{read_parameters, schema_of};
-use sastrugi_texture::compare::{CompareError, CompareParameters, CompareSettings, fits, surfaces};
+use sastrugi_store::digest;
+use sastrugi_texture::compare::{CompareError, CompareParameters, CompareSettings, fits, halves, surfaces};
 pub use sastrugi_texture::compare::{Comparison, Quantity};
 use sastrugi_texture::{FitParameters, FitSettings};
 use serde_json::{Value, json};
@@ -26,8 +27,10 @@ pub struct Side<'a> {
 
 /// What to compare.
 pub struct Request<'a> {
-    /// A and B.
-    pub sides: [Side<'a>; 2],
+    /// A.
+    pub a: Side<'a>,
+    /// B; where there is none, textures of one half of A are compared with its other half.
+    pub b: Option<Side<'a>>,
     /// Parameters of the comparison.
     pub parameters: Value,
     /// Seed of the random streams.
@@ -41,41 +44,72 @@ enum Content {
     Fit(Box<FitFile>),
 }
 
-/// Compares two DEMs, two fits, or a DEM (fitted as the fit was) and a fit. Returns the comparison and its full record.
+/// Compares two DEMs, two fits, a DEM (fitted as the fit was) and a fit, or textures of one half of a DEM with its other half.
+/// Returns the comparison and its full record.
 ///
 /// # Errors
-/// Unknown parameters, a release, files that cannot be read or fitted.
+/// Unknown parameters, a release, files that cannot be read or fitted, a fit and the DEM that it was made from.
 pub fn compare(request: &Request<'_>) -> Result<(Comparison, Value), Error> {
     parameters::check_schema(&request.parameters, &schema_of::<CompareParameters>(), STAGE)?;
     let raw: CompareParameters = read_parameters(&request.parameters)?;
     let settings = CompareSettings::try_from(raw)?;
     let streams = Streams::for_seed(request.seed, STAGE);
-    let [(a, mut notes), (b, more)] = [read(&request.sides[0], request)?, read(&request.sides[1], request)?];
-    notes.extend(more);
-    let mut comparison = match (&a, &b) {
-        (Content::Dem(a), Content::Dem(b)) => surfaces(a, b, &settings, &streams).map_err(refused)?,
-        (Content::Fit(a), Content::Fit(b)) => fits(a, b, &settings, &streams)?,
-        (Content::Dem(dem), Content::Fit(fit)) => {
+    let a = read(&request.a, request)?;
+    let b = request.b.as_ref().map(|side| read(side, request)).transpose()?;
+    let mut comparison = match (&a.content, b.as_ref().map(|b| &b.content)) {
+        (Content::Dem(site), None) => halves(site, &settings, &streams).map_err(refused)?,
+        (Content::Dem(one), Some(Content::Dem(other))) => surfaces(one, other, &settings, &streams).map_err(refused)?,
+        (Content::Fit(one), Some(Content::Fit(other))) => fits(one, other, &settings, &streams)?,
+        (Content::Dem(dem), Some(Content::Fit(fit))) => {
+            not_circular(&request.a, fit)?;
             fits(&like(dem, fit, &settings, &streams)?, fit, &settings, &streams)?
         }
-        (Content::Fit(fit), Content::Dem(dem)) => {
+        (Content::Fit(fit), Some(Content::Dem(dem))) => {
+            request.b.as_ref().map_or(Ok(()), |side| not_circular(side, fit))?;
             fits(fit, &like(dem, fit, &settings, &streams)?, &settings, &streams)?
         }
+        (Content::Fit(_), None) => {
+            let message = "a fit file has no halves; `--split-half` takes a DEM";
+            return Err(Error::Usage(format!("{}: {message}", request.a.path.display())));
+        }
     };
-    comparison.notes.splice(0..0, notes);
-    let described = |side: &Side, content: &Content| {
-        let what = if matches!(content, Content::Dem(_)) { "dem" } else { "fit" };
-        json!({ "file": side.path.display().to_string(), "what": what, "window": side.window })
-    };
+    let notes = [Some(&a), b.as_ref()].into_iter().flatten().flat_map(|side| side.notes.clone());
+    comparison.notes = notes.chain(comparison.notes).collect();
     let mut record = serde_json::to_value(&comparison).map_err(Error::failed)?;
-    record["a"] = described(&request.sides[0], &a);
-    record["b"] = described(&request.sides[1], &b);
+    record["a"] = a.described(&request.a);
+    record["b"] = json!(b.as_ref().zip(request.b.as_ref()).map(|(read, side)| read.described(side)));
     record["parameters"] = serde_json::to_value(settings.parameters()).map_err(Error::failed)?;
     record["seed"] = json!(request.seed);
     Ok((comparison, record))
 }
 
-fn read(side: &Side<'_>, request: &Request<'_>) -> Result<(Content, Vec<String>), Error> {
+/// A side as it was read.
+struct Read {
+    content: Content,
+    notes: Vec<String>,
+}
+
+impl Read {
+    fn described(&self, side: &Side<'_>) -> Value {
+        let what = if matches!(self.content, Content::Dem(_)) { "dem" } else { "fit" };
+        json!({ "file": side.path.display().to_string(), "what": what, "window": side.window })
+    }
+}
+
+/// A fit agrees with the DEM that it was made from: that is no evidence.
+fn not_circular(side: &Side<'_>, fit: &FitFile) -> Result<(), Error> {
+    let name = side.path.display();
+    let (_, sha256) = digest::of_file(side.path).map_err(|e| Error::Input(format!("{name}: {e}")))?;
+    match fit.source.as_ref().is_some_and(|source| source.sha256 == sha256) {
+        true => Err(Error::Usage(format!(
+            "{name} is the DEM that the fit was made from: that they agree says nothing; `compare {name} --split-half` judges a \
+             texture by what was not fitted"
+        ))),
+        false => Ok(()),
+    }
+}
+
+fn read(side: &Side<'_>, request: &Request<'_>) -> Result<Read, Error> {
     let name = side.path.display();
     if side.path.is_dir() {
         let message = format!(
@@ -88,12 +122,12 @@ fn read(side: &Side<'_>, request: &Request<'_>) -> Result<(Content, Vec<String>)
     if !is_fit {
         let (dem, notes) = read_metric(side.path, side.window, request.cell_m)?;
         let notes = notes.into_iter().map(|n| format!("{name}: {n}")).collect();
-        return Ok((Content::Dem(dem.grid), notes));
+        return Ok(Read { content: Content::Dem(dem.grid), notes });
     }
     if side.window.is_some() {
         return Err(Error::Usage(format!("{name} is a fit file, which has no window to cut")));
     }
-    Ok((Content::Fit(Box::new(read_fit(side.path)?)), Vec::new()))
+    Ok(Read { content: Content::Fit(Box::new(read_fit(side.path)?)), notes: Vec::new() })
 }
 
 /// A DEM fitted as a fit was: its model, window and trimming.

@@ -23,6 +23,10 @@
 //! Intervals come from the same simulations, as differences less quantiles of the null's; they hold near
 //! equality, which is where equivalence is decided, and are approximate for surfaces far apart.
 //!
+//! # Split halves
+//! A texture has its site's sigma and b because it was given them: comparing those is circular, and not done here. What a texture
+//! is judged by is what was not fitted, on ground that was not fitted ([`halves`]).
+//!
 //! # Errors
 //! Equality: Holm's (1979) adjustment, so that the probability of any wrong `different` is at most alpha (0.05) over all
 //! quantities. Equivalence: two one-sided tests, each wrong `same` has a probability of at most alpha; that all are the
@@ -32,12 +36,14 @@
 //! One fit of each side, and per simulation a surface of at most a million cells and two searches for each side.
 
 mod fits;
+mod halves;
 mod heights;
 mod params;
 mod surfaces;
 mod verdict;
 
 pub use fits::fits;
+pub use halves::halves;
 pub use params::{CompareParameters, CompareSettings};
 pub use surfaces::surfaces;
 
@@ -143,7 +149,7 @@ pub struct NullSummary {
 /// A comparison of two textures.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Comparison {
-    /// What was compared: `surfaces` or `fits`.
+    /// What was compared: `surfaces`, `fits` or `halves`.
     pub what: &'static str,
     /// Every quantity.
     pub quantities: Vec<Quantity>,

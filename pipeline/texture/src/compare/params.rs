@@ -6,8 +6,8 @@ use sastrugi_schemas::ParameterError;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Fewest simulations: at 0.05 over four or five quantities, Holm's first step needs a p-value of 0.0125 or 0.01.
-const SIMULATIONS_MIN: u32 = 99;
+/// Most quantities of a comparison.
+const QUANTITIES_MAX: f64 = 6.0;
 /// Most simulations.
 const SIMULATIONS_MAX: u32 = 100_000;
 
@@ -31,7 +31,9 @@ pub struct CompareParameters {
     pub equivalence_anisotropy: f64,
     /// Root mean square distance of the quantiles of standardised heights, standard deviations. Default 0.1.
     pub equivalence_heights: f64,
-    /// Simulated surfaces of each side. Default 199.
+    /// Root mean square relative difference of a statistic that was not fitted (split halves). Default 0.25.
+    pub equivalence_agreement: f64,
+    /// Simulated surfaces of each side, at least 6 / alpha - 1. Default 199.
     pub simulations: u32,
     /// Largest probability of any wrong `different`, and of each wrong `same`. Default 0.05.
     pub alpha: f64,
@@ -49,6 +51,7 @@ impl Default for CompareParameters {
             equivalence_shape: 0.25,
             equivalence_anisotropy: 0.25,
             equivalence_heights: 0.1,
+            equivalence_agreement: 0.25,
             simulations: 199,
             alpha: 0.05,
         }
@@ -74,12 +77,18 @@ impl TryFrom<CompareParameters> for CompareSettings {
             ("equivalence_shape", p.equivalence_shape),
             ("equivalence_anisotropy", p.equivalence_anisotropy),
             ("equivalence_heights", p.equivalence_heights),
+            ("equivalence_agreement", p.equivalence_agreement),
         ] {
             ParameterError::positive(name, bound)?;
         }
         ParameterError::between("alpha", p.alpha, 0.0, 0.5)?;
-        if !(SIMULATIONS_MIN..=SIMULATIONS_MAX).contains(&p.simulations) {
-            let message = format!("is {}; it must lie in [{SIMULATIONS_MIN}, {SIMULATIONS_MAX}]", p.simulations);
+        // The least p-value is one over simulations and one; Holm's first step must be able to accept it.
+        let least = (QUANTITIES_MAX / p.alpha).ceil() - 1.0;
+        if f64::from(p.simulations) < least || p.simulations > SIMULATIONS_MAX {
+            let message = format!(
+                "is {}; it must lie in [{least}, {SIMULATIONS_MAX}] at alpha = {}: fewer could never find a difference",
+                p.simulations, p.alpha
+            );
             return Err(ParameterError::new("simulations", message));
         }
         let form = one_term(&p.model)?;

@@ -38,11 +38,12 @@ struct Measured {
 }
 
 /// One side: its data, estimators on rings and on bins by direction, and estimates to start searches from.
-struct Side<'a> {
+pub(super) struct Side<'a> {
     rings: Estimator<'a>,
-    directions: Estimator<'a>,
+    pub(super) directions: Estimator<'a>,
     round: Estimate,
-    long: Estimate,
+    /// The fit with an axis.
+    pub(super) long: Estimate,
     heights: HeightCurve,
 }
 
@@ -80,7 +81,11 @@ pub fn surfaces(a: &Grid, b: &Grid, settings: &CompareSettings, streams: &Stream
     })
 }
 
-fn case<'a>(side: &'static str, dem: &'a Grid, settings: &'a CompareSettings) -> Result<Case<'a>, CompareError> {
+pub(super) fn case<'a>(
+    side: &'static str,
+    dem: &'a Grid,
+    settings: &'a CompareSettings,
+) -> Result<Case<'a>, CompareError> {
     Case::new(dem, &settings.fit).map_err(|error| CompareError::Side { side, error })
 }
 
@@ -91,7 +96,7 @@ fn weight(cases: &[Case; 2]) -> f64 {
 }
 
 impl<'a> Side<'a> {
-    fn new(
+    pub(super) fn new(
         side: &'static str,
         case: &'a Case<'a>,
         directional: &'a LagBins,
@@ -111,9 +116,8 @@ impl<'a> Side<'a> {
             return Err(CompareError::Side { side, error: FitError::White { range_m, cell_m } });
         }
         let long = lengthened(&directions, &round).ok_or(CompareError::NoLikelihood { side })?;
-        let (rows, cols) = (0..case.geometry.rows, 0..case.geometry.cols);
-        let all = case.survey.detrended(case.heights, case.settings, rows, cols);
-        let heights = HeightCurve::of(&all.map_err(|error| CompareError::Side { side, error })?.residual);
+        let residual = case.residual().map_err(|error| CompareError::Side { side, error })?;
+        let heights = HeightCurve::of(&residual);
         Ok(Self { rings, directions, round, long, heights })
     }
 

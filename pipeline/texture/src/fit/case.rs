@@ -59,6 +59,12 @@ impl<'a> Case<'a> {
         Ok(residual)
     }
 
+    /// All residuals, before trimming.
+    pub fn residual(&self) -> Result<Vec<f64>, FitError> {
+        let (rows, cols) = (0..self.geometry.rows, 0..self.geometry.cols);
+        Ok(self.survey.detrended(self.heights, self.settings, rows, cols)?.residual)
+    }
+
     /// Width of the window, m (the mean of both ways; along transects).
     pub fn window_m(&self) -> f64 {
         let [x, y] = self.window.size_m(self.geometry.cell);
