@@ -57,6 +57,25 @@ pub fn rms_slope(dem: &Grid) -> f64 {
     sums::mean(&sums::finite(&squares)).sqrt()
 }
 
+/// Root mean square of the central differences along x and along y, m/m, over the same cells as [`rms_slope`].
+pub fn rms_slopes(dem: &Grid) -> [f64; 2] {
+    let (rows, cols) = (dem.rows(), dem.cols());
+    if rows < 3 || cols < 3 {
+        return [f64::NAN; 2];
+    }
+    let [east, north] = dem.geometry.cell.map(|cell| 0.5 / cell);
+    let of_row = |r: usize| {
+        let (above, row, below) = (dem.row(r - 1), dem.row(r), dem.row(r + 1));
+        (1..cols - 1).fold([0.0; 3], |[x, y, n], c| {
+            let (dx, dy) = ((row[c + 1] - row[c - 1]) * east, (above[c] - below[c]) * north);
+            if (dx + dy).is_finite() { [x + dx * dx, y + dy * dy, n + 1.0] } else { [x, y, n] }
+        })
+    };
+    let by_row: Vec<[f64; 3]> = (1..rows - 1).into_par_iter().map(of_row).collect();
+    let total = |k: usize| sums::sum(&by_row.iter().map(|row| row[k]).collect::<Vec<_>>());
+    [0, 1].map(|k| (total(k) / total(2)).sqrt())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -104,11 +123,21 @@ mod tests {
     }
 
     #[test]
+    fn val_slopes_by_axis_make_up_the_slope() {
+        let dem = noise_with_holes(30, 40);
+        let [x, y] = rms_slopes(&dem);
+        assert!(((x * x + y * y).sqrt() / rms_slope(&dem) - 1.0).abs() < 1e-12);
+        assert!(rms_slopes(&dem.window(0, 0, 2, 9))[0].is_nan());
+    }
+
+    #[test]
     fn val_slope_of_a_plane() {
         let geometry = Geometry { rows: 6, cols: 9, cell: [0.5, 0.25], origin: [0.0; 2] };
         let plane = |k: usize| 0.3 * geometry.x(k % 9) - 0.4 * geometry.y(k / 9);
         let dem = Grid::new(geometry, (0..54).map(plane).collect());
         assert!((rms_slope(&dem) - 0.5).abs() < 1e-12);
+        let [x, y] = rms_slopes(&dem);
+        assert!((x - 0.3).abs() < 1e-12 && (y - 0.4).abs() < 1e-12);
         // The steepest neighbour is the diagonal one: (0.3 * 0.5 + 0.4 * 0.25) / hypot(0.5, 0.25).
         let steepest = 0.25 / (0.5f64 * 0.5 + 0.25 * 0.25).sqrt();
         assert!((moore_gradient(&dem).at(3, 4) - steepest).abs() < 1e-12);

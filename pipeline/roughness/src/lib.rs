@@ -1,24 +1,36 @@
-//! What a surface is like: gradients and roughness classes, heights and slopes, band roughness, spectrum, scaling
-//! exponents.
+//! What a surface is like: gradients and roughness classes, heights and slopes, band roughness, spectra, structure
+//! function, areal figures of ISO 25178, scaling exponents.
 //!
 //! Every function takes a DEM in metres with NaN where there is no data, and says what it does with such cells.
 //! Roughness classes are the codes [`LOW`], [`SEMI`], [`HIGH`] and [`NO_CLASS`].
 
 mod agreement;
+mod areal;
 mod band;
 mod classes;
 mod closing;
 mod gradient;
 mod heights;
+mod hurst;
+mod lags;
 pub mod multifractality;
+mod plane;
+mod profiles;
 mod spectrum;
+mod structure;
 mod summary;
 
 pub use agreement::{Statistic, unfitted_statistics};
+pub use areal::{ArealFigures, areal_figures};
 pub use band::{band_rms, moving_average, odd_cells};
 pub use classes::{ClassThresholds, HIGH, LOW, NO_CLASS, SEMI, Shares, ThresholdError, classify, shares};
 pub use closing::close_disk;
-pub use gradient::{moore_gradient, rms_slope};
+pub use gradient::{moore_gradient, rms_slope, rms_slopes};
 pub use heights::{HeightStatistics, HistogramBin, height_statistics, histogram};
-pub use spectrum::{SpectrumBin, power_spectrum, psd_slope};
+pub use hurst::{Hurst, hurst};
+pub use lags::{LagSums, PairSum};
+pub use plane::level;
+pub use profiles::{ProfileBin, profile_spectra};
+pub use spectrum::{SpectralMap, SpectrumBin, power_spectrum, psd_slope};
+pub use structure::{Autocorrelation, Direction, StructureBin, autocorrelation, lags_of, structure_function};
 pub use summary::{DescribeSettings, Summary, describe};

@@ -21,13 +21,14 @@
 //! # Cost
 //! One real transform of the grid, and about 24 bytes a cell.
 
-use sastrugi_numeric::fft::{HalfSpectrum, RealFft2, smooth_length};
+use crate::plane::Plane;
+use sastrugi_numeric::fft::{Complex64, HalfSpectrum, RealFft2, smooth_length};
 use sastrugi_numeric::{Geometry, Grid, sums};
 use serde::Serialize;
 use std::f64::consts::TAU;
 
 /// Rings per doubling of the frequency.
-const RINGS_PER_OCTAVE: f64 = 8.0;
+pub(crate) const RINGS_PER_OCTAVE: f64 = 8.0;
 /// First frequency of the slope's default band, cycles per shortest side.
 const SLOPE_CYCLES_MIN: f64 = 4.0;
 /// Last frequency of the slope's default band over the Nyquist frequency.
@@ -47,73 +48,101 @@ pub struct SpectrumBin {
 /// Radially averaged power spectral density, frequencies rising. Empty when fewer than three cells have data, or a side
 /// is below 3 cells.
 pub fn power_spectrum(dem: &Grid) -> Vec<SpectrumBin> {
-    let g = dem.geometry;
-    if g.rows < 3 || g.cols < 3 || dem.finite_count() < 3 {
-        return Vec::new();
-    }
-    let (rows, cols) = (smooth_length(g.rows), smooth_length(g.cols));
-    let (field, window_power) = tapered(dem, rows, cols);
-    let spectrum = RealFft2::new(rows, cols).forward(&field);
-    let density = g.cell[0] * g.cell[1] / window_power;
-    ring_means(&spectrum, &g, density)
+    SpectralMap::of(dem).map_or_else(Vec::new, |map| map.rings())
 }
+
+/// The two-dimensional density on the frequencies of the padded transform, before any averaging.
+#[derive(Clone, Debug)]
+pub struct SpectralMap {
+    geometry: Geometry,
+    spectrum: HalfSpectrum,
+    /// Density over squared modulus, m2.
+    density: f64,
+}
+
+impl SpectralMap {
+    /// Density of a heightfield; `None` when fewer than three cells have data, or a side is below 3 cells.
+    pub fn of(dem: &Grid) -> Option<Self> {
+        let g = dem.geometry;
+        if g.rows < 3 || g.cols < 3 || dem.finite_count() < 3 {
+            return None;
+        }
+        let (rows, cols) = (smooth_length(g.rows), smooth_length(g.cols));
+        let (field, window_power) = tapered(dem, rows, cols);
+        let spectrum = RealFft2::new(rows, cols).forward(&field);
+        Some(Self { geometry: g, spectrum, density: g.cell[0] * g.cell[1] / window_power })
+    }
+
+    /// Frequencies `[east, north]` in cycles/m with `f_east >= 0`, density in m4, and the number of modes that one stands
+    /// for (2 where the opposite frequency is not in the list).
+    pub fn modes(&self) -> impl Iterator<Item = ([f64; 2], f64, f64)> + '_ {
+        let (s, g) = (&self.spectrum, &self.geometry);
+        let step = [1.0 / (s.cols as f64 * g.cell[0]), 1.0 / (s.rows as f64 * g.cell[1])];
+        let signed = |k: usize, n: usize| if 2 * k > n { k as f64 - n as f64 } else { k as f64 };
+        s.values.chunks_exact(s.rows).enumerate().flat_map(move |(kx, column)| {
+            // Rows count southwards.
+            let mode = move |(ky, value): (usize, &Complex64)| {
+                let frequency = [kx as f64 * step[0], -signed(ky, s.rows) * step[1]];
+                (frequency, self.density * value.norm_sqr(), s.multiplicity(kx))
+            };
+            column.iter().enumerate().map(mode)
+        })
+    }
+
+    /// Means over rings.
+    pub fn rings(&self) -> Vec<SpectrumBin> {
+        ring_means(&self.spectrum, &self.geometry, self.density)
+    }
+
+    /// Direction of the texture (Std of ISO 25178-2), degrees clockwise from north in [0, 180): across the direction in
+    /// which the angular spectrum, the density integrated over the frequencies of the band, is largest (so along ridges
+    /// and furrows; the standard's own angle is that of the maximum). The angular spectrum is smoothed over 9 degrees.
+    /// NaN when the band holds no power.
+    pub fn direction_deg(&self, band_cycles_m: [f64; 2]) -> f64 {
+        let mut angular = [0.0; ANGLES];
+        for ([east, north], psd, multiplicity) in self.modes() {
+            let frequency = (east * east + north * north).sqrt();
+            if frequency >= band_cycles_m[0] && frequency <= band_cycles_m[1] {
+                let degrees = libm::atan2(east, north).to_degrees();
+                angular[degrees.rem_euclid(180.0).round() as usize % ANGLES] += multiplicity * psd;
+            }
+        }
+        let smooth =
+            |k: usize| -> f64 { (0..2 * SMOOTH + 1).map(|j| angular[(k + ANGLES + j - SMOOTH) % ANGLES]).sum() };
+        let best = (0..ANGLES).fold((0, 0.0), |best, k| if smooth(k) > best.1 { (k, smooth(k)) } else { best });
+        if best.1 > 0.0 { ((best.0 + ANGLES / 2) % ANGLES) as f64 } else { f64::NAN }
+    }
+}
+
+/// Directions of half a turn in the angular spectrum.
+const ANGLES: usize = 180;
+/// Directions on either side over which it is smoothed.
+const SMOOTH: usize = 4;
 
 /// The field times its window, padded to `(rows, cols)`, and the sum of the squared window.
 fn tapered(dem: &Grid, rows: usize, cols: usize) -> (Vec<f64>, f64) {
     let g = dem.geometry;
-    let plane = least_squares_plane(dem);
+    let plane = Plane::of(dem);
     let (hann_rows, hann_cols) = (hann(g.rows), hann(g.cols));
     let mut field = vec![0.0; rows * cols];
-    let mut powers = Vec::with_capacity(g.len());
+    let mut powers = Vec::with_capacity(g.rows);
     for (r, (out, wr)) in field.chunks_exact_mut(cols).zip(&hann_rows).enumerate() {
-        for (c, (v, wc)) in out.iter_mut().zip(&hann_cols).enumerate() {
-            let z = dem.at(r, c);
+        let mut power = 0.0;
+        for (c, ((v, wc), &z)) in out.iter_mut().zip(&hann_cols).zip(dem.row(r)).enumerate() {
             if z.is_finite() {
                 let weight = wr * wc;
                 *v = weight * (z - plane.at(r, c));
-                powers.push(weight * weight);
+                power += weight * weight;
             }
         }
+        powers.push(power);
     }
     (field, sums::sum(&powers))
 }
 
 /// Hann window without its zeros: `sin^2(pi (k + 1/2) / n)`.
-fn hann(n: usize) -> Vec<f64> {
+pub(crate) fn hann(n: usize) -> Vec<f64> {
     (0..n).map(|k| 0.5 - 0.5 * libm::cos(TAU * (k as f64 + 0.5) / n as f64)).collect()
-}
-
-/// `height + east (col - col_0) + north (row - row_0)`.
-struct Plane {
-    centre: [f64; 2],
-    height: f64,
-    slopes: [f64; 2],
-}
-
-impl Plane {
-    fn at(&self, row: usize, col: usize) -> f64 {
-        let [u, v] = [col as f64 - self.centre[0], row as f64 - self.centre[1]];
-        self.height + self.slopes[0] * u + self.slopes[1] * v
-    }
-}
-
-/// The plane nearest to the cells with data; level where they lie on one line.
-fn least_squares_plane(dem: &Grid) -> Plane {
-    let cols = dem.cols();
-    let cells: Vec<usize> = (0..dem.values.len()).filter(|&k| dem.values[k].is_finite()).collect();
-    let mean = |value: &dyn Fn(usize) -> f64| sums::mean(&cells.iter().map(|&k| value(k)).collect::<Vec<_>>());
-    let centre = [mean(&|k| (k % cols) as f64), mean(&|k| (k / cols) as f64)];
-    let height = mean(&|k| dem.values[k]);
-    let u = |k: usize| (k % cols) as f64 - centre[0];
-    let v = |k: usize| (k / cols) as f64 - centre[1];
-    let z = |k: usize| dem.values[k] - height;
-    let (uu, uv, vv) = (mean(&|k| u(k) * u(k)), mean(&|k| u(k) * v(k)), mean(&|k| v(k) * v(k)));
-    let (uz, vz) = (mean(&|k| u(k) * z(k)), mean(&|k| v(k) * z(k)));
-    let determinant = uu * vv - uv * uv;
-    let solvable = determinant > 1e-12 * uu * vv;
-    let slopes =
-        if solvable { [(uz * vv - vz * uv) / determinant, (vz * uu - uz * uv) / determinant] } else { [0.0; 2] };
-    Plane { centre, height, slopes }
 }
 
 fn nyquist(g: &Geometry) -> f64 {
@@ -223,6 +252,24 @@ mod tests {
         let spectrum = power_spectrum(&dem);
         let peak = spectrum.iter().max_by(|a, b| a.psd_m4.total_cmp(&b.psd_m4)).unwrap();
         assert!((peak.frequency_cycles_m / 2.0 - 1.0).abs() < 0.09, "{peak:?}");
+    }
+
+    /// A wave that travels east has ridges that run north-south; the map's density is where the wave is.
+    #[test]
+    fn val_direction_of_waves() {
+        for azimuth_deg in [0.0f64, 20.0, 45.0, 90.0, 120.0, 179.0] {
+            let (sin, cos) = libm::sincos(azimuth_deg.to_radians());
+            let g = Geometry { rows: 200, cols: 160, cell: [0.1, 0.15], origin: [0.0; 2] };
+            // Ridges along the azimuth: the phase grows across it.
+            let dem = field(g, |x, y| libm::sin(TAU * (x * cos - y * sin)));
+            let map = SpectralMap::of(&dem).unwrap();
+            let found = map.direction_deg([0.3, 3.0]);
+            let apart = (found - azimuth_deg).rem_euclid(180.0);
+            assert!(apart.min(180.0 - apart) < 2.5, "{azimuth_deg}: {found}");
+            let peak = map.modes().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap().0;
+            assert!((peak[0] * cos - peak[1] * sin).abs() > 0.97, "{peak:?}");
+            assert!(map.direction_deg([3.1, 3.0]).is_nan());
+        }
     }
 
     #[test]

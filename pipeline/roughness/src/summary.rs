@@ -1,10 +1,11 @@
 //! Everything the tables say about one heightfield.
 
+use crate::areal::{ArealFigures, areal_figures};
 use crate::band::band_rms;
 use crate::classes::{ClassThresholds, Shares, classify, shares};
 use crate::gradient::{moore_gradient, rms_slope};
 use crate::heights::{HeightStatistics, HistogramBin, height_statistics, histogram};
-use crate::spectrum::{SpectrumBin, default_slope_band, power_spectrum, psd_slope};
+use crate::spectrum::{SpectralMap, SpectrumBin, default_slope_band, psd_slope};
 use sastrugi_numeric::Grid;
 use serde::{Deserialize, Serialize};
 
@@ -24,6 +25,8 @@ pub struct DescribeSettings {
     /// Frequencies between which the slope of the spectrum is fitted, cycles/m; from 4 cycles per shorter side to half
     /// the Nyquist frequency when not given.
     pub slope_band_cycles_m: Option<[f64; 2]>,
+    /// Lags between which the Hurst exponent is fitted, m; from 1 cell to an eighth of the shorter side when not given.
+    pub hurst_lags_m: Option<[f64; 2]>,
     /// Bins of the height distribution.
     pub histogram_bins: usize,
 }
@@ -35,6 +38,7 @@ impl Default for DescribeSettings {
             border_m: 5.0,
             band_window_m: None,
             slope_band_cycles_m: None,
+            hurst_lags_m: None,
             histogram_bins: 64,
         }
     }
@@ -57,6 +61,8 @@ pub struct Summary {
     pub shares: Shares,
     /// That border, m.
     pub share_border_m: f64,
+    /// Areal figures above the least-squares plane.
+    pub areal: ArealFigures,
     /// Radially averaged power spectral density.
     pub spectrum: Vec<SpectrumBin>,
     /// Slope of the spectrum in log-log axes.
@@ -72,8 +78,10 @@ pub fn describe(dem: &Grid, settings: &DescribeSettings) -> Summary {
     let classes = classify(&moore_gradient(dem), &settings.thresholds);
     let window_m = settings.band_window_m.unwrap_or(BAND_CELLS * dem.geometry.mean_cell());
     let (band_rms_m, window) = band_rms(dem, window_m);
-    let spectrum = power_spectrum(dem);
+    let map = SpectralMap::of(dem);
+    let spectrum = map.as_ref().map_or_else(Vec::new, SpectralMap::rings);
     let slope_band_cycles_m = settings.slope_band_cycles_m.unwrap_or_else(|| default_slope_band(&dem.geometry));
+    let areal = areal_figures(dem, map.as_ref(), slope_band_cycles_m, settings.hurst_lags_m);
     Summary {
         valid_share: dem.finite_count() as f64 / dem.geometry.len() as f64,
         heights: height_statistics(dem),
@@ -82,6 +90,7 @@ pub fn describe(dem: &Grid, settings: &DescribeSettings) -> Summary {
         band_window_m: 0.5 * (window[0] + window[1]),
         shares: shares(&classes, settings.border_m),
         share_border_m: settings.border_m,
+        areal,
         psd_slope: psd_slope(&spectrum, slope_band_cycles_m),
         spectrum,
         slope_band_cycles_m,
