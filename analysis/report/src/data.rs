@@ -8,7 +8,8 @@ use sastrugi_numeric::Grid;
 use sastrugi_schemas::fit::FitFile;
 use sastrugi_schemas::manifest::FailedItem;
 use sastrugi_schemas::tables::{
-    CovarianceRow, FitRow, HeightDistributionRow, MissionRow, PsdRow, SampleRow, TerrainRow,
+    CandidateCurveRow, CandidateRow, CovarianceRow, FitRow, HeightDistributionRow, LikelihoodProfileRow, MissionRow,
+    ProfilePsdRow, PsdRow, SampleRow, StructureRow, SurfaceRow, TerrainRow,
 };
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -70,6 +71,18 @@ pub struct Data {
     pub fits: Vec<FitRow>,
     /// Covariance bins.
     pub covariance: Vec<CovarianceRow>,
+    /// Models that fits tried.
+    pub candidates: Vec<CandidateRow>,
+    /// Their curves in the bins.
+    pub candidate_curves: Vec<CandidateCurveRow>,
+    /// How likelihoods fall away along the range.
+    pub likelihood_profile: Vec<LikelihoodProfileRow>,
+    /// Figures of surfaces.
+    pub surfaces: Vec<SurfaceRow>,
+    /// Structure functions.
+    pub structure: Vec<StructureRow>,
+    /// Spectra of profiles.
+    pub profile_psd: Vec<ProfilePsdRow>,
     /// Spectra.
     pub psd: Vec<PsdRow>,
     /// Histograms of heights.
@@ -133,6 +146,40 @@ impl Data {
     pub fn spectrum(&self, id: &str) -> Vec<&PsdRow> {
         let usable = |r: &&PsdRow| r.frequency_cycles_m > 0.0 && r.psd_m4 > 0.0;
         of_key(&self.psd, |r| &r.terrain_id, id).iter().filter(usable).collect()
+    }
+
+    /// Figures of a surface.
+    pub fn surface(&self, id: &str) -> Option<&SurfaceRow> {
+        self.surfaces.iter().find(|s| s.surface_id == id)
+    }
+
+    /// Structure function of a surface in a direction: lags with a positive value.
+    pub fn structure_of(&self, id: &str, direction: &str) -> Vec<&StructureRow> {
+        let usable = |r: &&StructureRow| r.direction == direction && r.lag_m > 0.0 && r.value_m2 > 0.0;
+        of_key(&self.structure, |r| &r.surface_id, id).iter().filter(usable).collect()
+    }
+
+    /// Spectrum of a surface's profiles in a direction.
+    pub fn profile_spectrum(&self, id: &str, direction: &str) -> Vec<&ProfilePsdRow> {
+        let usable = |r: &&ProfilePsdRow| r.direction == direction && r.frequency_cycles_m > 0.0 && r.psd_m3 > 0.0;
+        of_key(&self.profile_psd, |r| &r.surface_id, id).iter().filter(usable).collect()
+    }
+
+    /// Models that a fit tried, the best first.
+    pub fn candidates_of(&self, fit: &str) -> &[CandidateRow] {
+        of_key(&self.candidates, |r| &r.fit_id, fit)
+    }
+
+    /// Curve of a candidate in the bins.
+    pub fn candidate_curve(&self, fit: &str, rank: i64) -> Vec<&CandidateCurveRow> {
+        let usable = |r: &&CandidateCurveRow| r.rank == rank && r.model_m2.is_finite();
+        of_key(&self.candidate_curves, |r| &r.fit_id, fit).iter().filter(usable).collect()
+    }
+
+    /// Profile of a fit's likelihood.
+    pub fn profile_of(&self, fit: &str) -> Vec<&LikelihoodProfileRow> {
+        let usable = |r: &&LikelihoodProfileRow| r.range_m > 0.0 && r.chi2_rise.is_finite();
+        of_key(&self.likelihood_profile, |r| &r.fit_id, fit).iter().filter(usable).collect()
     }
 
     /// Histogram of a heightfield.

@@ -31,6 +31,6 @@ pub use hurst::{Hurst, hurst};
 pub use lags::{LagSums, PairSum};
 pub use plane::level;
 pub use profiles::{ProfileBin, profile_spectra};
-pub use spectrum::{SpectralMap, SpectrumBin, power_spectrum, psd_slope};
+pub use spectrum::{SpectralMap, SpectrumBin, default_slope_band, power_spectrum, psd_slope};
 pub use structure::{Autocorrelation, Direction, StructureBin, autocorrelation, lags_of, structure_function};
 pub use summary::{DescribeSettings, Summary, describe};

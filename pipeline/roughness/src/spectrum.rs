@@ -181,7 +181,7 @@ fn ring_means(spectrum: &HalfSpectrum, g: &Geometry, density: f64) -> Vec<Spectr
 
 /// The band in which slopes are fitted unless another is asked for: from 4 cycles per shortest side, beyond the reach of
 /// plane and window, to half the Nyquist frequency, short of aliasing; cycles/m.
-pub(crate) fn default_slope_band(g: &Geometry) -> [f64; 2] {
+pub fn default_slope_band(g: &Geometry) -> [f64; 2] {
     let [size_x, size_y] = g.size();
     [SLOPE_CYCLES_MIN / size_x.min(size_y), SLOPE_NYQUIST_SHARE * nyquist(g)]
 }

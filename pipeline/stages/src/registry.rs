@@ -54,7 +54,7 @@ const SECTIONS: [Section; 6] = [
 ];
 
 /// Endings that files of the release have beside an id.
-const RESERVED: [&str; 4] = [".raw", ".metric", ".background", ".residual"];
+const RESERVED: [&str; 5] = [".raw", ".metric", ".background", ".residual", ".mask"];
 
 /// Names of the sections that are arrays of tables.
 pub fn section_names() -> Vec<&'static str> {

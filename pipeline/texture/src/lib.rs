@@ -20,6 +20,7 @@ pub mod fit;
 mod onto;
 pub mod outliers;
 pub mod registry;
+pub mod shown;
 mod sizes;
 pub mod synth;
 

@@ -19,7 +19,11 @@ super::table! {
         pairs: i64 ["1"],
         /// Fitted model in the same bin, after the same detrending and trimming where the mode corrects for them.
         model_m2: f64 ["m2"],
-        /// Fitted model itself, before detrending and trimming.
+        /// Fitted model itself, before detrending and trimming; null by direction.
         surface_model_m2: f64 ["m2"],
+        /// Lower end of the 95 % band of the empirical covariance: how much blocks of the site differ; null where there are too few.
+        covariance_low_m2: f64 ["m2"],
+        /// Upper end of that band.
+        covariance_high_m2: f64 ["m2"],
     }
 }

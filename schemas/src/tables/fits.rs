@@ -33,6 +33,60 @@ super::table! {
         used_share: f64 ["1"],
         /// Root mean square misfit of the covariance bins.
         misfit_m2: f64 ["m2"],
+        /// Range across the long axis over range along it; 1 for an isotropic model.
+        ratio: f64 ["1"],
+        /// Direction of the long axis, clockwise from north.
+        azimuth_deg: f64 ["deg"],
+        /// Level of the intervals.
+        interval_level: f64 ["1"],
+        /// Replicates of the parametric bootstrap; 0 without intervals.
+        replicates: i64 ["1"],
+        /// Lower end of the interval of sigma (profile likelihood where that is open, else bootstrap); 0 where it is open.
+        sigma_low_m: f64 ["m"],
+        /// Upper end of the interval of sigma (profile likelihood where that is open, else bootstrap); infinite where it is open.
+        sigma_high_m: f64 ["m"],
+        /// Lower end of the interval of b (profile likelihood where that is open, else bootstrap); 0 where it is open.
+        range_low_m: f64 ["m"],
+        /// Upper end of the interval of b (profile likelihood where that is open, else bootstrap); infinite where it is open.
+        range_high_m: f64 ["m"],
+        /// Lower end of the interval of sigma^2 / b by parametric bootstrap.
+        sigma2_over_range_low_m: f64 ["m"],
+        /// Upper end of the interval of sigma^2 / b by parametric bootstrap.
+        sigma2_over_range_high_m: f64 ["m"],
+        /// Replicates of the block bootstrap; 0 without intervals.
+        block_replicates: i64 ["1"],
+        /// Lower end of the interval of sigma by block bootstrap; 0 where it is open.
+        block_sigma_low_m: f64 ["m"],
+        /// Upper end of the interval of sigma by block bootstrap; infinite where it is open.
+        block_sigma_high_m: f64 ["m"],
+        /// Lower end of the interval of b by block bootstrap; 0 where it is open.
+        block_range_low_m: f64 ["m"],
+        /// Upper end of the interval of b by block bootstrap; infinite where it is open.
+        block_range_high_m: f64 ["m"],
+        /// Lower end of the interval of sigma^2 / b by block bootstrap.
+        block_sigma2_over_range_low_m: f64 ["m"],
+        /// Upper end of the interval of sigma^2 / b by block bootstrap.
+        block_sigma2_over_range_high_m: f64 ["m"],
+        /// p-value of the misfit of the bins.
+        misfit_p: f64 ["1"],
+        /// p-value of an isotropic texture against one with an axis.
+        isotropy_p: f64 ["1"],
+        /// Ratio of the texture with an axis.
+        isotropy_ratio: f64 ["1"],
+        /// Its direction, clockwise from north.
+        isotropy_azimuth_deg: f64 ["deg"],
+        /// p-value of one variance in all blocks of the site.
+        stationarity_p: f64 ["1"],
+        /// Largest over smallest standard deviation of the blocks.
+        block_sigma_max_over_min: f64 ["1"],
+        /// p-value of a normal residual.
+        normality_p: f64 ["1"],
+        /// Largest disagreement of fits at half and twice the window, in standard errors.
+        window_disagreement_z: f64 ["1"],
+        /// Standard deviation of a least-squares fit without any correction.
+        naive_sigma_m: f64 ["m"],
+        /// Range of that fit.
+        naive_range_m: f64 ["m"],
         /// Warnings, joined by `; `.
         warnings: String [""],
     }

@@ -2,20 +2,32 @@
 //!
 //! A row type is declared once by the macro `table!`; the column list, the reading order and the cells follow from it.
 
+pub mod candidate_curves;
+pub mod candidates;
 pub mod covariance;
 pub mod fits;
 pub mod height_distribution;
+pub mod likelihood_profile;
 pub mod missions;
+pub mod profile_psd;
 pub mod psd;
 pub mod samples;
+pub mod structure;
+pub mod surfaces;
 pub mod terrains;
 
+pub use candidate_curves::CandidateCurveRow;
+pub use candidates::CandidateRow;
 pub use covariance::CovarianceRow;
 pub use fits::FitRow;
 pub use height_distribution::HeightDistributionRow;
+pub use likelihood_profile::LikelihoodProfileRow;
 pub use missions::MissionRow;
+pub use profile_psd::ProfilePsdRow;
 pub use psd::PsdRow;
 pub use samples::SampleRow;
+pub use structure::StructureRow;
+pub use surfaces::SurfaceRow;
 pub use terrains::TerrainRow;
 
 use serde::Serialize;
@@ -61,11 +73,17 @@ pub struct Table {
 }
 
 /// All tables, in the order of the report and of `schema`.
-pub const ALL: [&Table; 7] = [
+pub const ALL: [&Table; 13] = [
     &TerrainRow::TABLE,
+    &SurfaceRow::TABLE,
     &FitRow::TABLE,
     &CovarianceRow::TABLE,
+    &CandidateRow::TABLE,
+    &CandidateCurveRow::TABLE,
+    &LikelihoodProfileRow::TABLE,
     &PsdRow::TABLE,
+    &ProfilePsdRow::TABLE,
+    &StructureRow::TABLE,
     &HeightDistributionRow::TABLE,
     &MissionRow::TABLE,
     &SampleRow::TABLE,

@@ -5,7 +5,8 @@ use crate::data::{Artifact, Data, Files, Study};
 use sastrugi_numeric::{Geometry, Grid, Stream, Streams, sums};
 use sastrugi_schemas::fit::FitFile;
 use sastrugi_schemas::tables::{
-    CovarianceRow, FitRow, HeightDistributionRow, MissionRow, PsdRow, SampleRow, TerrainRow,
+    CandidateCurveRow, CandidateRow, CovarianceRow, FitRow, HeightDistributionRow, LikelihoodProfileRow, MissionRow,
+    ProfilePsdRow, PsdRow, SampleRow, StructureRow, SurfaceRow, TerrainRow,
 };
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
@@ -52,6 +53,12 @@ pub fn empty() -> Data {
         terrains: Vec::new(),
         fits: Vec::new(),
         covariance: Vec::new(),
+        candidates: Vec::new(),
+        candidate_curves: Vec::new(),
+        likelihood_profile: Vec::new(),
+        surfaces: Vec::new(),
+        structure: Vec::new(),
+        profile_psd: Vec::new(),
         psd: Vec::new(),
         heights: Vec::new(),
         missions: Vec::new(),
@@ -292,8 +299,38 @@ fn measured(data: &mut Data, shelf: &mut Shelf) {
             trim_threshold_m: 45.0,
             used_share: 0.71,
             misfit_m2: 3.0,
+            ratio: 1.0,
+            azimuth_deg: f64::NAN,
+            interval_level: if mode == "paper" { f64::NAN } else { 0.95 },
+            replicates: if mode == "paper" { 0 } else { 99 },
+            sigma_low_m: if mode == "paper" { f64::NAN } else { 19.2 },
+            sigma_high_m: if mode == "paper" { f64::NAN } else { 24.1 },
+            range_low_m: if mode == "paper" { f64::NAN } else { 510.0 },
+            range_high_m: if mode == "paper" { f64::NAN } else { 905.0 },
+            sigma2_over_range_low_m: if mode == "paper" { f64::NAN } else { 0.61 },
+            sigma2_over_range_high_m: if mode == "paper" { f64::NAN } else { 0.77 },
+            block_replicates: 0,
+            block_sigma_low_m: f64::NAN,
+            block_sigma_high_m: f64::NAN,
+            block_range_low_m: f64::NAN,
+            block_range_high_m: f64::NAN,
+            block_sigma2_over_range_low_m: f64::NAN,
+            block_sigma2_over_range_high_m: f64::NAN,
+            misfit_p: if mode == "paper" { f64::NAN } else { 0.01 },
+            isotropy_p: if mode == "paper" { f64::NAN } else { 3e-9 },
+            isotropy_ratio: 0.71,
+            isotropy_azimuth_deg: 48.0,
+            stationarity_p: if mode == "paper" { f64::NAN } else { 0.002 },
+            block_sigma_max_over_min: 1.6,
+            normality_p: if mode == "paper" { f64::NAN } else { 0.4 },
+            window_disagreement_z: if mode == "paper" { f64::NAN } else { 1.2 },
+            naive_sigma_m: 14.0,
+            naive_range_m: 320.0,
             warnings: String::new(),
         });
+        if mode == "corrected" {
+            candidates(data, &fit_id, sigma_m, range_m);
+        }
         for bin in 0..17 {
             let lag_m = 90.0 * bin as f64;
             let surface = sigma_m * sigma_m * libm::exp(-lag_m / range_m);
@@ -307,10 +344,16 @@ fn measured(data: &mut Data, shelf: &mut Shelf) {
                 pairs: 20_000 * (bin + 1),
                 model_m2: seen,
                 surface_model_m2: surface,
+                covariance_low_m2: if mode == "paper" { f64::NAN } else { seen - 20.0 },
+                covariance_high_m2: if mode == "paper" { f64::NAN } else { seen + 25.0 },
             });
         }
         curves(data, &fit_id, -2.4, 8.0);
+        surface(data, &fit_id, "fit", Some(&fit_id), 8.0);
+        let mask = residual.map(|v| if v.is_nan() { 1 } else { 0 });
+        shelf.classes.insert(format!("fit/{fit_id}.mask.tif"), mask);
     }
+    surface(data, "jacksboro", "dem", None, 160.0);
     let texture = waves(Geometry::square(128, 128, 80.0), "texture", 9.0, 0.3);
     let params = r#"{"fit":"jacksboro-corrected","method":"fft_ma"}"#.into();
     data.terrains.push(TerrainRow {
@@ -320,4 +363,106 @@ fn measured(data: &mut Data, shelf: &mut Shelf) {
     });
     shelf.grids.insert("texture/texture.tif".into(), texture);
     curves(data, "texture", -2.5, 8.3);
+    surface(data, "texture", "texture", None, 9.0);
+    curves(data, "texture.residual", -2.4, 8.1);
+    surface(data, "texture.residual", "alike", Some("jacksboro-corrected"), 8.2);
+    data.covariance.sort_by(|a, b| (&a.fit_id, a.bin).cmp(&(&b.fit_id, b.bin)));
+    data.surfaces.sort_by(|a, b| a.surface_id.cmp(&b.surface_id));
+    data.structure.sort_by(|a, b| a.surface_id.cmp(&b.surface_id));
+    data.profile_psd.sort_by(|a, b| a.surface_id.cmp(&b.surface_id));
+    data.psd.sort_by(|a, b| a.terrain_id.cmp(&b.terrain_id));
+    data.heights.sort_by(|a, b| a.terrain_id.cmp(&b.terrain_id));
+}
+
+/// Two more models, a profile, and covariances by direction.
+fn candidates(data: &mut Data, fit_id: &str, sigma_m: f64, range_m: f64) {
+    for (rank, model, worse, factor) in
+        [(1, "exponential", 0.0, 1.0), (2, "matern", 1.8, 1.1), (3, "gaussian", 96.4, 0.6)]
+    {
+        data.candidates.push(CandidateRow {
+            fit_id: fit_id.into(),
+            rank,
+            model: model.into(),
+            parameters: format!("{{\"range_m\":{},\"sigma_m\":{sigma_m}}}", factor * range_m),
+            free: 2 + i64::from(rank == 2),
+            chi2: Some(21.5 + worse),
+            aicc_above_best: (rank < 3).then_some(worse),
+        });
+        for bin in 0..17 {
+            let lag_m = 90.0 * bin as f64;
+            let model_m2 = 0.8 * sigma_m * sigma_m * libm::exp(-lag_m / (factor * range_m)) - 45.0;
+            data.candidate_curves.push(CandidateCurveRow { fit_id: fit_id.into(), rank, bin, lag_m, model_m2 });
+        }
+    }
+    for (point, share) in [0.25, 0.5, 0.7, 1.0, 1.4, 2.0, 4.0].into_iter().enumerate() {
+        let log = libm::log(share);
+        data.likelihood_profile.push(LikelihoodProfileRow {
+            fit_id: fit_id.into(),
+            point: point as i64,
+            range_m: share * range_m,
+            chi2_rise: 18.0 * log * log,
+        });
+    }
+    for k in 0..24 {
+        let (azimuth_deg, lag_m) = (30.0 * f64::from(k % 6), 180.0 * f64::from(k / 6 + 1));
+        let model_m2 = 0.8 * sigma_m * sigma_m * libm::exp(-lag_m / range_m) - 45.0;
+        data.covariance.push(CovarianceRow {
+            fit_id: fit_id.into(),
+            bin: 17 + i64::from(k),
+            lag_m,
+            azimuth_deg: Some(azimuth_deg),
+            covariance_m2: model_m2 + 20.0 * libm::cos(azimuth_deg.to_radians()),
+            pairs: 4000,
+            model_m2,
+            surface_model_m2: f64::NAN,
+            covariance_low_m2: f64::NAN,
+            covariance_high_m2: f64::NAN,
+        });
+    }
+}
+
+/// Figures, structure function and profile spectra of a surface.
+fn surface(data: &mut Data, id: &str, stage: &str, fit_id: Option<&str>, sq_m: f64) {
+    data.surfaces.push(SurfaceRow {
+        surface_id: id.into(),
+        stage: stage.into(),
+        fit_id: fit_id.map(str::to_owned),
+        cell_x_m: 74.0,
+        cell_y_m: 92.0,
+        cells: 20_000,
+        valid_share: 0.71,
+        sq_m,
+        sa_m: 0.8 * sq_m,
+        ssk: 0.04,
+        sku: 2.7,
+        sp_m: 3.1 * sq_m,
+        sv_m: 2.9 * sq_m,
+        sz_m: 6.0 * sq_m,
+        sdq: 0.11,
+        rms_slope_x: 0.08,
+        rms_slope_y: 0.075,
+        sal_m: 310.0,
+        aspect_ratio: if stage == "dem" { f64::NAN } else { 0.72 },
+        direction_deg: 48.0,
+        hurst_exponent: 0.61,
+        hurst_standard_error: 0.02,
+        hurst_lag_min_m: 92.0,
+        hurst_lag_max_m: 700.0,
+    });
+    for direction in ["all", "x", "y"] {
+        for bin in 0..20 {
+            let lag_m = 74.0 * libm::pow(1.19, bin as f64);
+            let value_m2 = 2.0 * sq_m * sq_m * (1.0 - libm::exp(-lag_m / 400.0));
+            let (surface_id, direction) = (id.to_owned(), direction.to_owned());
+            data.structure.push(StructureRow { surface_id, direction, bin, lag_m, value_m2, pairs: 1000 });
+        }
+    }
+    for direction in ["x", "y"] {
+        for bin in 0..20 {
+            let frequency_cycles_m = 1e-4 * libm::pow(1.25, bin as f64);
+            let psd_m3 = sq_m * sq_m * 1e3 / (1.0 + libm::pow(2000.0 * frequency_cycles_m, 2.2));
+            let (surface_id, direction) = (id.to_owned(), direction.to_owned());
+            data.profile_psd.push(ProfilePsdRow { surface_id, direction, bin, frequency_cycles_m, psd_m3, modes: 9 });
+        }
+    }
 }

@@ -38,6 +38,12 @@ fn assembled(dest: &Path) -> ReleaseBuilder {
     builder.write_table("0000", data.terrains, Origin::default()).unwrap();
     builder.write_table("0000", data.fits, Origin::default()).unwrap();
     builder.write_table("0000", data.covariance, Origin::default()).unwrap();
+    builder.write_table("0000", data.candidates, Origin::default()).unwrap();
+    builder.write_table("0000", data.candidate_curves, Origin::default()).unwrap();
+    builder.write_table("0000", data.likelihood_profile, Origin::default()).unwrap();
+    builder.write_table("0000", data.surfaces, Origin::default()).unwrap();
+    builder.write_table("0000", data.structure, Origin::default()).unwrap();
+    builder.write_table("0000", data.profile_psd, Origin::default()).unwrap();
     builder.write_table("0000", data.psd, Origin::default()).unwrap();
     builder.write_table("0000", data.heights, Origin::default()).unwrap();
     builder.write_table("0000", data.missions, Origin::default()).unwrap();

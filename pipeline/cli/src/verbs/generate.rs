@@ -5,6 +5,7 @@ use crate::Verdict;
 use crate::args::{Common, Fit, Roughness, Terrain, Texture};
 use crate::failure::{Code, Failure};
 use crate::output::{columns, print};
+use sastrugi_stages::verbs::roughness::ArealFigures;
 use sastrugi_stages::verbs::{self, Reading, numbers, parameters};
 use serde_json::{Value, json};
 
@@ -109,6 +110,29 @@ pub fn fit(args: &Fit, common: &Common) -> Verdict {
     Ok(Code::Done)
 }
 
+/// Figures above the least-squares plane, as lines.
+fn areal(figures: &ArealFigures) -> [(&'static str, String); 6] {
+    let known = |value: f64, text: String| if value.is_finite() { text } else { "none".to_owned() };
+    let f = figures;
+    let hurst = f.hurst.as_ref().map_or_else(
+        || "none".to_owned(),
+        |h| format!("{:.3} +- {:.3} from {:.4} to {:.4} m", h.exponent, h.standard_error, h.lags_m[0], h.lags_m[1]),
+    );
+    let ratio = if f.aspect_ratio.is_finite() { format!("{:.3}", f.aspect_ratio) } else { "not known".to_owned() };
+    let [x, y] = f.rms_slopes;
+    [
+        ("Sq, Sa", known(f.sq_m, format!("{:.5}, {:.5} m above the least-squares plane", f.sq_m, f.sa_m))),
+        ("Ssk, Sku", known(f.ssk, format!("{:.3}, {:.3}", f.ssk, f.sku))),
+        ("Sp, Sv, Sz", known(f.sz_m, format!("{:.5}, {:.5}, {:.5} m", f.sp_m, f.sv_m, f.sz_m))),
+        ("Sdq", known(f.sdq, format!("{:.4}; along x {x:.4}, along y {y:.4}", f.sdq))),
+        (
+            "Sal, Str, Std",
+            known(f.sal_m, format!("{:.4} m, {ratio}, along {:.0} degrees from north", f.sal_m, f.direction_deg)),
+        ),
+        ("Hurst exponent", hurst),
+    ]
+}
+
 /// `roughness`.
 pub fn roughness(args: &Roughness, common: &Common) -> Verdict {
     let mut params = json!({});
@@ -133,7 +157,8 @@ pub fn roughness(args: &Roughness, common: &Common) -> Verdict {
         ),
         ("PSD slope", format!("{:.3}", summary.psd_slope)),
     ];
-    let rows: Vec<Vec<String>> = rows.iter().map(|(name, value)| vec![(*name).to_owned(), value.clone()]).collect();
+    let rows = rows.into_iter().chain(areal(&summary.areal));
+    let rows: Vec<Vec<String>> = rows.map(|(name, value)| vec![name.to_owned(), value]).collect();
     let mut text = columns(&rows);
     read_notes.iter().for_each(|note| text.push_str(&format!("\n  note: {note}")));
     print(common.json, &serde_json::to_value(&summary).map_err(Failure::failed)?, &text)?;

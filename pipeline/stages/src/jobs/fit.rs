@@ -2,24 +2,24 @@
 
 use super::dem::{HEIGHTS, input_error};
 use super::mask::{self, Mask};
-use super::roughness::{height_rows, psd_rows};
+use super::surface::{Surface, describe_residual};
 use super::{Estimate, ItemRef, Job, JobError, Outcome, Product, Rows, Work};
 use crate::registry::{BuildError, Builder, unknown_id};
 use crate::revision::Room;
 use crate::runner::graph::Node;
 use crate::study::Entry;
 use sastrugi_numeric::{Grid, Streams};
-use sastrugi_roughness::{histogram, power_spectrum};
 use sastrugi_schemas::Kind;
 use sastrugi_schemas::coregistration::Minus;
-use sastrugi_schemas::fit::{FitFile, Source};
+use sastrugi_schemas::fit::{Candidate, DirectionBin, FitFile, Intervals, Source};
 use sastrugi_schemas::kind::{read_parameters, schema_of};
 use sastrugi_schemas::study::FitItem;
-use sastrugi_schemas::tables::{CovarianceRow, FitRow};
+use sastrugi_schemas::tables::{CandidateCurveRow, CandidateRow, CovarianceRow, FitRow, LikelihoodProfileRow};
 use sastrugi_store::dem::Dem;
 use sastrugi_store::{atomic, dem, digest};
 use sastrugi_texture::coregister::coregister;
-use sastrugi_texture::{FitParameters, FitSettings};
+use sastrugi_texture::covariance::filtered::Measurement;
+use sastrugi_texture::{FitParameters, FitSettings, shown};
 use serde_json::{Value, json};
 
 /// Name of the stage.
@@ -28,8 +28,7 @@ pub const STAGE: &str = "fit";
 pub const FIT: &str = "fit.json";
 const BACKGROUND: &str = "background.tif";
 const RESIDUAL: &str = "residual.tif";
-/// Bins of the residual's height distribution, as many as a heightfield's.
-const HISTOGRAM_BINS: usize = 64;
+const MASK: &str = "mask.tif";
 
 /// The one kind of fit.
 pub fn kinds() -> Vec<Kind> {
@@ -187,6 +186,7 @@ impl Job for FitJob {
         let outcome = sastrugi_texture::fit(&read.grid, &self.settings, &self.streams).map_err(JobError::new)?;
         let [background, residual] = outcome.rasters(&read.grid).map_err(JobError::new)?;
         let fit = FitFile { source: Some(source), ..outcome.fit };
+        let mask = shown::uses(&read.grid, &background, &residual, &fit);
         atomic::write(&work.output(FIT), to_json(&fit)?.as_bytes()).map_err(JobError::new)?;
         let id = &self.id;
         let mut products = vec![Product::released(FIT, format!("fit/{id}.json"), None)];
@@ -194,12 +194,20 @@ impl Job for FitJob {
             dem::write(&work.output(file), grid, &read.info.crs, &Default::default()).map_err(JobError::new)?;
             products.push(Product::released(file, format!("fit/{id}.{file}"), Some(digest::heights(grid))));
         }
+        dem::write_classes(&work.output(MASK), &mask, &read.info.crs).map_err(JobError::new)?;
+        products.push(Product::released(MASK, format!("fit/{id}.{MASK}"), Some(digest::classes(&mask))));
+        let band = shown::covariance_band(&residual, &fit);
+        let FitParameters { inner_scale_m, noise_sigma_m, .. } = self.settings.parameters();
+        let measurement = Measurement { inner_scale_m, noise_sigma_m };
+        let curves = shown::candidate_curves(&fit, &read.grid.geometry, measurement).map_err(JobError::new)?;
+        let surface = Surface { id, stage: STAGE, fit_id: Some(id), grid: &residual };
         let rows = Rows {
             fits: vec![fit_row(id, &self.dem_id, &fit)],
-            covariance: covariance_rows(id, &fit),
-            psd: psd_rows(id, &power_spectrum(&residual)),
-            height_distribution: height_rows(id, &histogram(&residual, HISTOGRAM_BINS)),
-            ..Rows::default()
+            covariance: covariance_rows(id, &fit, &band),
+            candidates: candidate_rows(id, &fit),
+            candidate_curves: curve_rows(id, &fit, &curves),
+            likelihood_profile: profile_rows(id, &fit),
+            ..describe_residual(&surface, &fit)
         };
         Ok(Outcome { products, rows, notes: notes.into_iter().chain(fit.warnings).collect() })
     }
@@ -217,7 +225,16 @@ fn fit_row(id: &str, dem_id: &str, fit: &FitFile) -> FitRow {
     let parameter = |name: &str| fit.parameters.get(name).copied().unwrap_or(f64::NAN);
     let window = fit.window_m.unwrap_or([f64::NAN; 2]);
     let (sigma, range) = (parameter("sigma_m"), parameter("range_m"));
-    let nugget = fit.parameters.get("nugget_m2").copied().unwrap_or(0.0);
+    let or = |name: &str, otherwise: f64| fit.parameters.get(name).copied().unwrap_or(otherwise);
+    let finding = |name: &str| fit.diagnostics.get(name).and_then(Value::as_f64).unwrap_or(f64::NAN);
+    let ends = |intervals: &Option<Intervals>, name: &str| {
+        let [low, high] = intervals.as_ref().and_then(|i| i.values.get(name).copied())?;
+        // All these parameters are positive.
+        Some([low.unwrap_or(0.0), high.unwrap_or(f64::INFINITY)])
+    };
+    let own = |name: &str| ends(&fit.intervals, name).unwrap_or([f64::NAN; 2]);
+    let block = |name: &str| ends(&fit.block_intervals, name).unwrap_or([f64::NAN; 2]);
+    let replicates = |intervals: &Option<Intervals>| intervals.as_ref().map_or(0, |i| i64::from(i.replicates));
     FitRow {
         fit_id: id.to_owned(),
         dem_id: dem_id.to_owned(),
@@ -225,7 +242,7 @@ fn fit_row(id: &str, dem_id: &str, fit: &FitFile) -> FitRow {
         model: fit.model.clone(),
         sigma_m: sigma,
         range_m: range,
-        nugget_m2: nugget,
+        nugget_m2: or("nugget_m2", 0.0),
         sigma2_over_range_m: sigma * sigma / range,
         window_x_m: window[0],
         window_y_m: window[1],
@@ -233,6 +250,33 @@ fn fit_row(id: &str, dem_id: &str, fit: &FitFile) -> FitRow {
         trim_threshold_m: fit.trim.map_or(f64::NAN, |t| t.threshold_m),
         used_share: fit.trim.map_or(f64::NAN, |t| 1.0 - t.masked_share),
         misfit_m2: misfit(fit),
+        ratio: or("ratio", 1.0),
+        azimuth_deg: or("azimuth_deg", f64::NAN),
+        interval_level: fit.intervals.as_ref().map_or(f64::NAN, |i| i.level),
+        replicates: replicates(&fit.intervals),
+        sigma_low_m: own("sigma_m")[0],
+        sigma_high_m: own("sigma_m")[1],
+        range_low_m: own("range_m")[0],
+        range_high_m: own("range_m")[1],
+        sigma2_over_range_low_m: own("sigma2_over_range_m")[0],
+        sigma2_over_range_high_m: own("sigma2_over_range_m")[1],
+        block_replicates: replicates(&fit.block_intervals),
+        block_sigma_low_m: block("sigma_m")[0],
+        block_sigma_high_m: block("sigma_m")[1],
+        block_range_low_m: block("range_m")[0],
+        block_range_high_m: block("range_m")[1],
+        block_sigma2_over_range_low_m: block("sigma2_over_range_m")[0],
+        block_sigma2_over_range_high_m: block("sigma2_over_range_m")[1],
+        misfit_p: finding("misfit_p"),
+        isotropy_p: finding("isotropy_p"),
+        isotropy_ratio: finding("isotropy_ratio"),
+        isotropy_azimuth_deg: finding("isotropy_azimuth_deg"),
+        stationarity_p: finding("stationarity_p"),
+        block_sigma_max_over_min: finding("block_sigma_max_over_min"),
+        normality_p: finding("normality_p"),
+        window_disagreement_z: finding("window_disagreement_z"),
+        naive_sigma_m: finding("naive_sigma_m"),
+        naive_range_m: finding("naive_range_m"),
         warnings: fit.warnings.join("; "),
     }
 }
@@ -244,17 +288,73 @@ fn misfit(fit: &FitFile) -> f64 {
     sastrugi_numeric::sums::mean(&squares).sqrt()
 }
 
-fn covariance_rows(id: &str, fit: &FitFile) -> Vec<CovarianceRow> {
+/// Rings, then sectors.
+fn covariance_rows(id: &str, fit: &FitFile, band: &[[f64; 2]]) -> Vec<CovarianceRow> {
     let at = |values: &[f64], bin: usize| values.get(bin).copied().unwrap_or(f64::NAN);
-    let row = |bin: usize| CovarianceRow {
-        fit_id: id.to_owned(),
-        bin: bin as i64,
-        lag_m: at(&fit.lags_m, bin),
-        azimuth_deg: None,
-        covariance_m2: at(&fit.covariance_m2, bin),
-        pairs: fit.pairs.get(bin).map_or(0, |&n| n as i64),
-        model_m2: at(&fit.model_m2, bin),
-        surface_model_m2: at(&fit.surface_model_m2, bin),
+    let rings = fit.lags_m.len();
+    let ring = |bin: usize| {
+        let [low, high] = band.get(bin).copied().unwrap_or([f64::NAN; 2]);
+        CovarianceRow {
+            fit_id: id.to_owned(),
+            bin: bin as i64,
+            lag_m: at(&fit.lags_m, bin),
+            azimuth_deg: None,
+            covariance_m2: at(&fit.covariance_m2, bin),
+            pairs: fit.pairs.get(bin).map_or(0, |&n| n as i64),
+            model_m2: at(&fit.model_m2, bin),
+            surface_model_m2: at(&fit.surface_model_m2, bin),
+            covariance_low_m2: low,
+            covariance_high_m2: high,
+        }
     };
-    (0..fit.lags_m.len()).map(row).collect()
+    let sector = |(k, bin): (usize, &DirectionBin)| CovarianceRow {
+        fit_id: id.to_owned(),
+        bin: (rings + k) as i64,
+        lag_m: bin.lag_m,
+        azimuth_deg: Some(bin.azimuth_deg),
+        covariance_m2: bin.covariance_m2,
+        pairs: bin.pairs as i64,
+        model_m2: bin.model_m2,
+        surface_model_m2: f64::NAN,
+        covariance_low_m2: f64::NAN,
+        covariance_high_m2: f64::NAN,
+    };
+    (0..rings).map(ring).chain(fit.directions.iter().enumerate().map(sector)).collect()
+}
+
+fn candidate_rows(id: &str, fit: &FitFile) -> Vec<CandidateRow> {
+    let row = |(rank, c): (i64, &Candidate)| CandidateRow {
+        fit_id: id.to_owned(),
+        rank,
+        model: c.model.clone(),
+        parameters: json!(c.parameters).to_string(),
+        free: i64::from(c.free),
+        chi2: c.chi2,
+        aicc_above_best: c.aicc_above_best,
+    };
+    (1..).zip(&fit.candidates).map(row).collect()
+}
+
+fn curve_rows(id: &str, fit: &FitFile, curves: &[Vec<f64>]) -> Vec<CandidateCurveRow> {
+    let of_curve = |(rank, curve): (i64, &Vec<f64>)| {
+        let row = |(bin, (&lag_m, &model_m2)): (i64, (&f64, &f64))| CandidateCurveRow {
+            fit_id: id.to_owned(),
+            rank,
+            bin,
+            lag_m,
+            model_m2,
+        };
+        (0..).zip(fit.lags_m.iter().zip(curve)).map(row).collect::<Vec<_>>()
+    };
+    (1..).zip(curves).flat_map(of_curve).collect()
+}
+
+fn profile_rows(id: &str, fit: &FitFile) -> Vec<LikelihoodProfileRow> {
+    let row = |(point, (&range_m, &chi2_rise)): (i64, (&f64, &f64))| LikelihoodProfileRow {
+        fit_id: id.to_owned(),
+        point,
+        range_m,
+        chi2_rise,
+    };
+    fit.profile.iter().flat_map(|p| (0..).zip(p.range_m.iter().zip(&p.chi2_rise)).map(row)).collect()
 }

@@ -6,12 +6,16 @@ pub mod mask;
 pub mod missions;
 pub mod original;
 pub mod roughness;
+pub mod surface;
 pub mod terrain;
 pub mod texture;
 pub mod traverse;
 
 use crate::revision::Room;
-use sastrugi_schemas::tables::{CovarianceRow, FitRow, HeightDistributionRow, MissionRow, PsdRow, TerrainRow};
+use sastrugi_schemas::tables::{
+    CandidateCurveRow, CandidateRow, CovarianceRow, FitRow, HeightDistributionRow, LikelihoodProfileRow, MissionRow,
+    ProfilePsdRow, PsdRow, StructureRow, SurfaceRow, TerrainRow,
+};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -136,6 +140,18 @@ pub struct Rows {
     pub fits: Vec<FitRow>,
     /// Table `covariance`.
     pub covariance: Vec<CovarianceRow>,
+    /// Table `candidates`.
+    pub candidates: Vec<CandidateRow>,
+    /// Table `candidate_curves`.
+    pub candidate_curves: Vec<CandidateCurveRow>,
+    /// Table `likelihood_profile`.
+    pub likelihood_profile: Vec<LikelihoodProfileRow>,
+    /// Table `surfaces`.
+    pub surfaces: Vec<SurfaceRow>,
+    /// Table `structure`.
+    pub structure: Vec<StructureRow>,
+    /// Table `profile_psd`.
+    pub profile_psd: Vec<ProfilePsdRow>,
     /// Table `psd`.
     pub psd: Vec<PsdRow>,
     /// Table `height_distribution`.

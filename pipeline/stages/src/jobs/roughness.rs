@@ -1,6 +1,7 @@
 //! Stage `roughness`: every heightfield of a study described and classified.
 
 use super::dem::{HEIGHTS, input_error};
+use super::surface::{self, Surface};
 use super::{Estimate, ItemRef, Job, JobError, Outcome, Product, Rows, Work};
 use crate::registry::Heightfield;
 use crate::revision::Room;
@@ -143,12 +144,14 @@ impl Job for RoughnessJob {
             Product::released(CLASSES, format!("classes/{id}.tif"), Some(digest::classes(&closed))),
             Product::released(CLASSES_RAW, format!("classes/{id}.raw.tif"), Some(digest::classes(&raw))),
         ];
-        let rows = Rows {
+        let mut rows = Rows {
             terrains: vec![self.terrain_row(&read.grid, &summary)],
             psd: psd_rows(id, &summary.spectrum),
             height_distribution: height_rows(id, &summary.histogram),
             ..Rows::default()
         };
+        let surface = Surface { id, stage: &self.field.item.stage, fit_id: None, grid: &read.grid };
+        surface::add(&mut rows, &surface, &summary.areal);
         Ok(Outcome { products, rows, notes: Vec::new() })
     }
 }

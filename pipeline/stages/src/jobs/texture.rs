@@ -1,7 +1,8 @@
 //! Stage `texture`: a field that matches a fit, alone or on a base heightfield.
 
 use super::dem::{HEIGHTS, input_error};
-use super::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work, fit};
+use super::surface::{Surface, describe_residual};
+use super::{Estimate, ItemRef, Job, JobError, Outcome, Product, Rows, Work, fit};
 use crate::registry::{BuildError, Builder, Heightfield, unknown_id};
 use crate::revision::Room;
 use crate::runner::graph::Node;
@@ -122,6 +123,16 @@ pub fn lay_onto(base: &Grid, texture: &Grid, parameters: &Value) -> Result<Grid,
     sastrugi_texture::onto(base, texture).map_err(JobError::new)
 }
 
+impl TextureJob {
+    /// The texture, without its base, detrended and trimmed as the fit's residual was: what that residual is compared with.
+    fn alike(&self, texture: &Grid, fit: &FitFile) -> Rows {
+        let Some(residual) = sastrugi_texture::shown::alike(texture, fit) else { return Rows::default() };
+        let id = format!("{}.residual", self.id);
+        let surface = Surface { id: &id, stage: "alike", fit_id: Some(&self.fit.id), grid: &residual };
+        describe_residual(&surface, fit)
+    }
+}
+
 impl Job for TextureJob {
     fn recipe(&self) -> Value {
         let base = self.base.as_ref().map(ToString::to_string);
@@ -154,6 +165,7 @@ impl Job for TextureJob {
                 "{clip_share:.1e} of the spectrum was negative and set to 0; the covariance is off by at most {covariance_error_max_m2:.1e} m2"
             ));
         }
+        let rows = self.alike(&grid, &fit);
         let (heights, crs) = match &self.base {
             None => (grid, Crs::default()),
             Some(base) => {
@@ -164,6 +176,6 @@ impl Job for TextureJob {
         dem::write(&work.output(HEIGHTS), &heights, &crs, &Default::default()).map_err(JobError::new)?;
         let content = digest::heights(&heights);
         let products = vec![Product::released(HEIGHTS, format!("texture/{}.tif", self.id), Some(content))];
-        Ok(Outcome { products, notes, ..Outcome::default() })
+        Ok(Outcome { products, rows, notes })
     }
 }

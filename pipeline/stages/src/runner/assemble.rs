@@ -6,7 +6,7 @@ use super::cache::{Record, load_record};
 use super::execute::Failure;
 use super::progress::Progress;
 use crate::error::Error;
-use crate::jobs::{ItemRef, Rows, fit, roughness, traverse};
+use crate::jobs::{ItemRef, Rows, fit, roughness, texture, traverse};
 use sastrugi_schemas::Record as Row;
 use sastrugi_schemas::manifest::{FailedItem, ItemNote, Origin};
 use sastrugi_schemas::study::StudyHead;
@@ -157,12 +157,13 @@ fn damaged(folder: &Path, item: &ItemRef, file: &str) -> Error {
 }
 
 fn add_tables(builder: &mut ReleaseBuilder, contents: &Contents<'_>) -> Result<(), Error> {
-    let described = [roughness::STAGE, fit::STAGE];
     add_table(builder, contents, &[roughness::STAGE], |rows| rows.terrains)?;
-    add_table(builder, contents, &described, |rows| rows.psd)?;
-    add_table(builder, contents, &described, |rows| rows.height_distribution)?;
     add_table(builder, contents, &[fit::STAGE], |rows| rows.fits)?;
     add_table(builder, contents, &[fit::STAGE], |rows| rows.covariance)?;
+    add_table(builder, contents, &[fit::STAGE], |rows| rows.candidates)?;
+    add_table(builder, contents, &[fit::STAGE], |rows| rows.candidate_curves)?;
+    add_table(builder, contents, &[fit::STAGE], |rows| rows.likelihood_profile)?;
+    add_described(builder, contents)?;
     add_missions(builder, contents)
 }
 
@@ -186,6 +187,33 @@ fn add_table<R: Row>(
         Some(error) => Err(error),
         None => written.map_err(release_error),
     }
+}
+
+/// The tables that describe surfaces. An item may describe surfaces under ids of their own (`<texture>.residual`), so that
+/// rows are sorted here.
+fn add_described(builder: &mut ReleaseBuilder, contents: &Contents<'_>) -> Result<(), Error> {
+    let stages = [roughness::STAGE, fit::STAGE, texture::STAGE];
+    let mut all = Rows::default();
+    for (_, folder) in contents.results(&stages) {
+        let rows = record(folder)?.rows;
+        all.psd.extend(rows.psd);
+        all.height_distribution.extend(rows.height_distribution);
+        all.surfaces.extend(rows.surfaces);
+        all.structure.extend(rows.structure);
+        all.profile_psd.extend(rows.profile_psd);
+    }
+    // Stable: within a surface rows are in order.
+    all.psd.sort_by(|a, b| a.terrain_id.cmp(&b.terrain_id));
+    all.height_distribution.sort_by(|a, b| a.terrain_id.cmp(&b.terrain_id));
+    all.surfaces.sort_by(|a, b| a.surface_id.cmp(&b.surface_id));
+    all.structure.sort_by(|a, b| a.surface_id.cmp(&b.surface_id));
+    all.profile_psd.sort_by(|a, b| a.surface_id.cmp(&b.surface_id));
+    let made_by = || made_by(&stages.join("+"));
+    builder.write_table("0000", all.psd, made_by()).map_err(release_error)?;
+    builder.write_table("0000", all.height_distribution, made_by()).map_err(release_error)?;
+    builder.write_table("0000", all.surfaces, made_by()).map_err(release_error)?;
+    builder.write_table("0000", all.structure, made_by()).map_err(release_error)?;
+    builder.write_table("0000", all.profile_psd, made_by()).map_err(release_error)
 }
 
 fn made_by(stage: &str) -> Origin {

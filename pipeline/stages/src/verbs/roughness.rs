@@ -4,6 +4,7 @@ use super::{Read, Reading, parameters, read};
 use crate::error::Error;
 use crate::jobs::roughness::settings;
 use crate::study::check_roughness;
+pub use sastrugi_roughness::ArealFigures;
 use sastrugi_roughness::{Summary, classify, describe, moore_gradient};
 use sastrugi_schemas::kind::{read_parameters, schema_of};
 use sastrugi_schemas::study::RoughnessSection;

@@ -22,6 +22,8 @@ fn row(fit: u32, bin: i64, value: f64) -> CovarianceRow {
         pairs: bin * 3,
         model_m2: value * 1e300,
         surface_model_m2: f64::NAN,
+        covariance_low_m2: -value,
+        covariance_high_m2: value,
     }
 }
 

@@ -1,0 +1,115 @@
+//! Rows that describe a surface, whichever stage made it.
+
+use super::Rows;
+use super::roughness::{height_rows, psd_rows};
+use sastrugi_numeric::Grid;
+use sastrugi_roughness::{
+    ArealFigures, Direction, ProfileBin, SpectralMap, StructureBin, areal_figures, default_slope_band, histogram,
+};
+use sastrugi_schemas::fit::FitFile;
+use sastrugi_schemas::tables::{ProfilePsdRow, StructureRow, SurfaceRow};
+
+/// Bins of the height distribution of a residual, as many as a heightfield's.
+const HISTOGRAM_BINS: usize = 64;
+/// Longest lag of a residual's Hurst exponent over its window: beyond, the structure function levels off.
+const HURST_WINDOWS: f64 = 0.25;
+
+/// A surface and where it comes from.
+pub struct Surface<'a> {
+    /// Its id in the tables.
+    pub id: &'a str,
+    /// Word of the table `surfaces`.
+    pub stage: &'a str,
+    /// The fit whose window and trimming it went through.
+    pub fit_id: Option<&'a str>,
+    /// Heights, m.
+    pub grid: &'a Grid,
+}
+
+/// Rows of the tables `psd`, `height_distribution`, `surfaces`, `structure` and `profile_psd` for what a fit leaves of a
+/// surface: the residual of its DEM, or a texture treated alike. Both share the lags of the Hurst exponent.
+pub fn describe_residual(surface: &Surface<'_>, fit: &FitFile) -> Rows {
+    let map = SpectralMap::of(surface.grid);
+    let band = default_slope_band(&surface.grid.geometry);
+    let lags = fit
+        .cell_m
+        .zip(fit.window_m)
+        .map(|(cell, window)| [cell[0].max(cell[1]), HURST_WINDOWS * window[0].min(window[1])]);
+    let areal = areal_figures(surface.grid, map.as_ref(), band, lags);
+    let spectrum = map.as_ref().map_or_else(Vec::new, SpectralMap::rings);
+    let mut rows = Rows {
+        psd: psd_rows(surface.id, &spectrum),
+        height_distribution: height_rows(surface.id, &histogram(surface.grid, HISTOGRAM_BINS)),
+        ..Rows::default()
+    };
+    add(&mut rows, surface, &areal);
+    rows
+}
+
+/// Adds the rows of the tables `surfaces`, `structure` and `profile_psd`.
+pub fn add(rows: &mut Rows, surface: &Surface<'_>, areal: &ArealFigures) {
+    rows.surfaces.push(row(surface, areal));
+    rows.structure.extend(structure_rows(surface.id, &areal.structure));
+    rows.profile_psd.extend(profile_rows(surface.id, &areal.profiles));
+}
+
+fn row(surface: &Surface<'_>, areal: &ArealFigures) -> SurfaceRow {
+    let geometry = &surface.grid.geometry;
+    let cells = surface.grid.finite_count();
+    let hurst = |f: fn(&sastrugi_roughness::Hurst) -> f64| areal.hurst.as_ref().map_or(f64::NAN, f);
+    SurfaceRow {
+        surface_id: surface.id.to_owned(),
+        stage: surface.stage.to_owned(),
+        fit_id: surface.fit_id.map(str::to_owned),
+        cell_x_m: geometry.cell[0],
+        cell_y_m: geometry.cell[1],
+        cells: cells as i64,
+        valid_share: cells as f64 / geometry.len() as f64,
+        sq_m: areal.sq_m,
+        sa_m: areal.sa_m,
+        ssk: areal.ssk,
+        sku: areal.sku,
+        sp_m: areal.sp_m,
+        sv_m: areal.sv_m,
+        sz_m: areal.sz_m,
+        sdq: areal.sdq,
+        rms_slope_x: areal.rms_slopes[0],
+        rms_slope_y: areal.rms_slopes[1],
+        sal_m: areal.sal_m,
+        aspect_ratio: areal.aspect_ratio,
+        direction_deg: areal.direction_deg,
+        hurst_exponent: hurst(|h| h.exponent),
+        hurst_standard_error: hurst(|h| h.standard_error),
+        hurst_lag_min_m: hurst(|h| h.lags_m[0]),
+        hurst_lag_max_m: hurst(|h| h.lags_m[1]),
+    }
+}
+
+fn structure_rows(id: &str, bins: &[StructureBin]) -> Vec<StructureRow> {
+    let row = |(bin, b): (i64, &StructureBin)| StructureRow {
+        surface_id: id.to_owned(),
+        direction: b.direction.name().to_owned(),
+        bin,
+        lag_m: b.lag_m,
+        value_m2: b.value_m2,
+        pairs: b.pairs as i64,
+    };
+    numbered(bins, |b| b.direction).map(row).collect()
+}
+
+fn profile_rows(id: &str, bins: &[ProfileBin]) -> Vec<ProfilePsdRow> {
+    let row = |(bin, b): (i64, &ProfileBin)| ProfilePsdRow {
+        surface_id: id.to_owned(),
+        direction: b.direction.name().to_owned(),
+        bin,
+        frequency_cycles_m: b.frequency_cycles_m,
+        psd_m3: b.psd_m3,
+        modes: b.modes as i64,
+    };
+    numbered(bins, |b| b.direction).map(row).collect()
+}
+
+/// Bins with their numbers, from 0 in each direction.
+fn numbered<T>(bins: &[T], direction: fn(&T) -> Direction) -> impl Iterator<Item = (i64, &T)> {
+    bins.chunk_by(move |a, b| direction(a) == direction(b)).flat_map(|run| (0..).zip(run))
+}

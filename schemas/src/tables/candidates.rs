@@ -1,0 +1,23 @@
+//! Table `candidates`.
+
+super::table! {
+    /// One row per covariance model that a fit tried.
+    "candidates" CandidateRow {
+        keys {
+            /// Id of the fit.
+            fit_id: String,
+            /// Place by AICc, from 1: the first is the fit.
+            rank: i64,
+        }
+        /// Covariance model.
+        model: String [""],
+        /// Fitted parameters as JSON.
+        parameters: String [""],
+        /// Number of free parameters.
+        free: i64 ["1"],
+        /// Generalised sum of squares.
+        chi2: Option<f64> ["1"],
+        /// Akaike's corrected criterion above the least of all candidates.
+        aicc_above_best: Option<f64> ["1"],
+    }
+}

@@ -1,0 +1,17 @@
+//! Table `likelihood_profile`.
+
+super::table! {
+    /// One row per range at which a fit was held, everything else fitted anew: how the likelihood falls away.
+    "likelihood_profile" LikelihoodProfileRow {
+        keys {
+            /// Id of the fit.
+            fit_id: String,
+            /// Number of the point, from 0.
+            point: i64,
+        }
+        /// Range held.
+        range_m: f64 ["m"],
+        /// Rise of the generalised sum of squares above its minimum; 3.84 is the edge of a 95 % interval if the model is right.
+        chi2_rise: f64 ["1"],
+    }
+}
