@@ -32,16 +32,30 @@ const LEVEL: f64 = 0.95;
 /// What became of each cell of the DEM that was fitted.
 pub fn uses(dem: &Grid, background: &Grid, residual: &Grid, fit: &FitFile) -> Grid<u8> {
     let threshold = fit.trim.map_or(f64::INFINITY, |t| t.threshold_m);
+    let window = fit.window_m.map(|size_m| window_of(size_m, dem.geometry.cell));
+    let count = window.map_or_else(Vec::new, |w| box_mean(&dem.values, dem.cols(), w).count);
+    let needed = min_valid_share(fit) * window.map_or(0, |w| w.area()) as f64;
+    let lacks_data = |k: usize| count.get(k).is_some_and(|n| f64::from(*n) <= needed);
     let code = |k: usize| {
         let (z, away) = (dem.values[k], (dem.values[k] - background.values[k]).abs());
         match (z.is_finite(), residual.values[k].is_finite()) {
             (false, _) => NO_DATA,
             (true, true) => USED,
-            (true, false) if away > threshold => TRIMMED,
+            (true, false) if away > threshold && !lacks_data(k) => TRIMMED,
             (true, false) => BESIDE,
         }
     };
     Grid::new(dem.geometry, (0..dem.values.len()).map(code).collect())
+}
+
+/// The window of a true size east-west and north-south on its own cells.
+fn window_of(size_m: [f64; 2], cell_m: [f64; 2]) -> BoxWindow {
+    BoxWindow { half: [1, 0].map(|axis: usize| (size_m[axis] / cell_m[axis]).round() as usize / 2) }
+}
+
+/// Share of a window that must hold data.
+fn min_valid_share(fit: &FitFile) -> f64 {
+    fit.diagnostics.get("min_valid_share").and_then(|v| v.as_f64()).unwrap_or(0.5)
 }
 
 /// The rings of a fit's bins: bin 0 is lag zero, ring k the lags whose length rounds to k widths.
@@ -149,8 +163,7 @@ fn with_complete_windows(
     measurement: Measurement,
 ) -> Result<Vec<Vec<f64>>, ParameterError> {
     let (Some(rings), Some(window_m)) = (Rings::of(fit), fit.window_m) else { return Ok(Vec::new()) };
-    let window =
-        BoxWindow { half: [1, 0].map(|axis: usize| (window_m[axis] / rings.cell_m[axis]).round() as usize / 2) };
+    let window = window_of(window_m, rings.cell_m);
     let filter = DetrendFilter::new(window, rings.cell_m, rings.max_lag(), measurement);
     let threshold_m = fit.trim.map_or(f64::INFINITY, |t| t.threshold_m);
     let curve = |candidate: &Candidate| {
@@ -189,9 +202,9 @@ pub fn alike(texture: &Grid, fit: &FitFile) -> Option<Grid> {
         return None;
     }
     let window = BoxWindow::nearest(0.5 * (window_x + window_y), texture.geometry.cell);
-    let needed = fit.diagnostics.get("min_valid_share").and_then(|v| v.as_f64()).unwrap_or(0.5);
+    let needed = min_valid_share(fit) * window.area() as f64;
     let average = box_mean(&texture.values, texture.cols(), window);
-    let full = |k: usize| f64::from(average.count[k]) > needed * window.area() as f64;
+    let full = |k: usize| f64::from(average.count[k]) > needed;
     let residual = |k: usize| if full(k) { texture.values[k] - average.mean[k] } else { f64::NAN };
     let values: Vec<f64> = (0..texture.values.len()).map(residual).collect();
     let mut sizes: Vec<f64> = sums::finite(&values).into_iter().map(f64::abs).collect();

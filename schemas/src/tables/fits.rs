@@ -41,13 +41,13 @@ super::table! {
         interval_level: f64 ["1"],
         /// Replicates of the parametric bootstrap; 0 without intervals.
         replicates: i64 ["1"],
-        /// Lower end of the interval of sigma (profile likelihood where that is open, else bootstrap); 0 where it is open.
+        /// Lower end of the interval of sigma (profile likelihood where open, else bootstrap); 0 where it is open.
         sigma_low_m: f64 ["m"],
-        /// Upper end of the interval of sigma (profile likelihood where that is open, else bootstrap); infinite where it is open.
+        /// Upper end of the interval of sigma (profile likelihood where open, else bootstrap); infinite where it is open.
         sigma_high_m: f64 ["m"],
-        /// Lower end of the interval of b (profile likelihood where that is open, else bootstrap); 0 where it is open.
+        /// Lower end of the interval of b (profile likelihood where open, else bootstrap); 0 where it is open.
         range_low_m: f64 ["m"],
-        /// Upper end of the interval of b (profile likelihood where that is open, else bootstrap); infinite where it is open.
+        /// Upper end of the interval of b (profile likelihood where open, else bootstrap); infinite where it is open.
         range_high_m: f64 ["m"],
         /// Lower end of the interval of sigma^2 / b by parametric bootstrap.
         sigma2_over_range_low_m: f64 ["m"],

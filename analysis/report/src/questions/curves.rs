@@ -105,6 +105,17 @@ pub fn distributions(id: &str, curves: &[Curve], ranges: Ranges) -> Plot {
     plot
 }
 
+/// Curves of positive values in log-log axes.
+pub fn log_log(id: &str, curves: &[Curve], x_title: &str, y_title: &str) -> Plot {
+    let Ranges { x, y } = ranges(curves);
+    let x = (Axis::log(x.0 / 1.1, x.1 * 1.1), x_title);
+    let y = (Axis::log(y.0.max(y.1 * 1e-10) / 1.5, y.1 * 1.5), y_title);
+    let mut plot = Plot::new((WIDTH, HEIGHT), x, y, &entries(curves));
+    draw(&mut plot, id, curves);
+    plot.svg.close();
+    plot
+}
+
 /// Draws the curves inside of a clip that stays open.
 fn draw(plot: &mut Plot, id: &str, curves: &[Curve]) {
     plot.clip(&format!("{id}-clip"));

@@ -70,15 +70,20 @@ pub fn middle_range(data: &Data, paths: &[&str]) -> Result<Option<(f64, f64)>, R
 /// Shaded relief of the file at `path`; `None` when the release has no such file or it holds no data.
 pub fn relief(data: &Data, path: &str, style: Option<Style>, words: Words) -> Result<Option<Figure>, ReportError> {
     let Some(grid) = data.files.grid(path)? else { return Ok(None) };
+    relief_of(&grid, path, style, words)
+}
+
+/// Shaded relief of a grid that was drawn from the file at `path`; `None` without data.
+pub fn relief_of(grid: &Grid, path: &str, style: Option<Style>, words: Words) -> Result<Option<Figure>, ReportError> {
     let Some(own_range) = grid.range() else { return Ok(None) };
     let style = style.unwrap_or(Style { range_m: own_range, exaggeration: 1.0, pixels: 400 });
-    let picture = picture::relief(&grid, style.range_m, style.exaggeration, style.pixels)?;
+    let picture = picture::relief(grid, style.range_m, style.exaggeration, style.pixels)?;
     let absent = (grid.finite_count() < grid.values.len()).then_some((colour::NO_DATA, "no data"));
     let colours = picture::ramp(&colour::heights(), 40);
     let key = Key::Ramp { colours: &colours, range: style.range_m, title: "height, m", absent };
     let map = Map::new(&picture, MAP_WIDTH, &key);
-    let description = format!("Shaded relief of {}: {}.", path, extent(&grid));
-    Ok(Some(figure(words, description, map, numbers(path, &grid, own_range))))
+    let description = format!("Shaded relief of {}: {}.", path, extent(grid));
+    Ok(Some(figure(words, description, map, numbers(path, grid, own_range))))
 }
 
 /// Deviations of a grid coloured over `[-limit_m, limit_m]`; `absent` says what the grey cells are.

@@ -57,6 +57,15 @@ pub fn classes(
     Ok(placed(codes, data_uri, [cols, rows]))
 }
 
+/// Codes in their colours, by majority; a code without one as no data.
+pub fn codes(codes: &Grid<u8>, colours: &[(u8, Rgb)], most: usize) -> Result<Picture, ReportError> {
+    let thin = thin::block_majority(codes, thin::step(codes.rows(), codes.cols(), most));
+    let colour = |code: &u8| colours.iter().find(|(c, _)| c == code).map_or(colour::NO_DATA, |(_, colour)| *colour);
+    let bytes: Vec<u8> = thin.values.iter().flat_map(colour).collect();
+    let data_uri = encode(thin.cols(), thin.rows(), &bytes, None)?;
+    Ok(placed(codes, data_uri, [thin.cols(), thin.rows()]))
+}
+
 /// Colour of a class on maps and in their legends.
 pub fn class_colour(class: RoughnessClass) -> Rgb {
     colour::towards(class.colour(), [255; 3], 0.42)

@@ -49,6 +49,19 @@ pub fn centre(grid: &Grid, size_m: [f64; 2]) -> Grid {
     grid.window((g.rows - rows) / 2, (g.cols - cols) / 2, rows, cols)
 }
 
+/// The grid repeated `times` in either direction, thinned so that neither side has many more than `most` cells. Blocks are
+/// of a size that divides the grid where there is one, so that none straddles a seam.
+pub fn tiled(grid: &Grid, times: usize, most: usize) -> Grid {
+    let g = grid.geometry;
+    let needed = step(times * g.rows, times * g.cols, most);
+    let divides = |s: &usize| g.rows.is_multiple_of(*s) && g.cols.is_multiple_of(*s);
+    let tile = block_mean(grid, (needed..=2 * needed).find(divides).unwrap_or(needed));
+    let (rows, cols) = (tile.rows() * times, tile.cols() * times);
+    let values =
+        (0..rows).flat_map(|r| (0..times).flat_map(move |_| [r])).flat_map(|r| tile.row(r % tile.rows()).to_vec());
+    Grid::new(Geometry { rows, cols, ..tile.geometry }, values.collect())
+}
+
 /// Points of a line, given in order of x on the page, with one point per `width` of the page: the mean of each run.
 pub fn line(points: &[(f64, f64)], width: f64) -> Vec<(f64, f64)> {
     let column = |p: &(f64, f64)| (p.0 / width).floor();
@@ -85,6 +98,16 @@ mod tests {
         assert_eq!(block_majority(&codes, 2).values, [2]);
         assert_eq!(step(1009, 700, 512), 2);
         assert_eq!(step(100, 100, 512), 1);
+    }
+
+    #[test]
+    fn val_tiles_repeat() {
+        let grid = Grid::new(Geometry::square(2, 4, 0.5), (0..8).map(f64::from).collect());
+        let whole = tiled(&grid, 3, 100);
+        assert_eq!((whole.rows(), whole.cols(), whole.geometry.cell), (6, 12, [0.5; 2]));
+        assert!((0..72).all(|k| whole.values[k] == grid.at(k / 12 % 2, k % 12 % 4)));
+        let thin = tiled(&grid, 3, 6);
+        assert_eq!((thin.rows(), thin.cols(), thin.at(1, 4)), (3, 6, 2.5));
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Structure of whole reports: nothing here compares with a stored page.
 
-mod made_up;
+pub mod made_up;
 mod on_disk;
 pub mod xml;
 
@@ -52,6 +52,21 @@ fn prop_a_full_report_is_sound() {
         assert!(page.contains(&format!("href=\"data/{figure}.json\"")), "{figure}");
         assert!(files.contains_key(&format!("data/{figure}.json")), "{figure}");
     }
+    let of_fit = ["covariance", "candidates", "profile", "directions", "residual", "mask"];
+    let of_texture = ["measured", "synthetic", "tiles", "psd", "structure", "heights", "profiles"];
+    let expected = of_fit
+        .map(|f| format!("{f}-jacksboro-corrected"))
+        .into_iter()
+        .chain(of_texture.map(|f| format!("{f}-texture")));
+    for figure in expected {
+        assert!(summary.figures.contains(&figure), "{figure} is missing");
+    }
+    for table in ["intervals-of-jacksboro", "candidates-of-jacksboro", "figures-of-texture", "surfaces"] {
+        assert!(files.contains_key(&format!("data/{table}.json")), "{table}");
+    }
+    // Three surfaces in one frame, each by its own name.
+    let heights = &files["figures/heights-texture.svg"];
+    assert!(["measured residual", "treated alike", "as made"].iter().all(|name| heights.contains(name)));
     assert_eq!(summary.bytes, files.values().map(|t| t.len() as u64).sum::<u64>());
     assert!(page.contains("Settings differ"));
 }
@@ -87,11 +102,17 @@ fn prop_an_empty_release_has_a_page_without_empty_boxes() {
 #[test]
 fn prop_any_part_may_be_absent() {
     type Take = (&'static str, fn(&mut Data));
-    let takes: [Take; 9] = [
+    let takes: [Take; 15] = [
         ("missions", |d| d.missions.clear()),
         ("fits", |d| d.fits.clear()),
         ("covariance", |d| d.covariance.clear()),
         ("psd", |d| d.psd.clear()),
+        ("candidates", |d| d.candidates.clear()),
+        ("candidate curves", |d| d.candidate_curves.clear()),
+        ("profile", |d| d.likelihood_profile.clear()),
+        ("surfaces", |d| d.surfaces.clear()),
+        ("structure", |d| d.structure.clear()),
+        ("profile spectra", |d| d.profile_psd.clear()),
         ("heights", |d| d.heights.clear()),
         ("terrains", |d| d.terrains.clear()),
         ("files", |d| d.files = Box::new(made_up::Shelf::default())),
@@ -133,7 +154,15 @@ fn prop_unknown_figures_are_absent_not_nan() {
     }
     data.missions.iter_mut().for_each(|m| (m.time_s, m.start_x_m) = (f64::NAN, f64::INFINITY));
     data.fits.iter_mut().for_each(|f| (f.sigma_m, f.range_m) = (f64::NAN, f64::NAN));
-    data.covariance.iter_mut().for_each(|c| c.model_m2 = f64::NAN);
+    data.covariance.iter_mut().for_each(|c| (c.model_m2, c.covariance_low_m2) = (f64::NAN, f64::INFINITY));
+    for fit in &mut data.fits {
+        (fit.sigma_low_m, fit.range_high_m, fit.misfit_p, fit.isotropy_ratio) =
+            (f64::NAN, f64::INFINITY, f64::NEG_INFINITY, f64::NAN);
+    }
+    data.surfaces.iter_mut().for_each(|s| (s.sq_m, s.sal_m, s.hurst_lag_max_m) = (f64::NAN, f64::INFINITY, f64::NAN));
+    data.likelihood_profile.iter_mut().for_each(|p| p.range_m = f64::NAN);
+    data.structure.iter_mut().for_each(|s| s.value_m2 = f64::INFINITY);
+    data.candidates.iter_mut().for_each(|c| (c.parameters, c.chi2) = ("not JSON".into(), Some(f64::NAN)));
     assert_sound(&report(&data).0);
 }
 

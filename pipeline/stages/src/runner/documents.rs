@@ -30,7 +30,7 @@ pub fn readme(contents: &Contents<'_>) -> String {
          | `mask/` | masks of the fits |\n\
          | `terrain/`, `texture/` | heightfields, GeoTIFF, float32 metres, no data -9999 |\n\
          | `classes/` | roughness classes: 0 low, 1 semi, 2 high, 255 none; `.raw.tif` before closing |\n\
-         | `fit/` | covariance fits (JSON), with background and residual |\n\
+         | `fit/` | covariance fits (JSON), with background, residual and the cells used |\n\
          | `mcap/` | one recording per mission |\n\
          | `tables/` | Parquet, units and descriptions in the column metadata |\n\
          | `manifest.json`, `SHA256SUMS` | what each file is made from, and its checksum |\n\n",

@@ -1,5 +1,9 @@
-//! How well each fit describes its measured DEM: the DEM, what was fitted, the covariance with its model, the parameters
-//! of all fits side by side.
+//! How well each fit describes its measured DEM: what can be believed, the covariance with its models, the parameters of all
+//! fits side by side, the DEM and what was fitted of it.
+
+mod mask;
+mod models;
+mod verdict;
 
 use super::Question;
 use super::curves::HEIGHT;
@@ -27,9 +31,13 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     for dem in dems.iter().take(DEMS_MAX) {
         let fits: Vec<&FitRow> = data.fits.iter().filter(|f| f.dem_id == *dem).collect();
         blocks.push(Block::Heading(format!("DEM {dem}")));
+        blocks.extend(fits.iter().map(|fit| Block::Text(verdict::paragraph(fit))));
         blocks.extend(warnings(data, &fits)?.into_iter().map(Block::Warning));
         blocks.push(Block::Figures(covariances(data, &fits)));
-        blocks.push(Block::Table(parameters(dem, &fits)));
+        blocks.push(Block::Table(verdict::intervals(dem, &fits)));
+        blocks.push(Block::Figures(fits.iter().flat_map(|fit| models::figures(data, fit)).collect()));
+        blocks.push(Block::Table(models::table(data, dem, &fits)));
+        blocks.push(Block::FoldedTable(parameters(dem, &fits)));
         blocks.push(Block::Figures(maps(data, dem, &fits)?));
     }
     if dems.len() > DEMS_MAX {
@@ -68,18 +76,25 @@ fn sentence(words: &str) -> String {
     format!("{start}{}{stop}", chars.as_str())
 }
 
+/// Bins of a fit in all directions together.
+fn rings<'a>(data: &'a Data, fit: &FitRow) -> Vec<&'a CovarianceRow> {
+    let isotropic =
+        |r: &&CovarianceRow| r.fit_id == fit.fit_id && r.azimuth_deg.is_none() && r.covariance_m2.is_finite();
+    data.covariance.iter().filter(isotropic).collect()
+}
+
 fn covariances(data: &Data, fits: &[&FitRow]) -> Vec<Figure> {
-    let bins = |fit: &&FitRow| -> Vec<&CovarianceRow> {
-        let isotropic =
-            |r: &&CovarianceRow| r.fit_id == fit.fit_id && r.azimuth_deg.is_none() && r.covariance_m2.is_finite();
-        data.covariance.iter().filter(isotropic).collect()
-    };
     let drawn: Vec<(&FitRow, Vec<&CovarianceRow>)> =
-        fits.iter().map(|f| (*f, bins(f))).filter(|(_, b)| !b.is_empty()).collect();
+        fits.iter().map(|f| (*f, rings(data, f))).filter(|(_, b)| !b.is_empty()).collect();
     // Common axes, so that the modes can be compared by eye.
     let all = || drawn.iter().flat_map(|(_, bins)| bins.iter());
     let finite = |values: Vec<f64>| values.into_iter().filter(|v| v.is_finite());
-    let values = || all().flat_map(|r| finite(vec![r.covariance_m2, r.model_m2, r.surface_model_m2]));
+    let values = || {
+        let of_bin = |r: &&CovarianceRow| {
+            vec![r.covariance_m2, r.model_m2, r.surface_model_m2, r.covariance_low_m2, r.covariance_high_m2]
+        };
+        all().flat_map(move |r| finite(of_bin(r)))
+    };
     let x = Axis::linear(0.0, 1.03 * all().map(|r| r.lag_m).fold(0.0, f64::max));
     let high = values().fold(0.0, f64::max);
     let low = values().fold(0.0, f64::min);
@@ -95,6 +110,10 @@ fn covariance(fit: &FitRow, bins: &[&CovarianceRow], x: Axis, y: Axis) -> Figure
     let close = 0.01 * bins.iter().map(|b| b.model_m2.abs()).fold(0.0, f64::max);
     let same = bins.iter().all(|b| (b.model_m2 - b.surface_model_m2).abs() <= close);
     let mut legend = vec![(Mark::Symbol(Symbol::Disc, Paint::Ink), "measured (area: pairs)".to_owned())];
+    let banded = bins.iter().any(|b| b.covariance_low_m2.is_finite());
+    if banded {
+        legend.push((Mark::Line(BAND), "95 % over the site".into()));
+    }
     match same {
         true => legend.push((Mark::Line(seen), "fitted model".into())),
         false => legend.extend([
@@ -105,6 +124,9 @@ fn covariance(fit: &FitRow, bins: &[&CovarianceRow], x: Axis, y: Axis) -> Figure
     let mut plot = Plot::new((WIDTH, HEIGHT + 20.0), (x, "lag, m"), (y, "covariance, m²"), &legend);
     plot.line([(0.0, 0.0), (x.range().1, 0.0)], Stroke::new(Paint::Muted, 1.0));
     plot.clip(&format!("{id}-clip"));
+    for b in bins {
+        plot.line([(b.lag_m, b.covariance_low_m2), (b.lag_m, b.covariance_high_m2)], BAND);
+    }
     if !same {
         plot.line(bins.iter().map(|b| (b.lag_m, b.surface_model_m2)), surface);
     }
@@ -113,8 +135,11 @@ fn covariance(fit: &FitRow, bins: &[&CovarianceRow], x: Axis, y: Axis) -> Figure
     plot.svg.close();
     plot.note(0, &format!("σ = {}", set::with_unit(fit.sigma_m, 3, "m")));
     plot.note(1, &format!("b = {}", set::with_unit(fit.range_m, 3, "m")));
-    figure(id, fit, bins, plot)
+    figure(id, fit, bins, plot, banded)
 }
+
+/// Bars about the bins.
+const BAND: Stroke = Stroke { paint: Paint::Ink, width: 4.0, dash: "", opacity: 0.22 };
 
 /// Discs whose area grows with the number of pairs.
 fn draw_bins(plot: &mut Plot, bins: &[&CovarianceRow]) {
@@ -127,11 +152,12 @@ fn draw_bins(plot: &mut Plot, bins: &[&CovarianceRow]) {
     }
 }
 
-fn figure(id: String, fit: &FitRow, bins: &[&CovarianceRow], plot: Plot) -> Figure {
+fn figure(id: String, fit: &FitRow, bins: &[&CovarianceRow], plot: Plot, banded: bool) -> Figure {
     let pairs = bins.iter().map(|b| b.pairs);
     let (fewest, most) = (pairs.clone().min().unwrap_or(0), pairs.max().unwrap_or(0));
+    let band = if banded { " Bars: how much tiles of the site differ (jackknife)." } else { "" };
     let caption = format!(
-        "Covariance of the residual after a moving average of {} × {} m, {} model; {} to {} pairs of cells in a bin.",
+        "Covariance of the residual after a moving average of {} × {} m, {} model; {} to {} pairs of cells in a bin.{band}",
         set::significant(fit.window_x_m, 3),
         set::significant(fit.window_y_m, 3),
         fit.model,
@@ -145,7 +171,16 @@ fn figure(id: String, fit: &FitRow, bins: &[&CovarianceRow], plot: Plot) -> Figu
         set::with_unit(fit.sigma_m, 3, "m"),
         set::with_unit(fit.range_m, 3, "m")
     );
-    let names = ["bin", "lag_m", "covariance_m2", "pairs", "model_m2", "surface_model_m2"];
+    let names = [
+        "bin",
+        "lag_m",
+        "covariance_m2",
+        "covariance_low_m2",
+        "covariance_high_m2",
+        "pairs",
+        "model_m2",
+        "surface_model_m2",
+    ];
     let query = format!("tables/covariance where fit_id = '{}' and azimuth_deg is null", fit.fit_id);
     let numbers = Numbers::select(query, bins.iter().copied(), &names);
     let title = format!("{}, {} mode.", fit.fit_id, fit.mode);
@@ -199,6 +234,7 @@ fn maps(data: &Data, dem: &str, fits: &[&FitRow]) -> Result<Vec<Figure>, ReportE
     for fit in fits {
         figures.extend(background(data, fit, style)?);
         figures.extend(residual(data, fit)?);
+        figures.extend(mask::figure(data, fit)?);
     }
     Ok(figures)
 }

@@ -1,16 +1,24 @@
 //! Whether a synthetic texture looks like what it was fitted to: residual and texture side by side at one scale and in one
-//! colour range, their spectra and height distributions in one frame.
+//! colour range, their spectra, height distributions and structure functions in one frame, their figures in one table.
+//!
+//! A residual has lost what the moving average took; a texture has not. Both can be compared where the texture went through
+//! the same (`<texture>.residual`).
+
+mod figures;
 
 use super::Question;
 use super::curves::{self, Curve};
-use super::relief::{Style, Words, deviations, exaggeration, limit_m, middle_range, relief};
+use super::relief::{
+    Style, Words, deviations, exaggeration, exaggeration_words, limit_m, middle_range, relief, relief_of,
+};
 use crate::ReportError;
 use crate::content::{Block, Figure, Numbers, Size, TableBlock, slug};
 use crate::data::{self, Data};
+use crate::render::chart::Plot;
 use crate::render::svg::{Paint, Stroke};
 use crate::render::{number as set, thin};
 use sastrugi_numeric::Grid;
-use sastrugi_schemas::tables::{HeightDistributionRow, PsdRow, TerrainRow};
+use sastrugi_schemas::tables::TerrainRow;
 
 /// Registry entry.
 pub const QUESTION: Question = Question {
@@ -22,6 +30,8 @@ pub const QUESTION: Question = Question {
 
 /// Textures that are drawn; all are in the table.
 const TEXTURES_MAX: usize = 4;
+/// Tiles along each side of the picture that repeats a texture.
+const TILES: usize = 3;
 
 fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     let on_base = |t: &&TerrainRow| data::parameter(t, "onto").is_some();
@@ -33,13 +43,42 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
         if rows.iter().any(|row| !row.is_empty()) {
             blocks.push(Block::Heading(heading(texture)));
             blocks.extend(rows.into_iter().map(Block::Figures));
+            let fit = data::parameter(texture, "fit").filter(|_| data::parameter(texture, "onto").is_none());
+            blocks.extend(fit.map(|fit| Block::Table(figures::table(data, texture, &fit))));
         }
     }
     if textures.len() > TEXTURES_MAX {
         blocks.push(Block::Text(format!("The first {TEXTURES_MAX} of {} textures are drawn.", textures.len())));
     }
     blocks.push(Block::FoldedTable(all(data)));
+    blocks.push(Block::FoldedTable(surfaces(data)));
     Ok(blocks)
+}
+
+/// Figures of every surface of the release.
+fn surfaces(data: &Data) -> TableBlock {
+    let names = [
+        "surface_id",
+        "stage",
+        "fit_id",
+        "cell_x_m",
+        "valid_share",
+        "sq_m",
+        "sa_m",
+        "ssk",
+        "sku",
+        "sz_m",
+        "sdq",
+        "sal_m",
+        "aspect_ratio",
+        "direction_deg",
+        "hurst_exponent",
+        "hurst_standard_error",
+        "hurst_lag_min_m",
+        "hurst_lag_max_m",
+    ];
+    let numbers = Numbers::select("tables/surfaces", &data.surfaces, &names);
+    TableBlock { id: "surfaces".into(), caption: "All surfaces (ISO 25178)".into(), numbers }
 }
 
 fn heading(texture: &TerrainRow) -> String {
@@ -55,8 +94,15 @@ fn figures(data: &Data, texture: &TerrainRow) -> Result<Vec<Vec<Figure>>, Report
     if let Some(base) = data::parameter(texture, "onto") {
         return Ok(vec![on_base(data, texture, &base, &fit)?]);
     }
-    let curves = [spectra(data, texture, &fit), distributions(data, texture, &fit)];
-    Ok(vec![patches(data, texture, &fit)?, curves.into_iter().flatten().collect()])
+    let charts = [
+        spectra(data, texture, &fit),
+        structures(data, texture, &fit),
+        distributions(data, texture, &fit),
+        profiles(data, texture, &fit),
+    ];
+    let mut pictures = patches(data, texture, &fit)?;
+    pictures.extend(tiling(data, texture)?);
+    Ok(vec![pictures, charts.into_iter().flatten().collect()])
 }
 
 /// The base and the base with its texture, in one range of heights.
@@ -112,64 +158,160 @@ fn common_size(a: &Grid, b: Option<&Grid>) -> [f64; 2] {
     [sides.fold(f64::INFINITY, f64::min); 2]
 }
 
-const MEASURED: Stroke = Stroke { paint: Paint::Ink, width: 2.2, dash: "", opacity: 0.75 };
-const SYNTHETIC: Stroke = Stroke { paint: Paint::Series(1), width: 1.8, dash: "6 3", opacity: 1.0 };
+const MEASURED: Stroke = Stroke { paint: Paint::Ink, width: 2.4, dash: "", opacity: 0.75 };
+const ALIKE: Stroke = Stroke { paint: Paint::Series(1), width: 1.9, dash: "6 3", opacity: 1.0 };
+const AS_MADE: Stroke = Stroke { paint: Paint::Series(0), width: 1.4, dash: "2 3", opacity: 1.0 };
+
+/// Surfaces that are drawn in one frame: name, id, line.
+fn sides(fit: &str, texture: &TerrainRow) -> [(&'static str, String, Stroke); 3] {
+    [
+        ("measured residual", fit.to_owned(), MEASURED),
+        ("synthetic, treated alike", figures::alike_id(texture), ALIKE),
+        ("synthetic, as made", texture.terrain_id.clone(), AS_MADE),
+    ]
+}
 
 /// Curves of the residual (stored under the id of its fit) and of the texture.
-fn pair(fit: &str, texture: &TerrainRow, points: impl Fn(&str) -> Vec<(f64, f64)>) -> Vec<Curve> {
-    let curve = |name: &str, id: &str, stroke| Curve { name: Some(name.into()), stroke, points: points(id) };
-    let curves = [curve("measured residual", fit, MEASURED), curve("synthetic", &texture.terrain_id, SYNTHETIC)];
-    curves.into_iter().filter(|c| c.points.len() > 1).collect()
+fn together(fit: &str, texture: &TerrainRow, points: impl Fn(&str) -> Vec<(f64, f64)>) -> Vec<Curve> {
+    let curve =
+        |(name, id, stroke): (&str, String, Stroke)| Curve { name: Some(name.into()), stroke, points: points(&id) };
+    sides(fit, texture).into_iter().map(curve).filter(|c| c.points.len() > 1).collect()
+}
+
+/// The ids of a frame as a list for a query.
+fn ids(fit: &str, texture: &TerrainRow) -> String {
+    sides(fit, texture).map(|(_, id, _)| format!("'{id}'")).join(", ")
+}
+
+/// The chart of one kind of curve.
+struct Chart<'a> {
+    what: &'a str,
+    title: &'a str,
+    caption: &'a str,
+    measured: &'a str,
+}
+
+impl Chart<'_> {
+    fn figure(&self, texture: &TerrainRow, curves: &[Curve], plot: Plot, numbers: Numbers) -> Figure {
+        Figure {
+            id: slug(&format!("{}-{}", self.what, texture.terrain_id)),
+            title: self.title.into(),
+            caption: with_measured(self.caption, self.measured, curves),
+            description: format!("{} {}.", self.caption, names_of(curves)),
+            svg: plot.svg,
+            size: Size::Column,
+            numbers,
+        }
+    }
 }
 
 fn spectra(data: &Data, texture: &TerrainRow, fit: &str) -> Option<Figure> {
-    let curves = pair(fit, texture, |id| curves::spectrum(&data.spectrum(id)));
+    let curves = together(fit, texture, |id| curves::spectrum(&data.spectrum(id)));
     let id = slug(&format!("psd-{}", texture.terrain_id));
     let plot = (!curves.is_empty()).then(|| curves::spectra(&id, &curves, curves::ranges(&curves), None))?;
-    let rows: Vec<&PsdRow> = [fit, &texture.terrain_id].into_iter().flat_map(|id| data.spectrum(id)).collect();
+    let rows = sides(fit, texture).into_iter().flat_map(|(_, id, _)| data.spectrum(&id));
     let names = ["terrain_id", "bin", "frequency_cycles_m", "psd_m4", "modes"];
-    let query = format!("tables/psd where terrain_id in ('{fit}', '{}')", texture.terrain_id);
-    Some(Figure {
-        id,
-        title: "Spectra.".into(),
-        caption: with_measured(
-            "Radially averaged two-dimensional power spectral density.",
-            "The moving average has taken the lowest frequencies out of the measured residual, not out of the texture.",
-            &curves,
-        ),
-        description: format!("Log-log spectra of {}.", names_of(&curves)),
-        svg: plot.svg,
-        size: Size::Column,
-        numbers: Numbers::select(query, rows, &names),
-    })
+    let query = format!("tables/psd where terrain_id in ({})", ids(fit, texture));
+    let chart = Chart {
+        what: "psd",
+        title: "Spectra.",
+        caption: "Radially averaged two-dimensional power spectral density.",
+        measured: "The moving average has taken the lowest frequencies out of the measured residual, and out of the texture \
+                   where it was treated alike.",
+    };
+    Some(chart.figure(texture, &curves, plot, Numbers::select(query, rows, &names)))
 }
 
 fn distributions(data: &Data, texture: &TerrainRow, fit: &str) -> Option<Figure> {
-    let curves = pair(fit, texture, |id| curves::histogram(&data.histogram(id)));
+    let curves = together(fit, texture, |id| curves::histogram(&data.histogram(id)));
     let id = slug(&format!("heights-{}", texture.terrain_id));
     let plot = (!curves.is_empty()).then(|| curves::distributions(&id, &curves, curves::ranges(&curves)))?;
-    let rows: Vec<&HeightDistributionRow> =
-        [fit, &texture.terrain_id].into_iter().flat_map(|id| data.histogram(id)).collect();
+    let rows = sides(fit, texture).into_iter().flat_map(|(_, id, _)| data.histogram(&id));
     let names = ["terrain_id", "bin", "low_m", "high_m", "cells", "density_per_m"];
-    let query = format!("tables/height_distribution where terrain_id in ('{fit}', '{}')", texture.terrain_id);
-    Some(Figure {
-        id,
-        title: "Heights.".into(),
-        caption: with_measured("Height distributions.", "Trimmed outliers are missing from the measured one.", &curves),
-        description: format!("Height distributions of {}.", names_of(&curves)),
-        svg: plot.svg,
-        size: Size::Column,
-        numbers: Numbers::select(query, rows, &names),
-    })
+    let query = format!("tables/height_distribution where terrain_id in ({})", ids(fit, texture));
+    let chart = Chart {
+        what: "heights",
+        title: "Heights.",
+        caption: "Height distributions.",
+        measured: "The measured one ends where it was trimmed.",
+    };
+    Some(chart.figure(texture, &curves, plot, Numbers::select(query, rows, &names)))
+}
+
+fn structures(data: &Data, texture: &TerrainRow, fit: &str) -> Option<Figure> {
+    let points = |id: &str| data.structure_of(id, "all").iter().map(|r| (r.lag_m, r.value_m2)).collect();
+    let curves = together(fit, texture, points);
+    let id = slug(&format!("structure-{}", texture.terrain_id));
+    let plot = (!curves.is_empty()).then(|| curves::log_log(&id, &curves, "lag, m", "mean squared increment, m²"))?;
+    let rows = sides(fit, texture).into_iter().flat_map(|(_, id, _)| data.structure_of(&id, "all"));
+    let names = ["surface_id", "direction", "bin", "lag_m", "value_m2", "pairs"];
+    let query = format!("tables/structure where direction = 'all' and surface_id in ({})", ids(fit, texture));
+    let chart = Chart {
+        what: "structure",
+        title: "Structure functions.",
+        caption: "Mean squared difference of heights against their distance, all directions together.",
+        measured: "The moving average makes it level off at its window.",
+    };
+    Some(chart.figure(texture, &curves, plot, Numbers::select(query, rows, &names)))
+}
+
+/// Profile spectra along both axes, of the two surfaces that were treated alike.
+fn profiles(data: &Data, texture: &TerrainRow, fit: &str) -> Option<Figure> {
+    let alike = figures::alike_id(texture);
+    let surfaces = [("measured", fit, MEASURED.paint), ("synthetic", alike.as_str(), ALIKE.paint)];
+    let axes = [("x", "east-west", ""), ("y", "north-south", "5 3")];
+    let curve = |(name, id, paint): (&str, &str, Paint), (axis, words, dash): (&str, &str, &'static str)| Curve {
+        name: Some(format!("{name}, {words}")),
+        stroke: Stroke::new(paint, 1.8).dashed(dash).faint(0.85),
+        points: data.profile_spectrum(id, axis).iter().map(|r| (r.frequency_cycles_m, r.psd_m3)).collect(),
+    };
+    let curves: Vec<Curve> = surfaces
+        .into_iter()
+        .flat_map(|surface| axes.map(|axis| curve(surface, axis)))
+        .filter(|c| c.points.len() > 1)
+        .collect();
+    let id = slug(&format!("profiles-{}", texture.terrain_id));
+    let titles = ("spatial frequency, cycles/m", "power spectral density, m³");
+    let plot = (!curves.is_empty()).then(|| curves::log_log(&id, &curves, titles.0, titles.1))?;
+    let rows = surfaces.into_iter().flat_map(|(_, id, _)| axes.map(|(axis, _, _)| data.profile_spectrum(id, axis)));
+    let names = ["surface_id", "direction", "bin", "frequency_cycles_m", "psd_m3", "modes"];
+    let query = format!("tables/profile_psd where surface_id in ('{fit}', '{alike}')");
+    let chart = Chart {
+        what: "profiles",
+        title: "Spectra of profiles.",
+        caption: "One-dimensional power spectral density, mean of all rows and of all columns.",
+        measured: "",
+    };
+    Some(chart.figure(texture, &curves, plot, Numbers::select(query, rows.flatten(), &names)))
+}
+
+/// The texture laid three by three, where it repeats.
+fn tiling(data: &Data, texture: &TerrainRow) -> Result<Option<Figure>, ReportError> {
+    let repeats = serde_json::from_str::<serde_json::Value>(&texture.params)
+        .is_ok_and(|p| p.get("periodic").and_then(serde_json::Value::as_bool).unwrap_or(true));
+    let Some(grid) = data.files.grid(&texture.path)?.filter(|_| repeats) else { return Ok(None) };
+    let tiled = thin::tiled(&grid, TILES, 450);
+    let limit = limit_m(&grid);
+    let style = Style { range_m: (-limit, limit), exaggeration: exaggeration(texture.rms_slope), pixels: 450 };
+    let shading = exaggeration_words(style.exaggeration);
+    let words = Words {
+        id: slug(&format!("tiles-{}", texture.terrain_id)),
+        title: "Three by three.".into(),
+        caption: format!(
+            "{} repeated in either direction, as shaded relief: a seam would show as a line at a third.{shading}",
+            texture.terrain_id
+        ),
+    };
+    relief_of(&tiled, &texture.path, Some(style).filter(|s| s.range_m.0 < s.range_m.1), words)
 }
 
 /// The words, and what to mind about the measured curve where there is one.
 fn with_measured(words: &str, measured: &str, curves: &[Curve]) -> String {
-    if curves.len() > 1 { format!("{words} {measured}") } else { words.to_owned() }
+    if curves.len() > 1 && !measured.is_empty() { format!("{words} {measured}") } else { words.to_owned() }
 }
 
 fn names_of(curves: &[Curve]) -> String {
-    curves.iter().filter_map(|c| c.name.clone()).collect::<Vec<_>>().join(" and ")
+    curves.iter().filter_map(|c| c.name.clone()).collect::<Vec<_>>().join("; ")
 }
 
 fn all(data: &Data) -> TableBlock {

@@ -1,0 +1,207 @@
+//! The models that a fit tried, how its likelihood falls away, and the covariance by direction.
+
+use super::super::curves::HEIGHT;
+use super::verdict;
+use crate::content::{Figure, Numbers, Size, TableBlock, slug, text};
+use crate::data::Data;
+use crate::render::axis::Axis;
+use crate::render::chart::{Entry, Mark, Plot, WIDTH};
+use crate::render::number as set;
+use crate::render::svg::{Paint, Stroke, Symbol};
+use sastrugi_schemas::Cell;
+use sastrugi_schemas::tables::{CovarianceRow, FitRow};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Candidates that are drawn; all are in the table.
+const CANDIDATES_MAX: usize = 6;
+/// Rise of the sum of squares at the edge of a 95 % interval (chi-squared, one degree of freedom).
+const EDGE: f64 = 3.84;
+/// Highest rise that is drawn.
+const RISE_MAX: f64 = 30.0;
+/// Dashes that tell lines apart without colour.
+const DASHES: [&str; 6] = ["", "7 4", "2 3", "9 3 2 3", "4 2", "12 4"];
+
+/// Candidates, profile and directions of a fit, as far as it has them.
+pub fn figures(data: &Data, fit: &FitRow) -> Vec<Figure> {
+    [candidates(data, fit), profile(data, fit), directions(data, fit)].into_iter().flatten().collect()
+}
+
+fn line(i: usize) -> Stroke {
+    Stroke::new(Paint::Series(i), 1.8).dashed(DASHES[i % DASHES.len()])
+}
+
+/// Every candidate over the measured covariance; none where only one was tried.
+fn candidates(data: &Data, fit: &FitRow) -> Option<Figure> {
+    let all = data.candidates_of(&fit.fit_id);
+    let drawn: Vec<_> = all
+        .iter()
+        .map(|c| (c, data.candidate_curve(&fit.fit_id, c.rank)))
+        .filter(|(_, curve)| curve.len() > 1)
+        .take(CANDIDATES_MAX)
+        .collect();
+    if drawn.len() < 2 {
+        return None;
+    }
+    let bins = super::rings(data, fit);
+    let id = slug(&format!("candidates-{}", fit.fit_id));
+    let mut legend: Vec<Entry> = vec![(Mark::Symbol(Symbol::Disc, Paint::Ink), "measured".to_owned())];
+    legend.extend(drawn.iter().enumerate().map(|(i, (c, _))| (Mark::Line(line(i)), c.model.clone())));
+    let values = || {
+        let curves = drawn.iter().flat_map(|(_, curve)| curve.iter().map(|r| r.model_m2));
+        curves.chain(bins.iter().map(|b| b.covariance_m2))
+    };
+    let (low, high) = (values().fold(0.0, f64::min), values().fold(0.0, f64::max));
+    let lag = drawn.iter().flat_map(|(_, c)| c.iter().map(|r| r.lag_m)).fold(0.0, f64::max);
+    let y = Axis::linear(low - 0.04 * (high - low), high + 0.06 * (high - low));
+    let x = Axis::linear(0.0, 1.03 * lag);
+    let mut plot = Plot::new((WIDTH, HEIGHT + 20.0), (x, "lag, m"), (y, "covariance, m²"), &legend);
+    plot.line([(0.0, 0.0), (x.range().1, 0.0)], Stroke::new(Paint::Muted, 1.0));
+    plot.clip(&format!("{id}-clip"));
+    super::draw_bins(&mut plot, &bins);
+    // The best is drawn last, over the others.
+    for (i, (_, curve)) in drawn.iter().enumerate().rev() {
+        plot.line(curve.iter().map(|r| (r.lag_m, r.model_m2)), line(i));
+    }
+    plot.svg.close();
+    let names = ["rank", "bin", "lag_m", "model_m2"];
+    let query = format!("tables/candidate_curves where fit_id = '{}'", fit.fit_id);
+    let rows = drawn.iter().flat_map(|(_, curve)| curve.iter().copied());
+    Some(Figure {
+        id,
+        title: format!("Models that {} tried.", fit.fit_id),
+        caption: "Each candidate after the same detrending and trimming as the data, the best by AICc first.".into(),
+        description: format!("Covariance against lag with {} candidate models.", drawn.len()),
+        svg: plot.svg,
+        size: Size::Column,
+        numbers: Numbers::select(query, rows, &names),
+    })
+}
+
+/// How the sum of squares rises when the range is held elsewhere.
+fn profile(data: &Data, fit: &FitRow) -> Option<Figure> {
+    let points = data.profile_of(&fit.fit_id);
+    if points.len() < 3 {
+        return None;
+    }
+    let id = slug(&format!("profile-{}", fit.fit_id));
+    let ends = points.iter().fold((f64::INFINITY, 0.0f64), |(l, h), p| (l.min(p.range_m), h.max(p.range_m)));
+    let highest = points.iter().map(|p| p.chi2_rise).fold(0.0, f64::max);
+    let top = highest.clamp(2.0 * EDGE, RISE_MAX);
+    let curve = Stroke::new(Paint::Series(0), 2.0);
+    let edge = Stroke::new(Paint::Muted, 1.4).dashed("6 4");
+    let interval = Stroke::new(Paint::Series(1), 1.4).dashed("2 3");
+    let ends_of_b: Vec<f64> =
+        [fit.range_low_m, fit.range_high_m].into_iter().filter(|end| *end > 0.0 && end.is_finite()).collect();
+    let mut legend = vec![(Mark::Line(curve), "rise of the misfit".to_owned()), (Mark::Line(edge), "3.84".to_owned())];
+    if !ends_of_b.is_empty() {
+        legend.push((Mark::Line(interval), "ends of the interval".into()));
+    }
+    let x = (Axis::log(ends.0 / 1.05, ends.1 * 1.05), "range b held, m");
+    let y = (Axis::linear(0.0, 1.05 * top), "rise of χ²");
+    let mut plot = Plot::new((WIDTH, HEIGHT), x, y, &legend);
+    plot.clip(&format!("{id}-clip"));
+    plot.line([(ends.0, EDGE), (ends.1, EDGE)], edge);
+    for end in ends_of_b {
+        plot.line([(end, 0.0), (end, 1.05 * top)], interval);
+    }
+    plot.line(points.iter().map(|p| (p.range_m, p.chi2_rise)), curve);
+    let marks = plot.place(points.iter().map(|p| (p.range_m, p.chi2_rise)));
+    marks.into_iter().for_each(|at| plot.svg.disc(at, 2.6, Paint::Series(0), 1.0));
+    plot.svg.close();
+    let cut = if highest > top { format!(" The axis ends at {}.", set::significant(top, 2)) } else { String::new() };
+    let query = format!("tables/likelihood_profile where fit_id = '{}'", fit.fit_id);
+    Some(Figure {
+        id,
+        title: format!("How sharply {} knows b.", fit.fit_id),
+        caption: format!(
+            "Rise of the generalised sum of squares when b is held and everything else is fitted anew; 3.84 is the edge of a \
+             95 % interval if the model is right. A flat curve: b cannot be told.{cut}"
+        ),
+        description: format!("Profile likelihood over ranges from {}.", span(ends)),
+        svg: plot.svg,
+        size: Size::Column,
+        numbers: Numbers::select(query, points, &["point", "range_m", "chi2_rise"]),
+    })
+}
+
+fn span((low, high): (f64, f64)) -> String {
+    format!("{} to {}", set::significant(low, 3), set::with_unit(high, 3, "m"))
+}
+
+/// Covariance by sector.
+fn directions(data: &Data, fit: &FitRow) -> Option<Figure> {
+    let of_fit = |r: &&CovarianceRow| r.fit_id == fit.fit_id && r.covariance_m2.is_finite();
+    let mut sectors: BTreeMap<i64, Vec<&CovarianceRow>> = BTreeMap::new();
+    for row in data.covariance.iter().filter(of_fit) {
+        if let Some(azimuth) = row.azimuth_deg.filter(|a| a.is_finite()) {
+            sectors.entry(azimuth.round() as i64).or_default().push(row);
+        }
+    }
+    sectors.retain(|_, rows| rows.len() > 1);
+    if sectors.len() < 2 {
+        return None;
+    }
+    let id = slug(&format!("directions-{}", fit.fit_id));
+    let model = Stroke::new(Paint::Ink, 1.4).dashed("2 3");
+    let mut legend: Vec<Entry> =
+        sectors.keys().enumerate().map(|(i, azimuth)| (Mark::Line(line(i)), format!("{azimuth}°"))).collect();
+    legend.push((Mark::Line(model), "model".into()));
+    let all = || sectors.values().flatten();
+    let values = || all().flat_map(|r| [r.covariance_m2, r.model_m2]).filter(|v| v.is_finite());
+    let (low, high) = (values().fold(0.0, f64::min), values().fold(f64::NEG_INFINITY, f64::max));
+    let x = Axis::linear(0.0, 1.03 * all().map(|r| r.lag_m).fold(0.0, f64::max));
+    let y = Axis::linear(low - 0.04 * (high - low), high + 0.06 * (high - low));
+    let mut plot = Plot::new((WIDTH, HEIGHT + 20.0), (x, "lag, m"), (y, "covariance, m²"), &legend);
+    plot.line([(0.0, 0.0), (x.range().1, 0.0)], Stroke::new(Paint::Muted, 1.0));
+    plot.clip(&format!("{id}-clip"));
+    for (i, rows) in sectors.values().enumerate() {
+        plot.line(rows.iter().map(|r| (r.lag_m, r.model_m2)), model.faint(0.6));
+        plot.line(rows.iter().map(|r| (r.lag_m, r.covariance_m2)), line(i));
+    }
+    plot.svg.close();
+    let verdict = verdict::direction(fit).unwrap_or_default();
+    let names = ["azimuth_deg", "lag_m", "covariance_m2", "pairs", "model_m2"];
+    let query = format!("tables/covariance where fit_id = '{}' and azimuth_deg is not null", fit.fit_id);
+    let rows: Vec<&CovarianceRow> = all().copied().collect();
+    Some(Figure {
+        id,
+        title: format!("Covariance by direction, {}.", fit.fit_id),
+        caption: format!("Sectors about azimuths clockwise from north, opposite directions together. {verdict}"),
+        description: format!("Covariance against lag in {} directions. {verdict}", sectors.len()),
+        svg: plot.svg,
+        size: Size::Column,
+        numbers: Numbers::select(query, rows, &names),
+    })
+}
+
+/// The candidates of all fits of a DEM, one parameter a column; without rows where no fit had a choice.
+pub fn table(data: &Data, dem: &str, fits: &[&FitRow]) -> TableBlock {
+    let of_fit = |f: &&FitRow| data.candidates_of(&f.fit_id);
+    let rows: Vec<_> = fits.iter().map(of_fit).filter(|all| all.len() > 1).flatten().collect();
+    let parameters = |json: &str| serde_json::from_str::<BTreeMap<String, f64>>(json).unwrap_or_default();
+    let names: BTreeSet<String> = rows.iter().flat_map(|c| parameters(&c.parameters).into_keys()).collect();
+    let mut columns =
+        vec![("fit", ""), ("rank", ""), ("model", ""), ("AICc above best", "1"), ("χ²", "1"), ("free", "")];
+    let units: Vec<(String, &str)> = names.iter().map(|n| (n.clone(), unit_of(n))).collect();
+    columns.extend(units.iter().map(|(n, u)| (n.as_str(), *u)));
+    let mut numbers = Numbers::new(format!("tables/candidates of the fits of '{dem}'"), &columns);
+    for c in &rows {
+        let own = parameters(&c.parameters);
+        let optional = |v: Option<f64>| v.map_or(Cell::Null, crate::content::number);
+        let first = [text(&c.fit_id), Cell::I64(c.rank), text(&c.model), optional(c.aicc_above_best), optional(c.chi2)];
+        let values = names.iter().map(|n| optional(own.get(n).copied()));
+        numbers.row(first.into_iter().chain([Cell::I64(c.free)]).chain(values));
+    }
+    let caption = format!("Models tried on {dem}");
+    TableBlock { id: slug(&format!("candidates-of-{dem}")), caption, numbers }
+}
+
+/// Unit at the end of a parameter's name.
+fn unit_of(name: &str) -> &'static str {
+    match name.rsplit('_').next() {
+        Some("m") => "m",
+        Some("m2") => "m2",
+        Some("deg") => "deg",
+        _ => "1",
+    }
+}

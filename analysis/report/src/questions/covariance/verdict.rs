@@ -1,0 +1,211 @@
+//! What of a fit can be believed: its parameters with their intervals, and what the data says against it, in sentences.
+
+use crate::content::{Numbers, TableBlock, number, slug, text};
+use crate::render::number as set;
+use sastrugi_schemas::tables::FitRow;
+
+/// Level of tests.
+const LEVEL: f64 = 0.01;
+/// Standard errors by which fits at other windows may differ.
+const WINDOWS_Z: f64 = 2.58;
+/// Width of an interval, high over low, beyond which a parameter is called poorly known.
+const WIDE: f64 = 2.0;
+
+/// A parameter with its intervals: name in words, unit, estimate, parametric and block interval.
+type Parameter = (&'static str, &'static str, f64, [f64; 2], [f64; 2]);
+
+fn parameters(fit: &FitRow) -> [Parameter; 3] {
+    let f = fit;
+    [
+        ("σ", "m", f.sigma_m, [f.sigma_low_m, f.sigma_high_m], [f.block_sigma_low_m, f.block_sigma_high_m]),
+        ("b", "m", f.range_m, [f.range_low_m, f.range_high_m], [f.block_range_low_m, f.block_range_high_m]),
+        (
+            "σ²/b",
+            "m",
+            f.sigma2_over_range_m,
+            [f.sigma2_over_range_low_m, f.sigma2_over_range_high_m],
+            [f.block_sigma2_over_range_low_m, f.block_sigma2_over_range_high_m],
+        ),
+    ]
+}
+
+fn known([low, high]: [f64; 2]) -> bool {
+    low.is_finite() && high.is_finite()
+}
+
+/// An interval in words, as after a value; `None` where there is none.
+fn interval_words([low, high]: [f64; 2], unit: &str) -> Option<String> {
+    match (low > 0.0, high.is_finite()) {
+        _ if low.is_nan() || high.is_nan() => None,
+        (true, true) => Some(format!("{} to {}", set::significant(low, 3), set::with_unit(high, 3, unit))),
+        (true, false) => Some(format!("at least {}", set::with_unit(low, 3, unit))),
+        (false, true) => Some(format!("at most {}", set::with_unit(high, 3, unit))),
+        (false, false) => Some("anything".to_owned()),
+    }
+}
+
+/// The paragraph of one fit.
+pub fn paragraph(fit: &FitRow) -> String {
+    let sentences =
+        [Some(estimate(fit)), poorly_known(fit), model(fit), window(fit), direction(fit), site(fit), distribution(fit)];
+    let all: Vec<String> = sentences.into_iter().flatten().collect();
+    format!("{} ({} mode, {}): {}", fit.fit_id, fit.mode, fit.model, all.join(" "))
+}
+
+fn estimate(fit: &FitRow) -> String {
+    let one = |(name, unit, value, interval, _): Parameter| {
+        let value = format!("{name} = {}", set::with_unit(value, 3, unit));
+        match interval_words(interval, unit) {
+            Some(words) => format!("{value} ({words})"),
+            None => value,
+        }
+    };
+    let values = parameters(fit).into_iter().filter(|p| p.2.is_finite()).map(one).collect::<Vec<_>>().join(", ");
+    match fit.replicates {
+        0 => format!("{values}, without intervals."),
+        n => format!(
+            "{values}; {} intervals from {n} surfaces of the fitted model.",
+            set::percent(fit.interval_level, 0)
+        ),
+    }
+}
+
+fn poorly_known(fit: &FitRow) -> Option<String> {
+    let [_, range, ratio] = parameters(fit);
+    let wide = |interval: [f64; 2]| interval[1] > WIDE * interval[0];
+    (wide(range.3) && known(ratio.3) && !wide(ratio.3)).then(|| match range.3 {
+        [low, high] if low > 0.0 && high.is_finite() => {
+            let factor = set::significant(high / low, 2);
+            format!("b is known to a factor of {factor} only; σ²/b is what the data tells.")
+        }
+        _ => "The data knows no end to b; σ²/b is what it tells.".to_owned(),
+    })
+}
+
+fn model(fit: &FitRow) -> Option<String> {
+    let p = Some(fit.misfit_p).filter(|p| p.is_finite())?;
+    Some(match p <= LEVEL {
+        true => format!(
+            "The model does not describe the residual ({}): intervals that assume it are too narrow.",
+            p_value(p)
+        ),
+        false => format!("The misfit is no larger than chance makes it ({}).", p_value(p)),
+    })
+}
+
+fn window(fit: &FitRow) -> Option<String> {
+    let z = Some(fit.window_disagreement_z).filter(|z| z.is_finite())?;
+    let apart = format!("{} standard errors", set::significant(z, 2));
+    Some(match z > WINDOWS_Z {
+        true => format!("Fits at other windows disagree ({apart}): σ and b belong to this window, not to the surface."),
+        false => format!("Fits at other windows agree within their errors ({apart})."),
+    })
+}
+
+/// What the test of direction found.
+pub fn direction(fit: &FitRow) -> Option<String> {
+    let p = Some(fit.isotropy_p).filter(|p| p.is_finite())?;
+    Some(match p <= LEVEL {
+        true => format!(
+            "The texture has a direction ({}): it is {} times as long along {}° from north as across.",
+            p_value(p),
+            set::significant(1.0 / fit.isotropy_ratio, 3),
+            set::fixed(fit.isotropy_azimuth_deg, 0)
+        ),
+        false => format!("No direction stands out ({}).", p_value(p)),
+    })
+}
+
+fn site(fit: &FitRow) -> Option<String> {
+    let p = Some(fit.stationarity_p).filter(|p| p.is_finite())?;
+    let apart = set::significant(fit.block_sigma_max_over_min, 3);
+    Some(match p <= LEVEL {
+        true => {
+            format!("The site is not of one piece: σ of its blocks differs by a factor of {apart} ({}).", p_value(p))
+        }
+        false => format!(
+            "Blocks of the site are alike: σ differs by a factor of {apart}, as chance makes it ({}).",
+            p_value(p)
+        ),
+    })
+}
+
+fn distribution(fit: &FitRow) -> Option<String> {
+    let p = Some(fit.normality_p).filter(|p| p.is_finite())?;
+    Some(match p <= 2.0 * LEVEL {
+        true => format!("Heights of the residual are not normal ({}).", p_value(p)),
+        false => format!("Heights of the residual are as normal ones would be ({}).", p_value(p)),
+    })
+}
+
+/// `p = 0.03`, or `p < 0.0001`.
+fn p_value(p: f64) -> String {
+    if p < 1e-4 { "p < 0.0001".into() } else { format!("p = {}", set::significant(p, 2)) }
+}
+
+/// Estimates with both kinds of intervals; without rows where no fit has any.
+pub fn intervals(dem: &str, fits: &[&FitRow]) -> TableBlock {
+    let columns = [
+        ("fit", ""),
+        ("parameter", ""),
+        ("estimate", "m"),
+        ("low", "m"),
+        ("high", "m"),
+        ("low, blocks", "m"),
+        ("high, blocks", "m"),
+        ("uncorrected", "m"),
+    ];
+    let mut numbers = Numbers::new(format!("tables/fits where dem_id = '{dem}'"), &columns);
+    let with_intervals: Vec<&&FitRow> = fits.iter().filter(|f| f.replicates > 0 || f.block_replicates > 0).collect();
+    for fit in &with_intervals {
+        let naive = [fit.naive_sigma_m, fit.naive_range_m, fit.naive_sigma_m * fit.naive_sigma_m / fit.naive_range_m];
+        for ((name, _, value, own, block), naive) in parameters(fit).into_iter().zip(naive) {
+            let figures = [value, own[0], own[1], block[0], block[1], naive].map(number);
+            numbers.row([text(&fit.fit_id), text(name)].into_iter().chain(figures));
+        }
+    }
+    // A kind of interval that no fit has would be a column of dashes.
+    let alone = with_intervals.len() == 1;
+    for column in (0..columns.len()).rev() {
+        let absent = numbers.rows.iter().all(|row| row[column] == sastrugi_schemas::Cell::Null);
+        if absent || column == 0 && alone {
+            numbers.columns.remove(column);
+            numbers.rows.iter_mut().for_each(|row| drop(row.remove(column)));
+        }
+    }
+    let caption = match with_intervals.as_slice() {
+        [one] => format!("Intervals of {}", one.fit_id),
+        _ => format!("Intervals of the fits of {dem}"),
+    };
+    TableBlock { id: slug(&format!("intervals-of-{dem}")), caption, numbers }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tests::made_up;
+
+    #[test]
+    fn val_sentences_say_what_the_row_says() {
+        let data = made_up::full(1, 24);
+        let corrected = paragraph(&data.fits[0]);
+        for part in [
+            "σ = 21.0 m (19.2 to 24.1 m)",
+            "95 % intervals from 99 surfaces",
+            "does not describe the residual (p = 0.010)",
+            "agree within their errors (1.2 standard errors)",
+            "(p < 0.0001): it is 1.41 times as long along 48° from north",
+            "not of one piece: σ of its blocks differs by a factor of 1.60",
+            "as normal ones would be (p = 0.40)",
+        ] {
+            assert!(corrected.contains(part), "{part} in {corrected}");
+        }
+        assert!(!corrected.contains("to a factor of"));
+        let paper = paragraph(&data.fits[1]);
+        assert!(paper.ends_with("σ²/b = 0.613 m, without intervals."), "{paper}");
+        let fits: Vec<&FitRow> = data.fits.iter().collect();
+        let table = intervals("jacksboro", &fits).numbers;
+        let names: Vec<&str> = table.columns.iter().map(|c| c.name.as_str()).collect();
+        assert_eq!((table.rows.len(), names), (3, vec!["parameter", "estimate", "low", "high", "uncorrected"]));
+    }
+}

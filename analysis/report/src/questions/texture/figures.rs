@@ -1,0 +1,79 @@
+//! Figures of the measured residual and of the texture side by side.
+
+use crate::content::{Numbers, TableBlock, number, slug, text};
+use crate::data::Data;
+use crate::render::number as set;
+use sastrugi_schemas::Cell;
+use sastrugi_schemas::tables::{SurfaceRow, TerrainRow};
+
+/// A figure: name, unit, value.
+type Row = (&'static str, &'static str, fn(&SurfaceRow) -> f64);
+
+const ROWS: [Row; 15] = [
+    ("RMS height Sq", "m", |s| s.sq_m),
+    ("mean height Sa", "m", |s| s.sa_m),
+    ("skewness Ssk", "1", |s| s.ssk),
+    ("kurtosis Sku", "1", |s| s.sku),
+    ("peak Sp", "m", |s| s.sp_m),
+    ("pit Sv", "m", |s| s.sv_m),
+    ("peak over pit Sz", "m", |s| s.sz_m),
+    ("RMS slope Sdq", "1", |s| s.sdq),
+    ("RMS slope, east-west", "1", |s| s.rms_slope_x),
+    ("RMS slope, north-south", "1", |s| s.rms_slope_y),
+    ("autocorrelation length Sal", "m", |s| s.sal_m),
+    ("aspect ratio Str", "1", |s| s.aspect_ratio),
+    ("direction Std", "deg", |s| s.direction_deg),
+    ("Hurst exponent", "1", |s| s.hurst_exponent),
+    ("its standard error", "1", |s| s.hurst_standard_error),
+];
+
+/// Id under which a texture's stage stores what the fit would see of it.
+pub fn alike_id(texture: &TerrainRow) -> String {
+    format!("{}.residual", texture.terrain_id)
+}
+
+/// Columns: measured residual, texture treated alike, texture as it is; without rows where the release describes none.
+pub fn table(data: &Data, texture: &TerrainRow, fit: &str) -> TableBlock {
+    let alike = alike_id(texture);
+    let sides = [
+        ("measured", data.surface(fit)),
+        ("alike", data.surface(&alike)),
+        ("as made", data.surface(&texture.terrain_id)),
+    ];
+    let present: Vec<(&str, &SurfaceRow)> = sides.into_iter().filter_map(|(name, s)| Some((name, s?))).collect();
+    let columns: Vec<(&str, &str)> =
+        [("figure", "")].into_iter().chain(present.iter().map(|(name, _)| (*name, ""))).collect();
+    let query = format!("tables/surfaces where surface_id in ('{fit}', '{alike}', '{}')", texture.terrain_id);
+    let mut numbers = Numbers::new(query, &columns);
+    for (name, unit, figure) in ROWS.iter().filter(|_| !present.is_empty()) {
+        let unit = set::unit(unit);
+        let label = if unit.is_empty() { (*name).to_owned() } else { format!("{name}, {unit}") };
+        let values = present.iter().map(|(_, s)| rounded(figure(s), name));
+        numbers.row([text(label)].into_iter().chain(values));
+    }
+    if !present.is_empty() {
+        numbers.row([text("over lags of, m")].into_iter().chain(present.iter().map(|(_, s)| lags(s))));
+    }
+    let caption = "Residual of the fit; texture after the same detrending and trimming; texture as made".to_owned();
+    TableBlock { id: slug(&format!("figures-of-{}", texture.terrain_id)), caption, numbers }
+}
+
+/// Lags of the Hurst exponent.
+fn lags(surface: &SurfaceRow) -> Cell {
+    let ends = [surface.hurst_lag_min_m, surface.hurst_lag_max_m];
+    match ends.iter().all(|v| v.is_finite()) {
+        true => text(ends.map(|v| set::significant(v, 3)).join(" to ")),
+        false => Cell::Null,
+    }
+}
+
+/// Rows of one column have many magnitudes: each is given as text of its own digits.
+fn rounded(value: f64, name: &str) -> Cell {
+    match (value.is_finite(), name) {
+        (false, _) => number(value),
+        (true, "direction Std") => text(set::fixed(value, 0)),
+        (true, "its standard error") => text(set::significant(value, 2)),
+        (true, "skewness Ssk") => text(set::fixed(value, 3)),
+        (true, _) => text(set::significant(value, 3)),
+    }
+}
