@@ -35,7 +35,7 @@ pub struct Hurst {
     pub lags_m: [f64; 2],
 }
 
-/// Hurst exponent over `lags_m` (inclusive). `None` with fewer than three lags along an axis, or where a lag has no pair.
+/// Hurst exponent over `lags_m` (to the nearest cell). `None` with fewer than three lags along an axis, or where a lag has no pair.
 pub fn hurst(dem: &Grid, lags_m: Option<[f64; 2]>) -> Option<Hurst> {
     let g = &dem.geometry;
     let side = g.size()[0].min(g.size()[1]);
@@ -60,7 +60,8 @@ struct Lag {
     lag_m: f64,
 }
 
-/// Whole lags within the range, half an octave apart where that is more than a cell; at most half the side.
+/// Whole lags from the one nearest to the lower end up to the upper, half an octave apart where that is more than a cell; at
+/// most half the side.
 fn lags_along(axis: usize, dem: &Grid, [low, high]: [f64; 2]) -> Vec<Lag> {
     let cell = dem.geometry.cell[axis];
     let most = [dem.cols(), dem.rows()][axis] / 2;
@@ -71,8 +72,7 @@ fn lags_along(axis: usize, dem: &Grid, [low, high]: [f64; 2]) -> Vec<Lag> {
         .collect();
     all.dedup();
     let lag = |cells: usize| Lag { axis, cells, lag_m: cells as f64 * cell };
-    let inside = |l: &Lag| l.lag_m >= low * (1.0 - 1e-9) && l.lag_m <= high * (1.0 + 1e-9);
-    all.into_iter().map(lag).filter(inside).collect()
+    all.into_iter().map(lag).take_while(|l| l.lag_m <= high * (1.0 + 1e-9)).collect()
 }
 
 /// Sum of squared increments, and pairs.

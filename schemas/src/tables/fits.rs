@@ -67,6 +67,8 @@ super::table! {
         block_sigma2_over_range_low_m: f64 ["m"],
         /// Upper end of the interval of sigma^2 / b by block bootstrap.
         block_sigma2_over_range_high_m: f64 ["m"],
+        /// Generalised sum of squares per degree of freedom: 1 for a model that fits.
+        misfit_chi2_per_freedom: f64 ["1"],
         /// p-value of the misfit of the bins.
         misfit_p: f64 ["1"],
         /// p-value of an isotropic texture against one with an axis.

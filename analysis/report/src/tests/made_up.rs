@@ -316,6 +316,7 @@ fn measured(data: &mut Data, shelf: &mut Shelf) {
             block_range_high_m: f64::NAN,
             block_sigma2_over_range_low_m: f64::NAN,
             block_sigma2_over_range_high_m: f64::NAN,
+            misfit_chi2_per_freedom: 3.1,
             misfit_p: if mode == "paper" { f64::NAN } else { 0.01 },
             isotropy_p: if mode == "paper" { f64::NAN } else { 3e-9 },
             isotropy_ratio: 0.71,

@@ -162,8 +162,9 @@ impl Job for FitJob {
     }
 
     fn memory_bytes(&self) -> u64 {
-        // 51 bytes a cell measured at 4096 x 4096; the bins of the estimator beside them.
-        (256 << 20) + 64 * self.cells
+        // Background, residual, mask and what describes the residual (81 bytes a cell; the fit itself takes 51); the bins of
+        // the estimator beside them.
+        (256 << 20) + 100 * self.cells
     }
 
     fn estimate(&self) -> Estimate {
@@ -267,6 +268,7 @@ fn fit_row(id: &str, dem_id: &str, fit: &FitFile) -> FitRow {
         block_range_high_m: block("range_m")[1],
         block_sigma2_over_range_low_m: block("sigma2_over_range_m")[0],
         block_sigma2_over_range_high_m: block("sigma2_over_range_m")[1],
+        misfit_chi2_per_freedom: finding("misfit_chi2_per_freedom"),
         misfit_p: finding("misfit_p"),
         isotropy_p: finding("isotropy_p"),
         isotropy_ratio: finding("isotropy_ratio"),

@@ -123,8 +123,8 @@ impl Job for RoughnessJob {
     }
 
     fn memory_bytes(&self) -> u64 {
-        // Heights, gradient, classes, a distance map and a padded spectrum: 66 bytes a cell measured at 4096 x 4096.
-        (64 << 20) + 72 * self.field.cells
+        // Heights, and the padded transforms of pair sums: 81 bytes a cell measured at 4096 x 4096 with holes.
+        (64 << 20) + 88 * self.field.cells
     }
 
     fn estimate(&self) -> Estimate {

@@ -144,7 +144,8 @@ impl Job for TextureJob {
     }
 
     fn memory_bytes(&self) -> u64 {
-        self.draft.memory_bytes()
+        // The texture, and what describes it once it is detrended as the fit's residual was.
+        self.draft.memory_bytes().max((64 << 20) + 110 * self.draft.geometry().len() as u64)
     }
 
     fn estimate(&self) -> Estimate {

@@ -16,8 +16,8 @@ use std::collections::{BTreeMap, BTreeSet};
 const CANDIDATES_MAX: usize = 6;
 /// Rise of the sum of squares at the edge of a 95 % interval (chi-squared, one degree of freedom).
 const EDGE: f64 = 3.84;
-/// Highest rise that is drawn.
-const RISE_MAX: f64 = 30.0;
+/// Highest rise that is drawn over the edge of the interval.
+const RISE_MAX: f64 = 8.0;
 /// Dashes that tell lines apart without colour.
 const DASHES: [&str; 6] = ["", "7 4", "2 3", "9 3 2 3", "4 2", "12 4"];
 
@@ -86,13 +86,17 @@ fn profile(data: &Data, fit: &FitRow) -> Option<Figure> {
     let id = slug(&format!("profile-{}", fit.fit_id));
     let ends = points.iter().fold((f64::INFINITY, 0.0f64), |(l, h), p| (l.min(p.range_m), h.max(p.range_m)));
     let highest = points.iter().map(|p| p.chi2_rise).fold(0.0, f64::max);
-    let top = highest.clamp(2.0 * EDGE, RISE_MAX);
+    // A model that does not fit knows its parameters less well than its sum of squares says.
+    let misfit = if fit.misfit_chi2_per_freedom > 1.0 { fit.misfit_chi2_per_freedom } else { 1.0 };
+    let at_edge = EDGE * misfit;
+    let top = highest.clamp(2.0 * at_edge, RISE_MAX * at_edge);
     let curve = Stroke::new(Paint::Series(0), 2.0);
     let edge = Stroke::new(Paint::Muted, 1.4).dashed("6 4");
     let interval = Stroke::new(Paint::Series(1), 1.4).dashed("2 3");
     let ends_of_b: Vec<f64> =
         [fit.range_low_m, fit.range_high_m].into_iter().filter(|end| *end > 0.0 && end.is_finite()).collect();
-    let mut legend = vec![(Mark::Line(curve), "rise of the misfit".to_owned()), (Mark::Line(edge), "3.84".to_owned())];
+    let mut legend =
+        vec![(Mark::Line(curve), "rise of the misfit".to_owned()), (Mark::Line(edge), "edge of 95 %".to_owned())];
     if !ends_of_b.is_empty() {
         legend.push((Mark::Line(interval), "ends of the interval".into()));
     }
@@ -100,7 +104,7 @@ fn profile(data: &Data, fit: &FitRow) -> Option<Figure> {
     let y = (Axis::linear(0.0, 1.05 * top), "rise of χ²");
     let mut plot = Plot::new((WIDTH, HEIGHT), x, y, &legend);
     plot.clip(&format!("{id}-clip"));
-    plot.line([(ends.0, EDGE), (ends.1, EDGE)], edge);
+    plot.line([(ends.0, at_edge), (ends.1, at_edge)], edge);
     for end in ends_of_b {
         plot.line([(end, 0.0), (end, 1.05 * top)], interval);
     }
@@ -108,14 +112,18 @@ fn profile(data: &Data, fit: &FitRow) -> Option<Figure> {
     let marks = plot.place(points.iter().map(|p| (p.range_m, p.chi2_rise)));
     marks.into_iter().for_each(|at| plot.svg.disc(at, 2.6, Paint::Series(0), 1.0));
     plot.svg.close();
+    let allowance = match misfit > 1.0 {
+        true => format!(" times the misfit per degree of freedom, {}", set::significant(misfit, 3)),
+        false => String::new(),
+    };
     let cut = if highest > top { format!(" The axis ends at {}.", set::significant(top, 2)) } else { String::new() };
     let query = format!("tables/likelihood_profile where fit_id = '{}'", fit.fit_id);
     Some(Figure {
         id,
         title: format!("How sharply {} knows b.", fit.fit_id),
         caption: format!(
-            "Rise of the generalised sum of squares when b is held and everything else is fitted anew; 3.84 is the edge of a \
-             95 % interval if the model is right. A flat curve: b cannot be told.{cut}"
+            "Rise of the generalised sum of squares when b is held and everything else is fitted anew. The edge of a 95 % \
+             interval is at 3.84{allowance}. A flat curve: b cannot be told.{cut}"
         ),
         description: format!("Profile likelihood over ranges from {}.", span(ends)),
         svg: plot.svg,
