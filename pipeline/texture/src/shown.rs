@@ -224,7 +224,7 @@ mod tests {
     use std::sync::LazyLock;
 
     /// A texture of known covariance with holes, and its fit with two candidates.
-    static FITTED: LazyLock<(Grid, FitOutcome)> = LazyLock::new(|| {
+    static FITTED: LazyLock<(Grid, [Grid; 2], FitFile)> = LazyLock::new(|| {
         let truth = FitFile {
             model: "exponential".into(),
             parameters: [("sigma_m".to_owned(), 0.02), ("range_m".to_owned(), 0.28)].into(),
@@ -239,16 +239,16 @@ mod tests {
                 .unwrap();
         let settings = FitSettings::try_from(parameters).unwrap();
         let outcome = fit(&dem, &settings, &Streams::for_seed(1, "fit")).unwrap();
-        (dem, outcome)
+        let rasters = outcome.rasters(&dem).unwrap();
+        (dem, rasters, outcome.fit)
     });
 
     #[test]
     fn prop_what_is_shown_agrees_with_the_fit() {
-        let (dem, outcome) = &*FITTED;
-        let fit = &outcome.fit;
-        let codes = uses(dem, outcome);
+        let (dem, [background, residual], fit) = &*FITTED;
+        let codes = uses(dem, background, residual, fit);
         let count = |code: u8| codes.values.iter().filter(|c| **c == code).count();
-        assert_eq!(count(USED), outcome.residual.finite_count());
+        assert_eq!(count(USED), residual.finite_count());
         assert_eq!(count(NO_DATA), dem.values.len() - dem.finite_count());
         assert!(count(TRIMMED) > dem.values.len() / 25);
 
@@ -262,7 +262,7 @@ mod tests {
         assert!(curves[0].iter().zip(&fit.model_m2).all(|(c, m)| (c - m).abs() < 1e-12 * fit.model_m2[0]));
         assert!(curves[1].iter().zip(&curves[0]).any(|(a, b)| (a - b).abs() > 1e-3 * fit.model_m2[0]));
 
-        let band = covariance_band(&outcome.residual, fit);
+        let band = covariance_band(residual, fit);
         assert_eq!(band.len(), fit.lags_m.len());
         for (k, [low, high]) in band.iter().enumerate() {
             let value = fit.covariance_m2[k];
@@ -280,14 +280,14 @@ mod tests {
 
     #[test]
     fn val_a_texture_is_treated_as_the_residual_was() {
-        let (dem, outcome) = &*FITTED;
+        let (dem, [_, residual], fit) = &*FITTED;
         let texture = dem.map(|z| if z.is_nan() { 0.0 } else { z });
-        let alike = alike(&texture, &outcome.fit).unwrap();
+        let alike = alike(&texture, fit).unwrap();
         let used = alike.finite_count() as f64 / alike.values.len() as f64;
         assert!((used - 0.95).abs() < 0.02, "{used}");
         let rms = |g: &Grid| sums::variance(&sums::finite(&g.values)).sqrt();
-        assert!((rms(&alike) / rms(&outcome.residual) - 1.0).abs() < 0.05);
-        assert!(super::alike(&texture.window(0, 0, 29, 29), &outcome.fit).is_none());
+        assert!((rms(&alike) / rms(residual) - 1.0).abs() < 0.05);
+        assert!(super::alike(&texture.window(0, 0, 29, 29), fit).is_none());
         assert!(super::alike(&texture, &FitFile::default()).is_none());
     }
 }

@@ -1,7 +1,8 @@
 use super::*;
 use crate::covariance::Covariance;
 use crate::synth::Synthesis;
-use crate::synth::fft_ma::{FftMa, FftMaParameters, Phase};
+use crate::synth::fft_ma::{self, FftMaParameters, Phase};
+use crate::synth::tile::{Cell, TileParameters};
 use rayon::prelude::*;
 use sastrugi_numeric::{Geometry, sums};
 
@@ -10,9 +11,10 @@ const CELL_M: f64 = 0.06;
 /// A normal field with an exponential covariance of unit sigma, cut from a larger torus.
 fn field(range_m: f64, cells: usize, cell_m: f64, seed: u64) -> Grid {
     let covariance = Covariance::new(crate::covariance::model("exponential").unwrap(), 1.0, range_m).unwrap();
-    let size_m = [cells as f64 * cell_m; 2];
-    let parameters = FftMaParameters { size_m, cell_m, phase: Phase::Gaussian, periodic: false };
-    FftMa::new(parameters, covariance).unwrap().generate(&Streams::for_seed(seed, "fit-test")).unwrap().grid
+    let tile =
+        TileParameters { size_px: Some([cells as u32; 2]), cell_m: Cell::Square(cell_m), ..TileParameters::default() };
+    let parameters = FftMaParameters { phase: Phase::Gaussian, periodic: false, ..FftMaParameters::default() };
+    fft_ma::texture(tile, parameters, covariance).unwrap().generate(&Streams::for_seed(seed, "fit-test")).unwrap().grid
 }
 
 fn streams() -> Streams {

@@ -1,10 +1,23 @@
 //! Synthetic texture: random fields with a given covariance. One folder per method.
+//!
+//! A method (a [`Kernel`]) makes one tile of a normal field (bumps: nearly normal). What methods have in common is done
+//! around it, once ([`Texture`]): size and cells, anisotropy, a height distribution, repetition, and the comparison of the
+//! covariance that the method gives on average with the one that was asked for.
+//!
+//! Drawing all cells from one multivariate normal distribution by Latin hypercube sampling (`lhsnorm` in Vecherin et al.
+//! 2022, section 3.2) is not offered: it needs the matrix that [`cholesky`] needs, and stratifying each cell's values over
+//! an ensemble does nothing for the one surface that is wanted.
 
 pub mod fft_ma;
+pub mod marginal;
+pub mod reach;
+pub mod tile;
 
+use crate::covariance::Covariance;
 use sastrugi_numeric::{Geometry, Grid, Streams};
 use sastrugi_schemas::ParameterError;
-use serde_json::Value;
+use serde_json::{Map, Value};
+use tile::{Tile, TileParameters};
 
 /// A method with checked parameters, ready to make fields.
 pub trait Synthesis: Send + Sync {
@@ -17,8 +30,15 @@ pub trait Synthesis: Send + Sync {
     /// Working memory of [`Self::generate`], result included.
     fn memory_bytes(&self) -> u64;
 
+    /// Arithmetic operations of [`Self::generate`], to a factor of about two.
+    fn operations(&self) -> f64;
+
     /// Sentences a user should read: rounded sizes, coarse cells, a torus too small for the range.
     fn notes(&self) -> Vec<String>;
+
+    /// The covariance that an ensemble of these textures has beside the one that was asked for, at lags along rows, columns
+    /// and diagonals: up to half a periodic tile, up to the whole of another one.
+    fn covariance(&self) -> Vec<LagCovariance>;
 
     /// One field from the named streams.
     ///
@@ -27,13 +47,31 @@ pub trait Synthesis: Send + Sync {
     fn generate(&self, streams: &Streams) -> Result<TextureOutcome, SynthesisError>;
 }
 
+/// Covariance at a lag.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LagCovariance {
+    /// Lag, east and north, m.
+    pub lag_m: [f64; 2],
+    /// What was asked for, m2.
+    pub wanted_m2: f64,
+    /// What the method gives on average, m2.
+    pub achieved_m2: f64,
+}
+
+impl LagCovariance {
+    fn error_m2(&self) -> f64 {
+        (self.achieved_m2 - self.wanted_m2).abs()
+    }
+}
+
 /// A texture.
 #[derive(Clone, Debug)]
 pub struct TextureOutcome {
     /// Heights, m.
     pub grid: Grid,
     /// Largest absolute difference between the covariance that was made and the one that was asked for, over all lags
-    /// of the torus, m2.
+    /// of the torus (methods that are not exact, and given height distributions: over the lags of
+    /// [`Synthesis::covariance`]), m2.
     pub covariance_error_max_m2: f64,
     /// Share of the spectrum that was negative and set to 0.
     pub clip_share: f64,
@@ -61,16 +99,169 @@ pub enum SynthesisError {
     },
 }
 
-/// Cells along a side of `size_m`: the nearest integer when within 1e-6 of one, else rounded down (`true`).
-fn cells_along(key: &str, size_m: f64, cell_m: f64) -> Result<(usize, bool), ParameterError> {
-    /// Cells along a side of more than this are a mistake.
-    const CELLS_MAX: f64 = 1e6;
-    let cells = ParameterError::positive(key, size_m)? / cell_m;
-    let whole = (cells - cells.round()).abs() <= 1e-6;
-    let count = if whole { cells.round() } else { cells.floor() };
-    if !(1.0..=CELLS_MAX).contains(&count) {
-        let message = format!("is {size_m} m, {cells} cells of {cell_m} m; it must hold 1 to {CELLS_MAX} cells");
-        return Err(ParameterError::new(key, message));
+/// One way to make a tile.
+pub trait Kernel: Send + Sync {
+    /// Its own parameters with every default written out.
+    fn parameters(&self) -> Value;
+
+    /// Working memory, result included.
+    fn memory_bytes(&self) -> u64;
+
+    /// Arithmetic operations.
+    fn operations(&self) -> f64;
+
+    /// Sentences a user should read.
+    fn notes(&self) -> Vec<String>;
+
+    /// The covariance on average, m2, at lags `[east, north]` up to half a periodic tile.
+    fn achieved(&self) -> Box<dyn Fn([f64; 2]) -> f64 + '_>;
+
+    /// One tile.
+    ///
+    /// # Errors
+    /// See [`SynthesisError`].
+    fn make(&self, streams: &Streams) -> Result<Made, SynthesisError>;
+}
+
+/// One tile.
+pub struct Made {
+    /// Heights, row-major, m.
+    pub heights_m: Vec<f64>,
+    /// Largest error of the covariance over all lags, where the method knows it; else that of [`Synthesis::covariance`].
+    pub covariance_error_max_m2: Option<f64>,
+    /// Share of the spectrum that was negative and set to 0.
+    pub clip_share: f64,
+}
+
+/// A method with what all of them have in common.
+pub struct Texture<K> {
+    tile: Tile,
+    wanted: Covariance,
+    kernel: K,
+    notes: Vec<String>,
+}
+
+/// Error of the covariance, as a share of the variance, that is worth a note.
+const ERROR_NOTE: f64 = 1e-4;
+/// Most lags along each direction of a comparison.
+const LAGS_MAX: usize = 2048;
+
+impl<K: Kernel> Texture<K> {
+    /// The texture of `parameters` for the `fitted` covariance; `kernel` makes the method for one tile of the covariance
+    /// wanted.
+    ///
+    /// # Errors
+    /// Parameters out of range.
+    pub fn new(
+        parameters: TileParameters,
+        periodic: bool,
+        fitted: Covariance,
+        kernel: impl FnOnce(&Tile, &Covariance) -> Result<K, ParameterError>,
+    ) -> Result<Self, ParameterError> {
+        let tile = Tile::check(parameters, periodic)?;
+        let mut notes = Vec::new();
+        let wanted = tile.covariance(fitted, &mut notes);
+        let kernel = kernel(&tile, &wanted)?;
+        notes.extend(kernel.notes());
+        Ok(Self { tile, wanted, kernel, notes })
     }
-    Ok((count as usize, !whole))
+
+    /// The tile with the wanted heights.
+    fn shaped(&self, heights_m: Vec<f64>) -> Grid {
+        let tile = Grid::new(self.tile.geometry, heights_m);
+        let shaped = match &self.tile.marginal {
+            None => tile,
+            Some(marginal) => {
+                let sigma_m = self.kernel.achieved()([0.0; 2]).sqrt();
+                tile.map(|z| marginal.height_m(z / sigma_m))
+            }
+        };
+        self.tile.repeated(shaped)
+    }
+
+    /// Lags along rows, columns and diagonals, in cells east and north.
+    fn lags(&self) -> impl Iterator<Item = [f64; 2]> + use<K> {
+        let g = self.tile.geometry;
+        let last = |n: usize| if self.tile.periodic { n / 2 } else { n - 1 };
+        let (across, down) = (last(g.cols), last(g.rows));
+        let run = move |[x, y]: [f64; 2], count: usize| {
+            (1..=count.min(LAGS_MAX)).map(move |k| [x * k as f64 * g.cell[0], y * k as f64 * g.cell[1]])
+        };
+        std::iter::once([0.0; 2])
+            .chain(run([1.0, 0.0], across))
+            .chain(run([0.0, 1.0], down))
+            .chain(run([1.0, 1.0], across.min(down)))
+            .chain(run([-1.0, 1.0], across.min(down)))
+    }
+
+    fn error_note(&self) -> Option<String> {
+        let lags = self.covariance();
+        let worst = lags.iter().max_by(|a, b| a.error_m2().total_cmp(&b.error_m2()))?;
+        let variance_m2 = lags[0].wanted_m2;
+        let [east_m, north_m] = worst.lag_m;
+        (worst.error_m2() > ERROR_NOTE * variance_m2).then(|| {
+            let share = 100.0 * worst.error_m2() / variance_m2;
+            let error_m2 = worst.error_m2();
+            format!(
+                "the covariance differs from the fit's by up to {error_m2:.2e} m2, {share:.2} % of the variance (at a lag of \
+                 {east_m} m east, {north_m} m north)"
+            )
+        })
+    }
+}
+
+impl<K: Kernel> Synthesis for Texture<K> {
+    fn geometry(&self) -> Geometry {
+        self.tile.whole()
+    }
+
+    fn parameters(&self) -> Value {
+        let mut all: Map<String, Value> = self.tile.parameters();
+        if let Value::Object(own) = self.kernel.parameters() {
+            all.extend(own);
+        }
+        Value::Object(all)
+    }
+
+    fn memory_bytes(&self) -> u64 {
+        let whole = self.tile.whole().len();
+        let repeated = if whole > self.tile.geometry.len() { 8 * whole as u64 } else { 0 };
+        self.kernel.memory_bytes() + repeated
+    }
+
+    fn operations(&self) -> f64 {
+        /// A distribution function.
+        const MARGINAL: f64 = 60.0;
+        let marginal = self.tile.marginal.as_ref().map_or(0.0, |_| MARGINAL * self.tile.geometry.len() as f64);
+        self.kernel.operations() + marginal
+    }
+
+    fn notes(&self) -> Vec<String> {
+        let marginal = self.tile.marginal.as_ref().map(|m| {
+            let (given_m2, fitted_m2) = (m.variance_m2, self.wanted.at_distance(0.0));
+            format!(
+                "the height distribution bends the covariance; its variance is {given_m2:.3e} m2, the fit's {fitted_m2:.3e} m2"
+            )
+        });
+        self.notes.iter().cloned().chain(marginal).chain(self.error_note()).collect()
+    }
+
+    fn covariance(&self) -> Vec<LagCovariance> {
+        let achieved = self.kernel.achieved();
+        let variance_m2 = achieved([0.0; 2]);
+        let bent = |c: f64| self.tile.marginal.as_ref().map_or(c, |m| m.covariance_m2(c / variance_m2));
+        self.lags()
+            .map(|lag_m| LagCovariance { lag_m, wanted_m2: self.wanted.at(lag_m), achieved_m2: bent(achieved(lag_m)) })
+            .collect()
+    }
+
+    fn generate(&self, streams: &Streams) -> Result<TextureOutcome, SynthesisError> {
+        let Made { heights_m, covariance_error_max_m2, clip_share } = self.kernel.make(streams)?;
+        let over_lags = || self.covariance().iter().map(LagCovariance::error_m2).fold(0.0, f64::max);
+        let covariance_error_max_m2 = match &self.tile.marginal {
+            None => covariance_error_max_m2.unwrap_or_else(over_lags),
+            Some(_) => over_lags(),
+        };
+        Ok(TextureOutcome { grid: self.shaped(heights_m), covariance_error_max_m2, clip_share })
+    }
 }

@@ -11,38 +11,45 @@
 //!   Eqs. 8 and 11, and sampled at the wavenumbers of a grid it loses 2 to 10 % of the variance;
 //! * the mean over the tile is not removed: the mode at k = 0 belongs to the covariance.
 //!
-//! A covariance cut to a torus may have negative eigenvalues (none found for an exponential on a side of 14 ranges or more; at 10 ranges 2e-6 on 400 cells, 2e-5 on 2000).
-//! They are set to 0 when they are at most [`CLIP_SHARE_MAX`] of the spectrum; the largest error of the covariance is
-//! then their sum over M (it is largest at lag 0), and is reported. Otherwise `periodic = true` is refused.
+//! `spectrum = "eq10"` takes that equation (with its 2 pi) after all, for comparison: isotropic exponentials only, and its
+//! loss of variance is reported.
+//!
+//! Covariances of any model, sums, nugget, anisotropy at any azimuth, oblong cells. A self-affine one is made as its
+//! stationary twin (see [`super::tile`]).
+//!
+//! A covariance cut to a torus may have negative eigenvalues (none found for an exponential on a side of 14 ranges or more;
+//! at 10 ranges 2e-6 on 400 cells, 2e-5 on 2000). They are set to 0 when they are at most [`CLIP_SHARE_MAX`] of the
+//! spectrum; the largest error of the covariance is then their sum over M (it is largest at lag 0), and is reported.
+//! Otherwise `periodic = true` is refused.
 //!
 //! `periodic = true`: the tile is the torus and repeats without seams. `periodic = false`: the field is cut from a torus
-//! at least twice as wide (so that no lag within the crop goes the other way round) and ten ranges wide.
+//! at least twice as wide (so that no lag within the crop goes the other way round) and wide enough for the covariance
+//! ([`super::reach`]: 16 ranges of an exponential).
 //!
 //! Unit phases are exact on the whole torus only. Crops scatter like any sample, and the spread over an ensemble of
 //! unit-phase tiles is too small: Monte Carlo work needs `gaussian`.
 //!
-//! Cost: a quarter of a complex transform for the spectrum, half of one for the field, a square root and a phase per
-//! mode. Memory: 36 bytes per torus cell.
+//! Cost: a quarter of a complex transform for the spectrum (half of one where the axes of anisotropy are not the grid's),
+//! half of one for the field, a square root and a phase per mode. Memory: 36 bytes per torus cell.
 
 mod spectrum;
 
-use super::{Synthesis, SynthesisError, TextureOutcome, cells_along};
+use super::tile::{self, Tile, TileParameters};
+use super::{Kernel, Made, Synthesis, SynthesisError, Texture, reach};
 use crate::covariance::Covariance;
 use rayon::prelude::*;
 use sastrugi_numeric::fft::{Complex64, HalfSpectrum, RealFft2, smooth_length};
 use sastrugi_numeric::{Geometry, Grid, Stream, Streams, sums};
 use sastrugi_schemas::fit::FitFile;
-use sastrugi_schemas::kind::{read_parameters, schema_of};
 use sastrugi_schemas::{Kind, ParameterError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
+use spectrum::Spectrum;
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
 
 /// Negative share of the spectrum that is set to 0; more is refused.
 pub const CLIP_SHARE_MAX: f64 = 1e-6;
-/// A torus this many ranges wide has a non-negative spectrum.
-const TORUS_RANGES: f64 = 16.0;
 /// A tile of fewer ranges is worth a note.
 const TILE_RANGES_NOTE: f64 = 4.0;
 /// Bytes per torus cell while a field is made.
@@ -59,34 +66,42 @@ pub enum Phase {
     Gaussian,
 }
 
-/// Raw parameters of an FFT-MA texture.
+/// Where the eigenvalues come from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum SpectrumOf {
+    /// Transform of the covariance on the torus: exact.
+    #[default]
+    Covariance,
+    /// Vecherin et al. 2022, Eq. 10 at the wavenumbers of the torus: loses 2 to 10 % of the variance.
+    Eq10,
+}
+
+/// Raw parameters of an FFT-MA texture, beside those of its tile.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct FftMaParameters {
-    /// Size of the texture, east-west and north-south, m. Default 20 x 20 (Vecherin et al. 2022, Figure 5).
-    pub size_m: [f64; 2],
-    /// Cell size, m. Default 0.1 (Vecherin et al. 2022, section 3.2).
-    pub cell_m: f64,
     /// `unit` (default, Vecherin et al. 2022, section 3.3) or `gaussian`.
     pub phase: Phase,
     /// Whether the texture repeats without seams. Default true.
     pub periodic: bool,
+    /// `covariance` (default) or `eq10` (an isotropic exponential as published, which loses variance).
+    pub spectrum: SpectrumOf,
 }
 
 impl Default for FftMaParameters {
     fn default() -> Self {
-        Self { size_m: [20.0; 2], cell_m: 0.1, phase: Phase::Unit, periodic: true }
+        Self { phase: Phase::Unit, periodic: true, spectrum: SpectrumOf::Covariance }
     }
 }
 
-/// An FFT-MA texture with checked parameters.
+/// FFT-MA with checked parameters.
 pub struct FftMa {
     parameters: FftMaParameters,
     covariance: Covariance,
     tile: Geometry,
     /// Rows and columns of the torus.
     torus: [usize; 2],
-    notes: Vec<String>,
 }
 
 /// Registry entry.
@@ -96,7 +111,7 @@ pub fn kind() -> Kind {
         kind: "fft_ma",
         summary: "random field from the square root of its spectrum; periodic, exact on the torus with unit phases",
         source: "Vecherin et al. 2022, Eqs. 11-12; Oliver 1995",
-        parameters: schema_of::<FftMaParameters>(),
+        parameters: tile::schema::<FftMaParameters>(),
     }
 }
 
@@ -105,67 +120,89 @@ pub fn kind() -> Kind {
 /// # Errors
 /// Parameters out of range; a fit file without a known model and its parameters.
 pub fn prepare(parameters: &Value, fit: &FitFile) -> Result<Box<dyn Synthesis>, ParameterError> {
-    let covariance = Covariance::of_fit(fit)?;
-    Ok(Box::new(FftMa::new(read_parameters(parameters)?, covariance)?))
+    let (of_tile, own) = tile::read(parameters)?;
+    Ok(Box::new(texture(of_tile, own, Covariance::of_fit(fit)?)?))
+}
+
+/// The texture of a covariance.
+///
+/// # Errors
+/// Parameters out of range.
+pub fn texture(
+    of_tile: TileParameters,
+    own: FftMaParameters,
+    covariance: Covariance,
+) -> Result<Texture<FftMa>, ParameterError> {
+    Texture::new(of_tile, own.periodic, covariance, |tile, wanted| FftMa::new(own, tile, wanted))
 }
 
 impl FftMa {
-    /// The texture with raw parameters and a covariance.
+    /// The method for one tile of a covariance.
     ///
     /// # Errors
-    /// Parameters out of range.
-    pub fn new(parameters: FftMaParameters, covariance: Covariance) -> Result<Self, ParameterError> {
-        let cell_m = ParameterError::positive("cell_m", parameters.cell_m)?;
-        let (cols, cut_x) = cells_along("size_m", parameters.size_m[0], cell_m)?;
-        let (rows, cut_y) = cells_along("size_m", parameters.size_m[1], cell_m)?;
-        let tile = Geometry::square(rows, cols, cell_m);
-        let torus = [rows, cols].map(|n| match parameters.periodic {
+    /// Eq. 10 of a covariance that is no isotropic exponential.
+    pub fn new(parameters: FftMaParameters, tile: &Tile, wanted: &Covariance) -> Result<Self, ParameterError> {
+        if parameters.spectrum == SpectrumOf::Eq10 && !is_plain_exponential(wanted) {
+            let message = "is `eq10`, which is an isotropic exponential without nugget; the fit is another model";
+            return Err(ParameterError::new("spectrum", message));
+        }
+        let Geometry { rows, cols, cell: [dx, dy], .. } = tile.geometry;
+        let [width_m, height_m] = reach::torus_m(wanted);
+        let torus = [(rows, height_m, dy), (cols, width_m, dx)].map(|(n, side_m, cell_m)| match parameters.periodic {
             true => n,
-            false => smooth_length((2 * n).max((TORUS_RANGES * covariance.range_m() / cell_m).ceil() as usize)),
+            false => smooth_length((2 * n).max((side_m / cell_m).ceil() as usize)),
         });
-        let mut texture = Self { parameters, covariance, tile, torus, notes: Vec::new() };
-        texture.notes = texture.remarks(cut_x || cut_y);
-        Ok(texture)
+        Ok(Self { parameters, covariance: wanted.clone(), tile: tile.geometry, torus })
     }
 
-    fn remarks(&self, cut: bool) -> Vec<String> {
-        let FftMaParameters { size_m, cell_m, phase, periodic } = &self.parameters;
-        let b = self.covariance.range_m();
-        let [width_m, height_m] = self.tile.size();
-        let mut notes = Vec::new();
-        if cut {
-            notes.push(format!(
-                "size {} m x {} m is no whole number of {cell_m} m cells; the texture is {width_m} m x {height_m} m",
-                size_m[0], size_m[1]
-            ));
+    fn spectrum(&self) -> Spectrum {
+        let term = &self.covariance.structures[0];
+        match self.parameters.spectrum {
+            SpectrumOf::Covariance => Spectrum::of(&self.covariance, self.torus, self.tile.cell),
+            SpectrumOf::Eq10 => Spectrum::eq10(term.sigma_m, term.range_m, self.torus, self.tile.cell),
         }
-        if *cell_m > 0.5 * b {
-            notes.push(format!(
-                "the cell of {cell_m} m is more than half the range of {b} m: most of the texture is below it"
-            ));
-        }
-        if *periodic && width_m.min(height_m) < TILE_RANGES_NOTE * b {
-            notes.push(format!("the tile of {width_m} m x {height_m} m is less than four ranges of {b} m wide"));
-        }
-        if !periodic && *phase == Phase::Unit {
-            notes.push("unit phases are exact on the whole torus; the covariance of this crop scatters".to_owned());
-        }
-        notes
     }
 
-    /// Side of a tile with a non-negative spectrum, m.
-    fn enough_m(&self) -> f64 {
-        TORUS_RANGES * self.covariance.range_m()
+    /// The torus, its south-west corner the origin.
+    fn torus_geometry(&self) -> Geometry {
+        Geometry { rows: self.torus[0], cols: self.torus[1], ..self.tile }
+    }
+
+    fn refusal(&self, clip_share: f64) -> SynthesisError {
+        let [width_m, height_m] = self.torus_geometry().size();
+        let needed_m = reach::torus_m(&self.covariance).into_iter().fold(0.0, f64::max);
+        SynthesisError::NegativeSpectrum { width_m, height_m, clip_share, limit: CLIP_SHARE_MAX, needed_m }
     }
 }
 
-impl Synthesis for FftMa {
-    fn geometry(&self) -> Geometry {
-        self.tile
-    }
+fn is_plain_exponential(covariance: &Covariance) -> bool {
+    let exponential = |name: &str| name == "exponential";
+    let [term] = &covariance.structures[..] else { return false };
+    exponential(term.model.kind().kind) && covariance.is_isotropic() && covariance.nugget_m2 == 0.0
+}
 
+/// Sentences about cells too coarse and tiles too small for the covariance.
+pub(super) fn size_notes(covariance: &Covariance, tile: &Geometry, periodic: bool) -> Vec<String> {
+    let ranges = reach::extent(covariance).map(|e| e * covariance.range_m());
+    let ([dx, dy], [width_m, height_m]) = (tile.cell, tile.size());
+    let mut notes = Vec::new();
+    if let Some((cell_m, range_m)) = [(dx, ranges[0]), (dy, ranges[1])].into_iter().find(|(c, b)| *c > 0.5 * b) {
+        notes.push(format!(
+            "the cell of {cell_m} m is more than half the range of {range_m} m: most of the texture is below it"
+        ));
+    }
+    let narrow = |(side, range): &(f64, f64)| *side < TILE_RANGES_NOTE * range;
+    if let Some((_, range_m)) = [(width_m, ranges[0]), (height_m, ranges[1])].into_iter().find(narrow)
+        && periodic
+    {
+        notes.push(format!("the tile of {width_m} m x {height_m} m is less than four ranges of {range_m} m wide"));
+    }
+    notes
+}
+
+impl Kernel for FftMa {
     fn parameters(&self) -> Value {
-        // A plain struct of numbers and words always has a JSON form.
+        // A plain struct of words always has a JSON form.
         serde_json::to_value(&self.parameters).unwrap_or_default()
     }
 
@@ -173,31 +210,57 @@ impl Synthesis for FftMa {
         BYTES_PER_CELL * self.torus[0] as u64 * self.torus[1] as u64 + 8 * self.tile.len() as u64
     }
 
-    fn notes(&self) -> Vec<String> {
-        self.notes.clone()
+    fn operations(&self) -> f64 {
+        /// Covariance, root and phase of one cell.
+        const PER_CELL: f64 = 60.0;
+        let cells = (self.torus[0] * self.torus[1]) as f64;
+        cells * (3.75 * libm::log2(cells) + PER_CELL)
     }
 
-    fn generate(&self, streams: &Streams) -> Result<TextureOutcome, SynthesisError> {
+    fn notes(&self) -> Vec<String> {
+        let FftMaParameters { phase, periodic, spectrum } = self.parameters;
+        let mut notes = size_notes(&self.covariance, &self.tile, periodic);
+        if !periodic && phase == Phase::Unit {
+            notes.push("unit phases are exact on the whole torus; the covariance of this crop scatters".to_owned());
+        }
+        if spectrum == SpectrumOf::Eq10 {
+            let made_m2 = self.spectrum().total() / (self.torus[0] * self.torus[1]) as f64;
+            let share = 100.0 * made_m2 / self.covariance.at_distance(0.0);
+            notes.push(format!(
+                "Eq. 10 of the paper (with its missing factor 2 pi) on this grid holds {share:.1} % of the variance"
+            ));
+        }
+        notes
+    }
+
+    fn achieved(&self) -> Box<dyn Fn([f64; 2]) -> f64 + '_> {
+        if self.parameters.spectrum == SpectrumOf::Covariance {
+            return Box::new(|lag_m| self.covariance.at(lag_m));
+        }
+        let ([rows, cols], [dx, dy]) = (self.torus, self.tile.cell);
+        let covariance = self.spectrum().covariance();
+        let cell = |lag: f64, side: f64, n: usize| ((lag / side).round() as isize).rem_euclid(n as isize) as usize;
+        Box::new(move |[x, y]| covariance[cell(y, dy, rows) * cols + cell(x, dx, cols)])
+    }
+
+    fn make(&self, streams: &Streams) -> Result<Made, SynthesisError> {
         let [rows, cols] = self.torus;
-        let spectrum = spectrum::EvenSpectrum::of(&self.covariance, self.torus, self.parameters.cell_m);
-        let negative = spectrum.negative();
-        let clip_share = negative / (spectrum.total() + 2.0 * negative);
+        let spectrum = self.spectrum();
+        let clip_share = spectrum.negative_share();
         if clip_share > CLIP_SHARE_MAX {
-            let [width_m, height_m] = Geometry::square(rows, cols, self.parameters.cell_m).size();
-            let (limit, needed_m) = (CLIP_SHARE_MAX, self.enough_m());
-            return Err(SynthesisError::NegativeSpectrum { width_m, height_m, clip_share, limit, needed_m });
+            return Err(self.refusal(clip_share));
         }
         let cells = (rows * cols) as f64;
         let amplitude = |kx: usize, ky: usize| (spectrum.at(kx, ky).max(0.0) * cells).sqrt();
         let modes = random_spectrum(self.torus, amplitude, self.parameters.phase, streams);
         let field = RealFft2::new(rows, cols).inverse(modes);
-        let torus = Grid::new(Geometry::square(rows, cols, self.parameters.cell_m), field);
-        let grid = match self.parameters.periodic {
-            true => torus,
-            false => Grid { geometry: self.tile, ..torus.window(0, 0, self.tile.rows, self.tile.cols) },
+        let heights_m = match self.parameters.periodic {
+            true => field,
+            false => Grid::new(self.torus_geometry(), field).window(0, 0, self.tile.rows, self.tile.cols).values,
         };
-        let covariance_error_max_m2 = negative / (rows * cols) as f64;
-        Ok(TextureOutcome { grid, covariance_error_max_m2, clip_share })
+        let exact = self.parameters.spectrum == SpectrumOf::Covariance;
+        let covariance_error_max_m2 = exact.then(|| spectrum.negative() / cells);
+        Ok(Made { heights_m, covariance_error_max_m2, clip_share })
     }
 }
 

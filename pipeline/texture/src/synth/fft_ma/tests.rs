@@ -1,28 +1,51 @@
 use super::*;
-use crate::covariance::model;
+use crate::covariance::{Form, model};
+use crate::synth::TextureOutcome;
+use serde_json::json;
 
 fn exponential(sigma_m: f64, range_m: f64) -> Covariance {
     Covariance::new(model("exponential").unwrap(), sigma_m, range_m).unwrap()
 }
 
-fn texture(parameters: FftMaParameters, covariance: &Covariance) -> FftMa {
-    FftMa::new(parameters, covariance.clone()).unwrap()
+/// A covariance by the names of fit files.
+fn covariance(form: &str, values: &[(&str, f64)]) -> Covariance {
+    let values = values.iter().map(|(k, v)| ((*k).to_owned(), *v)).collect();
+    Form::parse(form).unwrap().covariance(&values).unwrap()
 }
 
-fn tile(size_m: [f64; 2], phase: Phase, periodic: bool) -> FftMaParameters {
-    FftMaParameters { size_m, phase, periodic, ..FftMaParameters::default() }
+fn prepared(parameters: &Value, covariance: &Covariance) -> Result<Texture<FftMa>, ParameterError> {
+    let (of_tile, own) = tile::read(parameters)?;
+    super::texture(of_tile, own, covariance.clone())
+}
+
+fn texture(parameters: &Value, covariance: &Covariance) -> Texture<FftMa> {
+    prepared(parameters, covariance).unwrap()
+}
+
+fn tile_of(size_m: [f64; 2], phase: &str, periodic: bool) -> Value {
+    json!({ "size_m": size_m, "phase": phase, "periodic": periodic })
+}
+
+fn made(parameters: &Value, covariance: &Covariance, seed: u64) -> TextureOutcome {
+    texture(parameters, covariance).generate(&streams(seed)).unwrap()
 }
 
 fn streams(seed: u64) -> Streams {
     Streams::for_seed(seed, "texture")
 }
 
-/// The covariance that was asked for, on the torus, row-major.
+/// The covariance that was asked for, on the torus, row-major: each lag the short way round, the mean of both ways where
+/// they are equally long.
 fn wanted(covariance: &Covariance, g: &Geometry) -> Vec<f64> {
-    let short = |k: usize, n: usize| k.min(n - k) as f64;
+    let ways = |k: usize, n: usize| match (2 * k).cmp(&n) {
+        std::cmp::Ordering::Less => vec![k as f64],
+        std::cmp::Ordering::Equal => vec![k as f64, -(k as f64)],
+        std::cmp::Ordering::Greater => vec![k as f64 - n as f64],
+    };
     let at = |r: usize, c: usize| {
-        let (y, x) = (short(r, g.rows) * g.cell[1], short(c, g.cols) * g.cell[0]);
-        covariance.at_distance((x * x + y * y).sqrt())
+        let (south, east) = (ways(r, g.rows), ways(c, g.cols));
+        let both = south.iter().flat_map(|s| east.iter().map(move |e| [e * g.cell[0], -s * g.cell[1]]));
+        sums::mean(&both.map(|lag| covariance.at(lag)).collect::<Vec<_>>())
     };
     (0..g.rows).flat_map(|r| (0..g.cols).map(move |c| (r, c))).map(|(r, c)| at(r, c)).collect()
 }
@@ -36,14 +59,174 @@ fn worst(a: &[f64], b: &[f64]) -> f64 {
 fn val_unit_phases_have_the_exact_covariance() {
     let covariance = exponential(0.7, 0.28);
     for size_m in [[20.0, 20.0], [6.4, 3.2], [7.5, 8.1], [10.09, 5.0], [3.3, 20.0]] {
-        let texture = texture(tile(size_m, Phase::Unit, true), &covariance);
         for seed in 1..=3 {
-            let made = texture.generate(&streams(seed)).unwrap();
+            let made = made(&tile_of(size_m, "unit", true), &covariance, seed);
             let error = worst(&torus_covariance(&made.grid), &wanted(&covariance, &made.grid.geometry));
             assert!(error <= 1e-12 * 0.49, "{size_m:?}: {error:e}");
             assert!(made.covariance_error_max_m2 <= 1e-12 * 0.49);
         }
     }
+}
+
+/// The same for every model, sums, a nugget, any azimuth and oblong cells; variance 1 each.
+#[test]
+fn val_every_model_is_exact() {
+    let aniso = |azimuth: f64| [("sigma_m", 1.0), ("range_m", 0.4), ("ratio", 0.5), ("azimuth_deg", azimuth)];
+    let cases = [
+        covariance("spherical+nugget", &[("sigma_m", 0.8), ("range_m", 1.1), ("nugget_m2", 0.36)]),
+        covariance("matern", &[("sigma_m", 1.0), ("range_m", 0.3), ("smoothness", 0.8)]),
+        covariance(
+            "exponential+gaussian",
+            &[("sigma_m", 0.6), ("range_m", 0.5), ("sigma_2_m", 0.8), ("range_2_m", 0.2)],
+        ),
+        covariance("anisotropic:exponential", &aniso(0.0)),
+        covariance("anisotropic:exponential", &aniso(90.0)),
+        covariance("anisotropic:exponential", &aniso(37.0)),
+    ];
+    for (k, covariance) in cases.iter().enumerate() {
+        for cell_m in [json!(0.1), json!([0.1, 0.15])] {
+            let made = made(&json!({ "size_px": [101, 90], "cell_m": cell_m }), covariance, 4);
+            let error = worst(&torus_covariance(&made.grid), &wanted(covariance, &made.grid.geometry));
+            assert!(error <= 1e-12 + 2.0 * made.covariance_error_max_m2, "case {k}, {cell_m}: {error:e}");
+            assert!(made.clip_share <= CLIP_SHARE_MAX);
+        }
+    }
+}
+
+/// Ratio and azimuth recovered from a made field within 2 % (of the ratio; of 180 degrees: 3.6): an exponential's distances
+/// are `-b ln(C / sigma^2)`, and their squares a quadratic form of the lag, here by least squares.
+#[test]
+fn val_anisotropy_is_recovered() {
+    for (ratio, azimuth_deg) in [(0.4, 30.0), (0.6, 118.0), (0.3, 90.0)] {
+        let parameters = json!({ "size_m": [24.0, 16.0], "ratio": ratio, "azimuth_deg": azimuth_deg });
+        let grid = made(&parameters, &exponential(1.0, 0.9), 3).grid;
+        let covariance = torus_covariance(&grid);
+        let (mut normal, mut right) = ([[0.0; 3]; 3], [0.0; 3]);
+        for (south, east) in (0..8isize).flat_map(|r| (-8..9isize).map(move |c| (r, c))).filter(|l| *l != (0, 0)) {
+            let c = covariance[south as usize * grid.cols() + east.rem_euclid(grid.cols() as isize) as usize];
+            let distance = -libm::log(c / covariance[0]);
+            let (x, y) = (0.1 * east as f64, -0.1 * south as f64);
+            let terms = [x * x, 2.0 * x * y, y * y];
+            for i in 0..3 {
+                right[i] += terms[i] * distance * distance;
+                (0..3).for_each(|j| normal[i][j] += terms[i] * terms[j]);
+            }
+        }
+        let [a, b, c] = solve3(normal, right);
+        // The larger eigenvalue's direction is across the long axis, here counter-clockwise from east.
+        let (mean, half) = (0.5 * (a + c), (0.25 * (a - c) * (a - c) + b * b).sqrt());
+        let across = 0.5 * libm::atan2(2.0 * b, a - c).to_degrees();
+        let azimuth = crate::covariance::form::half_turn(-across);
+        let found = ((mean - half) / (mean + half)).sqrt();
+        assert!((found / ratio - 1.0).abs() < 0.02, "{ratio}: {found}");
+        assert!((azimuth - azimuth_deg).abs() < 3.6, "{azimuth_deg}: {azimuth}");
+    }
+}
+
+/// Cramer's rule.
+fn solve3(m: [[f64; 3]; 3], right: [f64; 3]) -> [f64; 3] {
+    let det = |m: [[f64; 3]; 3]| {
+        let minor = |a: usize, b: usize| m[1][a] * m[2][b] - m[1][b] * m[2][a];
+        m[0][0] * minor(1, 2) - m[0][1] * minor(0, 2) + m[0][2] * minor(0, 1)
+    };
+    [0, 1, 2].map(|k| {
+        let mut replaced = m;
+        (0..3).for_each(|row| replaced[row][k] = right[row]);
+        det(replaced) / det(m)
+    })
+}
+
+/// The specification's shares of the variance that Eq. 10 keeps on a grid of 512 x 512, to its three digits.
+#[test]
+fn val_eq10_loses_variance() {
+    for (cell_m, range_m, share) in [(0.06, 0.28, 0.939), (0.06, 1.0, 0.983), (0.1, 0.28, 0.898), (0.1, 1.0, 0.971)] {
+        let parameters = json!({ "size_px": [512, 512], "cell_m": cell_m, "spectrum": "eq10" });
+        let covariance = exponential(0.2, range_m);
+        let texture = texture(&parameters, &covariance);
+        let achieved = texture.covariance()[0].achieved_m2 / 0.04;
+        assert!((achieved - share).abs() < 5e-4, "{cell_m} {range_m}: {achieved}");
+        let notes = texture.notes().join("; ");
+        assert!(notes.contains(&format!("holds {:.1} % of the variance", 100.0 * share)), "{notes}");
+        assert!(notes.contains("differs from the fit's"), "{notes}");
+        let outcome = texture.generate(&streams(1)).unwrap();
+        let variance = torus_covariance(&outcome.grid)[0] / 0.04;
+        assert!((variance - achieved).abs() < 1e-9, "{variance}");
+        assert!((outcome.covariance_error_max_m2 / 0.04 - (1.0 - achieved)).abs() < 1e-9);
+    }
+    let other =
+        prepared(&json!({ "spectrum": "eq10" }), &covariance("gaussian", &[("sigma_m", 1.0), ("range_m", 1.0)]));
+    assert_eq!(other.err().unwrap().key, "spectrum");
+}
+
+/// A self-affine fit: the variance of increments over a cell d is its own, `s^2 d^(2 H)`, but for a share of the order of
+/// `(d / 2 b)^(2 - 2 H)`, 7 % here, and the note says so.
+#[test]
+fn val_self_affine_increments() {
+    let fitted = covariance("self_affine", &[("increment_1m_m", 0.05), ("hurst", 0.7)]);
+    let texture = texture(&json!({ "size_m": [40.0, 40.0], "outer_m": 4.0, "periodic": false }), &fitted);
+    assert!(texture.notes().iter().any(|n| n.contains("no variance")), "{:?}", texture.notes());
+    let lags = texture.covariance();
+    let increment = 2.0 * (lags[0].achieved_m2 - lags[1].achieved_m2);
+    let own = 0.0025 * libm::exp(1.4 * libm::log(0.1));
+    assert!((0.92..1.0).contains(&(increment / own)), "{increment} {own}");
+    let share = format!("are {:.0} % of the fit's over a cell", 100.0 * (increment / own).sqrt());
+    assert!(texture.notes().iter().any(|n| n.contains(&share)), "{share}: {:?}", texture.notes());
+}
+
+/// Parameters of studies written for version 0.1 stay valid, and what is unknown is refused.
+#[test]
+fn val_keys() {
+    let covariance = exponential(1.0, 0.5);
+    let old = json!({ "size_m": [20.0, 10.0], "cell_m": 0.1, "phase": "gaussian", "periodic": false });
+    let texture = texture(&old, &covariance);
+    let all = texture.parameters();
+    for (key, value) in old.as_object().unwrap() {
+        assert_eq!(&all[key], value);
+    }
+    assert_eq!(all["tile"], json!([1, 1]));
+    let refused = |parameters: Value| prepared(&parameters, &covariance).err().unwrap().to_string();
+    assert!(refused(json!({ "phases": "unit" })).contains("which has"));
+    assert!(refused(json!({ "tile": [2, 2], "periodic": false })).contains("seams"));
+    assert!(refused(json!({ "size_m": [1.0, 1.0], "size_px": [10, 10] })).contains("size_px"));
+    assert!(refused(json!({ "ratio": 1.5 })).contains("ratio"));
+}
+
+/// Tiles are laid as often as asked for, and each is the single one.
+#[test]
+fn val_tiles_repeat() {
+    let covariance = exponential(1.0, 0.3);
+    let one = made(&json!({ "size_px": [50, 40] }), &covariance, 2).grid;
+    let many = made(&json!({ "size_px": [50, 40], "tile": [2, 3] }), &covariance, 2).grid;
+    assert_eq!((many.rows(), many.cols()), (80, 150));
+    for (r, c) in (0..80).flat_map(|r| (0..150).map(move |c| (r, c))) {
+        assert_eq!(many.at(r, c).to_bits(), one.at(r % 40, c % 50).to_bits());
+    }
+}
+
+/// Normal scores: the heights of the texture follow the given distribution (a maximum distance of the distribution
+/// functions of 0.01 on 160 000 cells, 28 cells to a range cubed; a unit-phase tile's variance is exact), and the
+/// covariance that was predicted is the one that is found, to 3 % of the variance at lags of up to three cells.
+#[test]
+fn stat_given_heights() {
+    let covariance = exponential(1.0, 0.28);
+    // Exponentially distributed heights, mean 0.
+    let quantiles: Vec<f64> = (0..=200).map(|k| -0.1 * libm::log(1.0 - f64::from(k) / 201.0) - 0.1).collect();
+    let texture = texture(&json!({ "size_m": [40.0, 40.0], "marginal_m": quantiles }), &covariance);
+    let grid = texture.generate(&streams(8)).unwrap().grid;
+    let mut heights = grid.values.clone();
+    heights.sort_by(f64::total_cmp);
+    for k in (5..200).step_by(5) {
+        let below = heights.partition_point(|h| *h <= quantiles[k]) as f64 / heights.len() as f64;
+        assert!((below - k as f64 / 200.0).abs() < 0.01, "{k}: {below}");
+    }
+    let mean = sums::mean(&grid.values);
+    let found = torus_covariance(&grid.map(|z| z - mean));
+    let predicted = texture.covariance();
+    for k in 0..4 {
+        let error = (found[k] - predicted[k].achieved_m2) / predicted[0].achieved_m2;
+        assert!(error.abs() < 0.03, "{k}: {error}");
+    }
+    assert!(texture.notes().iter().any(|n| n.contains("bends the covariance")));
 }
 
 /// Increments across the seam are those of the interior: the mean square increment at one cell is the same at every
@@ -53,7 +236,7 @@ fn val_unit_phases_have_the_exact_covariance() {
 #[test]
 fn stat_no_seam() {
     let covariance = exponential(1.0, 0.28);
-    let texture = texture(tile([20.0; 2], Phase::Unit, true), &covariance);
+    let texture = texture(&tile_of([20.0; 2], "unit", true), &covariance);
     let (n, mut squares) = (200, Vec::new());
     for seed in 0..30 {
         let grid = texture.generate(&streams(seed)).unwrap().grid;
@@ -73,9 +256,9 @@ fn stat_no_seam() {
 #[test]
 fn stat_gaussian_phase_powers() {
     let covariance = exponential(1.0, 0.28);
-    let made = texture(tile([20.0; 2], Phase::Gaussian, true), &covariance).generate(&streams(5)).unwrap();
+    let made = made(&tile_of([20.0; 2], "gaussian", true), &covariance, 5);
     let field = RealFft2::new(200, 200).forward(&made.grid.values);
-    let spectrum = spectrum::EvenSpectrum::of(&covariance, [200, 200], 0.1);
+    let spectrum = Spectrum::of(&covariance, [200, 200], [0.1; 2]);
     let mut classes = [0.0; 10];
     for (kx, column) in field.values.chunks_exact(200).enumerate().take(100).skip(1) {
         for (ky, v) in column.iter().enumerate() {
@@ -93,7 +276,7 @@ fn stat_gaussian_phase_powers() {
 #[test]
 fn stat_crops_have_the_covariance_on_average() {
     let covariance = exponential(1.0, 0.28);
-    let texture = texture(tile([8.0; 2], Phase::Gaussian, false), &covariance);
+    let texture = texture(&tile_of([8.0; 2], "gaussian", false), &covariance);
     assert_eq!(texture.geometry().len(), 6400);
     for lag in [0, 1, 3] {
         let products: Vec<f64> = (0..60)
@@ -112,10 +295,7 @@ fn stat_crops_have_the_covariance_on_average() {
 /// 0.5 (given to one or two digits).
 #[test]
 fn val_clip_shares() {
-    let share = |ratio: f64| {
-        let spectrum = spectrum::EvenSpectrum::of(&exponential(1.0, 20.0 * ratio), [200, 200], 0.1);
-        spectrum.negative() / (spectrum.total() + 2.0 * spectrum.negative())
-    };
+    let share = |ratio: f64| Spectrum::of(&exponential(1.0, 20.0 * ratio), [200, 200], [0.1; 2]).negative_share();
     assert_eq!(share(0.05), 0.0);
     assert!(share(0.1) < 1e-7, "{}", share(0.1));
     assert!((share(0.15) / 3e-4 - 1.0).abs() < 0.2, "{}", share(0.15));
@@ -125,9 +305,9 @@ fn val_clip_shares() {
 #[test]
 fn val_a_torus_too_small_is_refused_and_enlarged_when_not_periodic() {
     let covariance = exponential(1.0, 5.0);
-    let error = texture(tile([20.0; 2], Phase::Unit, true), &covariance).generate(&streams(1)).err().unwrap();
+    let error = texture(&tile_of([20.0; 2], "unit", true), &covariance).generate(&streams(1)).err().unwrap();
     assert!(matches!(error, SynthesisError::NegativeSpectrum { needed_m: 80.0, .. }), "{error}");
-    let cropped = texture(tile([20.0; 2], Phase::Unit, false), &covariance);
+    let cropped = texture(&tile_of([20.0; 2], "unit", false), &covariance);
     let made = cropped.generate(&streams(1)).unwrap();
     assert_eq!((made.grid.rows(), made.grid.cols()), (200, 200));
     assert!(made.clip_share <= CLIP_SHARE_MAX);
@@ -136,22 +316,23 @@ fn val_a_torus_too_small_is_refused_and_enlarged_when_not_periodic() {
 #[test]
 fn val_sizes_are_whole_cells() {
     let covariance = exponential(0.1, 0.3);
-    let sized = |size_m| texture(FftMaParameters { size_m, ..FftMaParameters::default() }, &covariance);
+    let sized = |size_m: [f64; 2]| texture(&json!({ "size_m": size_m }), &covariance);
     assert_eq!(sized([2.0, 3.0]).geometry(), Geometry::square(30, 20, 0.1));
     assert!(sized([2.0, 3.0]).notes().is_empty());
     let cut = sized([2.06, 3.0]);
     assert_eq!(cut.geometry().cols, 20);
     assert!(cut.notes()[0].contains("2.06 m x 3 m is no whole number"), "{:?}", cut.notes());
     for size_m in [[0.0, 1.0], [1.0, -1.0], [f64::NAN, 1.0], [0.01, 1.0], [1e9, 1.0]] {
-        assert!(FftMa::new(FftMaParameters { size_m, ..FftMaParameters::default() }, covariance.clone()).is_err());
+        let parameters = TileParameters { size_m: Some(size_m), ..TileParameters::default() };
+        assert!(Tile::check(parameters, true).is_err(), "{size_m:?}");
     }
-    assert!(texture(tile([1.0; 2], Phase::Unit, true), &covariance).notes()[0].contains("less than four ranges"));
+    assert!(texture(&tile_of([1.0; 2], "unit", true), &covariance).notes()[0].contains("less than four ranges"));
 }
 
 /// One thread or many: the same bits.
 #[test]
 fn prop_threads_change_no_bit() {
-    let texture = texture(tile([10.0, 7.0], Phase::Unit, true), &exponential(0.1, 0.3));
+    let texture = texture(&tile_of([10.0, 7.0], "unit", true), &exponential(0.1, 0.3));
     let run = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| texture.generate(&streams(9)).unwrap().grid.values)
