@@ -46,6 +46,9 @@ pub struct FitFile {
     pub profile: Option<Profile>,
     /// Covariance by direction.
     pub directions: Vec<DirectionBin>,
+    /// Heights of the residual at equally spaced probabilities from 0 to 1, m.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub height_quantiles_m: Vec<f64>,
     /// The model as GSTools' classes take it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gstools: Option<GsTools>,

@@ -315,6 +315,9 @@ pub struct Texture {
     /// `unit` magnitude (exact covariance in each tile) or `gaussian`.
     #[arg(long, value_name = "unit|gaussian")]
     pub phase: Option<String>,
+    /// Repeat the (periodic) texture, rows by columns.
+    #[arg(long, value_name = "RxC")]
+    pub tile: Option<String>,
     /// Base DEM to add the texture to.
     #[arg(long, value_name = "DEM")]
     pub onto: Option<PathBuf>,

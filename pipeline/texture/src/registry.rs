@@ -2,17 +2,22 @@
 
 use crate::covariance::MODELS;
 use crate::fit::FitParameters;
-use crate::synth::{Synthesis, fft_ma};
+use crate::synth::{Synthesis, Wanted, cholesky, fft_ma, gaussians, quasi_wavelets};
 use sastrugi_schemas::fit::FitFile;
 use sastrugi_schemas::kind::schema_of;
 use sastrugi_schemas::{Kind, ParameterError};
 use serde_json::Value;
 
 /// How a method is prepared.
-type Prepare = fn(&Value, &FitFile) -> Result<Box<dyn Synthesis>, ParameterError>;
+type Prepare = fn(&Value, Wanted) -> Result<Box<dyn Synthesis>, ParameterError>;
 
 /// Every synthesis method.
-const METHODS: [(fn() -> Kind, Prepare); 1] = [(fft_ma::kind, fft_ma::prepare)];
+const METHODS: [(fn() -> Kind, Prepare); 4] = [
+    (fft_ma::kind, fft_ma::prepare),
+    (cholesky::kind, cholesky::prepare),
+    (gaussians::kind, gaussians::prepare),
+    (quasi_wavelets::kind, quasi_wavelets::prepare),
+];
 
 /// Every kind of this room: the fit, the covariance models, the synthesis methods.
 pub fn kinds() -> Vec<Kind> {
@@ -33,7 +38,7 @@ pub fn kinds() -> Vec<Kind> {
 /// An unknown method (the known ones are listed); parameters or a fit that the method refuses.
 pub fn prepare(method: &str, parameters: &Value, fit: &FitFile) -> Result<Box<dyn Synthesis>, ParameterError> {
     match METHODS.into_iter().find(|(kind, _)| kind().kind == method) {
-        Some((_, prepare)) => prepare(parameters, fit),
+        Some((_, prepare)) => prepare(parameters, Wanted::of_fit(fit)?),
         None => {
             let known = METHODS.map(|(kind, _)| kind().kind).join(", ");
             Err(ParameterError::new("method", format!("is `{method}`; known texture methods: {known}")))
@@ -58,6 +63,9 @@ mod tests {
     #[test]
     fn val_an_unknown_method_lists_the_known() {
         let error = prepare("kriging", &json!({}), &FitFile::default()).err().unwrap();
-        assert_eq!(error.to_string(), "`method` is `kriging`; known texture methods: fft_ma");
+        assert_eq!(
+            error.to_string(),
+            "`method` is `kriging`; known texture methods: fft_ma, cholesky, gaussians, quasi_wavelets"
+        );
     }
 }

@@ -30,6 +30,9 @@ pub fn texture(args: &Texture, common: &Common) -> Verdict {
     if let Some(phase) = &args.phase {
         params["phase"] = json!(phase);
     }
+    if let Some(tile) = &args.tile {
+        params["tile"] = json!(numbers::<2>("--tile", tile)?.map(whole));
+    }
     let request = verbs::texture::Request {
         fit: &args.fit,
         method: &args.method,
@@ -40,6 +43,11 @@ pub fn texture(args: &Texture, common: &Common) -> Verdict {
         options: options(args.compress),
     };
     made(common, &verbs::texture::texture(&request)?)
+}
+
+/// A number as JSON, whole where it is, so that a count can be read from it.
+fn whole(number: f64) -> Value {
+    if number.fract() == 0.0 && number.abs() < 1e9 { json!(number as i64) } else { json!(number) }
 }
 
 /// Says what was made.

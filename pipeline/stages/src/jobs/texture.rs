@@ -87,7 +87,8 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
 /// The method with its parameters checked against a stand-in fit.
 fn draft(method: &str, params: &Value) -> Result<Box<dyn Synthesis>, ParameterError> {
     let parameters = [("sigma_m".to_owned(), 1.0), ("range_m".to_owned(), 1.0)].into();
-    let fit = FitFile { model: "exponential".to_owned(), parameters, ..FitFile::default() };
+    let height_quantiles_m = vec![-1.0, 1.0];
+    let fit = FitFile { model: "exponential".to_owned(), parameters, height_quantiles_m, ..FitFile::default() };
     sastrugi_texture::prepare(method, params, &fit)
 }
 

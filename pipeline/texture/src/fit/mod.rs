@@ -41,11 +41,13 @@ pub use params::{FitParameters, FitSettings, Mode};
 
 use crate::covariance::Form;
 use crate::covariance::bins::Layout;
+use crate::synth::marginal::quantiles_m;
 use case::Case;
 use estimator::{Estimate, Estimator, best, ordinary};
 use report::Findings;
 use sastrugi_numeric::{Geometry, Grid, Streams};
 use sastrugi_schemas::fit::FitFile;
+use std::ops::Range;
 use survey::Survey;
 
 /// A fit and what is needed to show the rasters behind it.
@@ -84,6 +86,10 @@ pub fn fit(heights: &dyn Heights, settings: &FitSettings, streams: &Streams) -> 
         Mode::Paper => paper(&case, &naive)?,
         Mode::Corrected => corrected(&case, &naive, streams)?,
     };
+    let (rows, cols) = middle(&case.geometry);
+    // The shape of the heights is that before trimming.
+    let residual = case.survey.detrended(heights, settings, rows, cols)?.residual;
+    let fit = FitFile { height_quantiles_m: quantiles_m(&residual), ..fit };
     Ok(FitOutcome { fit, settings: settings.clone(), survey: case.survey })
 }
 
@@ -146,13 +152,20 @@ fn refuse_white(case: &Case, estimate: &Estimate) -> Result<(), FitError> {
 
 /// The part of a DEM that is fitted again at other windows: all of it, or its middle.
 fn examined(case: &Case) -> Result<Box<dyn Heights>, FitError> {
-    let Geometry { rows, cols, .. } = case.geometry;
-    let share = (resampling::CELLS_MAX as f64 / case.geometry.len() as f64).sqrt().min(1.0);
-    let [height, width] = [rows, cols].map(|n| (n as f64 * share) as usize).map(|n| n.max(1));
-    let (top, left) = ((rows - height) / 2, (cols - width) / 2);
-    let values = case.heights.part(top..top + height, left..left + width).map_err(FitError::Unreadable)?;
-    let part = Grid::new(case.geometry.window(top, left, height, width), values);
+    let (rows, cols) = middle(&case.geometry);
+    let geometry = case.geometry.window(rows.start, cols.start, rows.len(), cols.len());
+    let part = Grid::new(geometry, case.heights.part(rows, cols).map_err(FitError::Unreadable)?);
     Ok(if case.heights.are_profiles() { Box::new(Profiles::of(part)) } else { Box::new(part) })
+}
+
+/// Rows and columns of all of a raster, or of as much about its middle as is looked at twice.
+fn middle(geometry: &Geometry) -> (Range<usize>, Range<usize>) {
+    let share = (resampling::CELLS_MAX as f64 / geometry.len() as f64).sqrt().min(1.0);
+    let span = |n: usize| {
+        let width = ((n as f64 * share) as usize).max(1);
+        (n - width) / 2..(n - width) / 2 + width
+    };
+    (span(geometry.rows), span(geometry.cols))
 }
 
 #[cfg(test)]

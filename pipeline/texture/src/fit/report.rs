@@ -71,6 +71,7 @@ pub fn fit_file(case: &Case, naive: &Estimate, estimate: &Estimate, binned: Vec<
         gstools: gstools(&estimate.form, &estimate.covariance),
         warnings: figures.warnings(case, naive, estimate, findings),
         source: None,
+        height_quantiles_m: Vec::new(),
     }
 }
 

@@ -20,9 +20,21 @@ const TERMS: usize = 200;
 const POINTS: usize = 8000;
 const BOUND: f64 = 8.0;
 
+/// Quantiles that are kept of a measured surface.
+const QUANTILES: usize = 101;
+
+/// Heights at [`QUANTILES`] equally spaced probabilities from 0 to 1, m; none where there are no heights (NaN).
+pub fn quantiles_m(heights_m: &[f64]) -> Vec<f64> {
+    let mut heights = sums::finite(heights_m);
+    heights.sort_by(f64::total_cmp);
+    let at = |k: usize| sums::quantile_sorted(&heights, k as f64 / (QUANTILES - 1) as f64);
+    if heights.is_empty() { Vec::new() } else { (0..QUANTILES).map(at).collect() }
+}
+
 /// A height distribution.
 pub struct Marginal {
     quantiles_m: Vec<f64>,
+    mean_m: f64,
     /// `c_k^2` for k from 1.
     squares: Vec<f64>,
     /// Variance, m2.
@@ -45,8 +57,18 @@ impl Marginal {
         if quantiles_m[0] == quantiles_m[quantiles_m.len() - 1] {
             return refuse("holds one height only; the texture would be flat");
         }
-        let (squares, variance_m2) = coefficients(quantiles_m);
-        Ok(Self { quantiles_m: quantiles_m.to_vec(), squares, variance_m2 })
+        let (mean_m, squares, variance_m2) = coefficients(quantiles_m);
+        Ok(Self { quantiles_m: quantiles_m.to_vec(), mean_m, squares, variance_m2 })
+    }
+
+    /// The distribution of that shape with mean 0 and another variance.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn of_shape(quantiles_m: &[f64], variance_m2: f64) -> Result<Self, ParameterError> {
+        let own = Self::new(quantiles_m)?;
+        let scale = (variance_m2 / own.variance_m2).sqrt();
+        Self::new(&quantiles_m.iter().map(|q| (q - own.mean_m) * scale).collect::<Vec<_>>())
     }
 
     /// The height that stands for `score` standard deviations.
@@ -63,8 +85,8 @@ impl Marginal {
     }
 }
 
-/// `c_k^2` and the variance by the midpoint rule.
-fn coefficients(quantiles_m: &[f64]) -> (Vec<f64>, f64) {
+/// The mean, `c_k^2` and the variance by the midpoint rule.
+fn coefficients(quantiles_m: &[f64]) -> (f64, Vec<f64>, f64) {
     let step = 2.0 * BOUND / POINTS as f64;
     let mut sums = vec![0.0; TERMS + 1];
     let mut second = 0.0;
@@ -80,7 +102,7 @@ fn coefficients(quantiles_m: &[f64]) -> (Vec<f64>, f64) {
             (before, now) = (now, (x * now - n.sqrt() * before) / (n + 1.0).sqrt());
         }
     }
-    (sums[1..].iter().map(|c| c * c).collect(), second - sums[0] * sums[0])
+    (sums[0], sums[1..].iter().map(|c| c * c).collect(), second - sums[0] * sums[0])
 }
 
 #[cfg(test)]
@@ -112,6 +134,14 @@ mod tests {
         for rho in [0.0, 0.3, 0.8, 1.0] {
             assert!((m.covariance_m2(rho) - rho).abs() < 2e-3, "{rho}: {}", m.covariance_m2(rho));
         }
+    }
+
+    #[test]
+    fn val_a_measured_shape() {
+        let quantiles = quantiles_m(&[3.0, f64::NAN, 1.0, 2.0, 5.0]);
+        assert_eq!((quantiles.len(), quantiles[0], quantiles[50], quantiles[100]), (101, 1.0, 2.5, 5.0));
+        let m = Marginal::of_shape(&quantiles, 0.01).unwrap();
+        assert!((m.variance_m2 - 0.01).abs() < 1e-12 && m.mean_m.abs() < 1e-12);
     }
 
     #[test]

@@ -8,14 +8,22 @@
 //! 2022, section 3.2) is not offered: it needs the matrix that [`cholesky`] needs, and stratifying each cell's values over
 //! an ensemble does nothing for the one surface that is wanted.
 
+mod bumps;
+pub mod cholesky;
 pub mod fft_ma;
+pub mod gaussians;
 pub mod marginal;
+pub mod quasi_wavelets;
 pub mod reach;
 pub mod tile;
 
 use crate::covariance::Covariance;
+use marginal::Marginal;
 use sastrugi_numeric::{Geometry, Grid, Streams};
 use sastrugi_schemas::ParameterError;
+use sastrugi_schemas::fit::FitFile;
+use schemars::JsonSchema;
+use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
 use tile::{Tile, TileParameters};
 
@@ -133,9 +141,47 @@ pub struct Made {
     pub clip_share: f64,
 }
 
+/// What a texture should match.
+#[derive(Clone)]
+pub struct Wanted {
+    /// Covariance.
+    pub covariance: Covariance,
+    /// Measured heights at equally spaced probabilities from 0 to 1, m; empty when not known.
+    pub quantiles_m: Vec<f64>,
+}
+
+impl Wanted {
+    /// What a fit file says.
+    ///
+    /// # Errors
+    /// An unknown model; a parameter that is missing, unknown or out of range.
+    pub fn of_fit(fit: &FitFile) -> Result<Self, ParameterError> {
+        Ok(Self { covariance: Covariance::of_fit(fit)?, quantiles_m: fit.height_quantiles_m.clone() })
+    }
+}
+
+impl From<Covariance> for Wanted {
+    fn from(covariance: Covariance) -> Self {
+        Self { covariance, quantiles_m: Vec::new() }
+    }
+}
+
+/// A texture from raw parameters: those of the tile and those of the method, `P`.
+fn prepare<P: DeserializeOwned + JsonSchema, K: Kernel + 'static>(
+    raw: &Value,
+    wanted: Wanted,
+    periodic: impl FnOnce(&P) -> bool,
+    kernel: impl FnOnce(P, &Tile, &Covariance) -> Result<K, ParameterError>,
+) -> Result<Box<dyn Synthesis>, ParameterError> {
+    let (of_tile, own) = tile::read(raw)?;
+    let periodic = periodic(&own);
+    Ok(Box::new(Texture::new(of_tile, periodic, wanted, |tile, wanted| kernel(own, tile, wanted))?))
+}
+
 /// A method with what all of them have in common.
 pub struct Texture<K> {
     tile: Tile,
+    marginal: Option<Marginal>,
     wanted: Covariance,
     kernel: K,
     notes: Vec<String>,
@@ -147,29 +193,29 @@ const ERROR_NOTE: f64 = 1e-4;
 const LAGS_MAX: usize = 2048;
 
 impl<K: Kernel> Texture<K> {
-    /// The texture of `parameters` for the `fitted` covariance; `kernel` makes the method for one tile of the covariance
-    /// wanted.
+    /// The texture of `parameters` that matches `fitted`; `kernel` makes the method for one tile of the covariance wanted.
     ///
     /// # Errors
     /// Parameters out of range.
     pub fn new(
         parameters: TileParameters,
         periodic: bool,
-        fitted: Covariance,
+        fitted: Wanted,
         kernel: impl FnOnce(&Tile, &Covariance) -> Result<K, ParameterError>,
     ) -> Result<Self, ParameterError> {
         let tile = Tile::check(parameters, periodic)?;
         let mut notes = Vec::new();
-        let wanted = tile.covariance(fitted, &mut notes);
+        let wanted = tile.covariance(fitted.covariance, &mut notes);
+        let marginal = tile.marginal(&fitted.quantiles_m, wanted.at_distance(0.0))?;
         let kernel = kernel(&tile, &wanted)?;
         notes.extend(kernel.notes());
-        Ok(Self { tile, wanted, kernel, notes })
+        Ok(Self { tile, marginal, wanted, kernel, notes })
     }
 
     /// The tile with the wanted heights.
     fn shaped(&self, heights_m: Vec<f64>) -> Grid {
         let tile = Grid::new(self.tile.geometry, heights_m);
-        let shaped = match &self.tile.marginal {
+        let shaped = match &self.marginal {
             None => tile,
             Some(marginal) => {
                 let sigma_m = self.kernel.achieved()([0.0; 2]).sqrt();
@@ -232,12 +278,12 @@ impl<K: Kernel> Synthesis for Texture<K> {
     fn operations(&self) -> f64 {
         /// A distribution function.
         const MARGINAL: f64 = 60.0;
-        let marginal = self.tile.marginal.as_ref().map_or(0.0, |_| MARGINAL * self.tile.geometry.len() as f64);
+        let marginal = self.marginal.as_ref().map_or(0.0, |_| MARGINAL * self.tile.geometry.len() as f64);
         self.kernel.operations() + marginal
     }
 
     fn notes(&self) -> Vec<String> {
-        let marginal = self.tile.marginal.as_ref().map(|m| {
+        let marginal = self.marginal.as_ref().map(|m| {
             let (given_m2, fitted_m2) = (m.variance_m2, self.wanted.at_distance(0.0));
             format!(
                 "the height distribution bends the covariance; its variance is {given_m2:.3e} m2, the fit's {fitted_m2:.3e} m2"
@@ -249,7 +295,7 @@ impl<K: Kernel> Synthesis for Texture<K> {
     fn covariance(&self) -> Vec<LagCovariance> {
         let achieved = self.kernel.achieved();
         let variance_m2 = achieved([0.0; 2]);
-        let bent = |c: f64| self.tile.marginal.as_ref().map_or(c, |m| m.covariance_m2(c / variance_m2));
+        let bent = |c: f64| self.marginal.as_ref().map_or(c, |m| m.covariance_m2(c / variance_m2));
         self.lags()
             .map(|lag_m| LagCovariance { lag_m, wanted_m2: self.wanted.at(lag_m), achieved_m2: bent(achieved(lag_m)) })
             .collect()
@@ -258,7 +304,7 @@ impl<K: Kernel> Synthesis for Texture<K> {
     fn generate(&self, streams: &Streams) -> Result<TextureOutcome, SynthesisError> {
         let Made { heights_m, covariance_error_max_m2, clip_share } = self.kernel.make(streams)?;
         let over_lags = || self.covariance().iter().map(LagCovariance::error_m2).fold(0.0, f64::max);
-        let covariance_error_max_m2 = match &self.tile.marginal {
+        let covariance_error_max_m2 = match &self.marginal {
             None => covariance_error_max_m2.unwrap_or_else(over_lags),
             Some(_) => over_lags(),
         };

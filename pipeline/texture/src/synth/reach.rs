@@ -35,6 +35,20 @@ pub fn reach_m(covariance: &Covariance, level: f64) -> f64 {
     covariance.structures.iter().map(|s| distance_m(s, level)).fold(0.0, f64::max)
 }
 
+/// Distance along the long axis at which the covariance has fallen to half its variance (without the nugget), m.
+pub fn half_distance_m(covariance: &Covariance) -> f64 {
+    let half = 0.5 * covariance.variance_m2();
+    let (mut low, mut high) = (0.0, covariance.range_m());
+    while covariance.at_distance(high) > half {
+        high *= 2.0;
+    }
+    for _ in 0..50 {
+        let middle = 0.5 * (low + high);
+        if covariance.at_distance(middle) > half { low = middle } else { high = middle }
+    }
+    0.5 * (low + high)
+}
+
 /// Sides of a torus, east-west and north-south, on which the covariance is positive definite but for a share of 1e-6, m.
 pub fn torus_m(covariance: &Covariance) -> [f64; 2] {
     let rough = |s: &Structure| 1.0 - s.model.correlation(1e-3, s.shape) > ROUGH_LOSS;

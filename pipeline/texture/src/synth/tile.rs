@@ -43,6 +43,17 @@ impl Cell {
     }
 }
 
+/// Where the height distribution comes from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Heights {
+    /// Normal.
+    #[default]
+    Normal,
+    /// The shape of the fitted residual's.
+    Measured,
+}
+
 /// Raw parameters that every method has.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
@@ -68,7 +79,10 @@ pub struct TileParameters {
     /// not.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub outer_m: Option<f64>,
-    /// Height distribution: heights in m at equally spaced probabilities from 0 to 1, ascending. Default: normal.
+    /// Height distribution: `normal` (default), or `measured`, the shape of the fitted residual's with the variance of the
+    /// covariance (trimming has cut its tails).
+    pub marginal: Heights,
+    /// Height distribution, in place of `marginal`: heights in m at equally spaced probabilities from 0 to 1, ascending. Default: normal.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub marginal_m: Option<Vec<f64>>,
 }
@@ -83,6 +97,7 @@ impl Default for TileParameters {
             ratio: None,
             azimuth_deg: None,
             outer_m: None,
+            marginal: Heights::Normal,
             marginal_m: None,
         }
     }
@@ -95,8 +110,6 @@ pub struct Tile {
     pub geometry: Geometry,
     /// Whether it repeats without seams.
     pub periodic: bool,
-    /// Height distribution, unless normal.
-    pub marginal: Option<Marginal>,
     note: Option<String>,
 }
 
@@ -130,8 +143,26 @@ impl Tile {
             return Err(ParameterError::new("azimuth_deg", format!("is {azimuth}; it must be finite")));
         }
         parameters.outer_m.map(|m| ParameterError::positive("outer_m", m)).transpose()?;
-        let marginal = parameters.marginal_m.as_deref().map(Marginal::new).transpose()?;
-        Ok(Self { parameters, geometry, periodic, marginal, note })
+        Ok(Self { parameters, geometry, periodic, note })
+    }
+
+    /// The height distribution, unless normal; `measured_m` are the fit's quantiles.
+    ///
+    /// # Errors
+    /// A table that is no distribution; a fit without heights.
+    pub fn marginal(&self, measured_m: &[f64], variance_m2: f64) -> Result<Option<Marginal>, ParameterError> {
+        match (&self.parameters.marginal_m, self.parameters.marginal) {
+            (None, Heights::Normal) => Ok(None),
+            (Some(_), Heights::Measured) => {
+                Err(ParameterError::new("marginal", "is `measured` beside a table of heights; give one of them"))
+            }
+            (Some(table), _) => Marginal::new(table).map(Some),
+            (None, Heights::Measured) if measured_m.is_empty() => {
+                let message = "is `measured`, but the fit file has no `height_quantiles_m`; fit the DEM again";
+                Err(ParameterError::new("marginal", message))
+            }
+            (None, Heights::Measured) => Marginal::of_shape(measured_m, variance_m2).map(Some),
+        }
     }
 
     /// All tiles together.

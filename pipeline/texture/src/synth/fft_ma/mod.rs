@@ -35,12 +35,11 @@
 mod spectrum;
 
 use super::tile::{self, Tile, TileParameters};
-use super::{Kernel, Made, Synthesis, SynthesisError, Texture, reach};
+use super::{Kernel, Made, Synthesis, SynthesisError, Texture, Wanted, reach};
 use crate::covariance::Covariance;
 use rayon::prelude::*;
 use sastrugi_numeric::fft::{Complex64, HalfSpectrum, RealFft2, smooth_length};
 use sastrugi_numeric::{Geometry, Grid, Stream, Streams, sums};
-use sastrugi_schemas::fit::FitFile;
 use sastrugi_schemas::{Kind, ParameterError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -115,13 +114,12 @@ pub fn kind() -> Kind {
     }
 }
 
-/// The texture with raw parameters, matching `fit`.
+/// The texture with raw parameters, matching `wanted`.
 ///
 /// # Errors
-/// Parameters out of range; a fit file without a known model and its parameters.
-pub fn prepare(parameters: &Value, fit: &FitFile) -> Result<Box<dyn Synthesis>, ParameterError> {
-    let (of_tile, own) = tile::read(parameters)?;
-    Ok(Box::new(texture(of_tile, own, Covariance::of_fit(fit)?)?))
+/// Parameters out of range.
+pub fn prepare(parameters: &Value, wanted: Wanted) -> Result<Box<dyn Synthesis>, ParameterError> {
+    super::prepare(parameters, wanted, |own: &FftMaParameters| own.periodic, FftMa::new)
 }
 
 /// The texture of a covariance.
@@ -133,7 +131,7 @@ pub fn texture(
     own: FftMaParameters,
     covariance: Covariance,
 ) -> Result<Texture<FftMa>, ParameterError> {
-    Texture::new(of_tile, own.periodic, covariance, |tile, wanted| FftMa::new(own, tile, wanted))
+    Texture::new(of_tile, own.periodic, covariance.into(), |tile, wanted| FftMa::new(own, tile, wanted))
 }
 
 impl FftMa {

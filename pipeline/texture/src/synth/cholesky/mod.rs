@@ -1,0 +1,240 @@
+//! Random field from the Cholesky factor of its covariance matrix.
+//!
+//! `z = L f`, f independent standard normal values, one per cell, and `L L' = C` the lower factor of the matrix of
+//! covariances of all pairs of cells. Exact on average on any grid, for any covariance, and in no need of a torus: hence not
+//! periodic.
+//!
+//! Source: Vecherin et al. 2022, section 3.2. The factor is made in blocks of [`BLOCK`] cells, column of blocks by column of
+//! blocks; each element is the same sum in the same order on any number of threads. A pivot below 1e-10 of the variance
+//! is none (smooth covariances on fine grids are singular to rounding): its column is left out, an error of at most 1e-4 of
+//! the variance.
+//!
+//! Cost, for N cells: `N^3 / 3` operations, `4 N^2` bytes (half of the matrix). 100 x 100 cells are a matrix of 0.8 GB, 0.4 GB
+//! of it kept; more than [`CELLS_MAX`] cells are refused before anything is done. [`super::fft_ma`] gives the same fields at a
+//! millionth of the cost; this is the reference beside it.
+
+use super::tile::{self, Tile};
+use super::{Kernel, Made, Synthesis, SynthesisError, Wanted};
+use crate::covariance::Covariance;
+use rayon::prelude::*;
+use sastrugi_numeric::{Geometry, Streams};
+use sastrugi_schemas::{Kind, ParameterError};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+/// Most cells: 100 x 100, a matrix of 0.8 GB.
+pub const CELLS_MAX: usize = 10_000;
+/// Cells per block: a block of 32 kB stays in the first cache.
+const BLOCK: usize = 64;
+/// Pivots below this share of the variance are rounding.
+const PIVOT_MIN: f64 = 1e-10;
+
+/// A Cholesky texture has no parameters beside those of its tile.
+#[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct CholeskyParameters {}
+
+/// The method with checked parameters.
+pub struct Cholesky {
+    covariance: Covariance,
+    tile: Geometry,
+}
+
+/// Registry entry.
+pub fn kind() -> Kind {
+    Kind {
+        family: "texture",
+        kind: "cholesky",
+        summary: "normal field from the factor of its dense covariance matrix; not periodic; at most 10000 cells",
+        source: "Vecherin et al. 2022, section 3.2",
+        parameters: tile::schema::<CholeskyParameters>(),
+    }
+}
+
+/// The texture with raw parameters, matching `wanted`.
+///
+/// # Errors
+/// Parameters out of range; too many cells.
+pub fn prepare(parameters: &Value, wanted: Wanted) -> Result<Box<dyn Synthesis>, ParameterError> {
+    super::prepare(parameters, wanted, |_| false, Cholesky::new)
+}
+
+impl Cholesky {
+    fn new(_: CholeskyParameters, tile: &Tile, wanted: &Covariance) -> Result<Self, ParameterError> {
+        let cells = tile.geometry.len();
+        if cells > CELLS_MAX {
+            let gigabytes = 8e-9 * cells as f64 * cells as f64;
+            let message = format!(
+                "gives {} x {} cells, a covariance matrix of {gigabytes:.1} GB; `cholesky` takes at most {CELLS_MAX} cells \
+                 (0.8 GB), `fft_ma` any number",
+                tile.geometry.cols, tile.geometry.rows
+            );
+            return Err(ParameterError::new("size_m", message));
+        }
+        Ok(Self { covariance: wanted.clone(), tile: tile.geometry })
+    }
+
+    /// Rows `i` and columns `j` of the covariance matrix, row-major.
+    fn block(&self, i: usize, j: usize) -> Vec<f64> {
+        let Geometry { cols, cell: [dx, dy], .. } = self.tile;
+        let (lines, columns) = (self.cells(i), self.cells(j));
+        let mut block = Vec::with_capacity(lines.len() * columns.len());
+        for a in lines {
+            block.extend(columns.clone().map(|b| {
+                let east = (a % cols) as f64 - (b % cols) as f64;
+                let south = (a / cols) as f64 - (b / cols) as f64;
+                self.covariance.at([east * dx, -south * dy])
+            }));
+        }
+        block
+    }
+
+    /// Cells of a block.
+    fn cells(&self, block: usize) -> std::ops::Range<usize> {
+        block * BLOCK..((block + 1) * BLOCK).min(self.tile.len())
+    }
+}
+
+impl Kernel for Cholesky {
+    fn parameters(&self) -> Value {
+        Value::Object(serde_json::Map::new())
+    }
+
+    fn memory_bytes(&self) -> u64 {
+        let cells = self.tile.len() as u64;
+        4 * cells * (cells + BLOCK as u64) + 8 * cells
+    }
+
+    fn operations(&self) -> f64 {
+        let cells = self.tile.len() as f64;
+        cells * cells * cells / 3.0
+    }
+
+    fn notes(&self) -> Vec<String> {
+        let gigabytes = 1e-9 * self.memory_bytes() as f64;
+        vec![format!(
+            "the covariance matrix of {} cells takes {gigabytes:.3} GB; the field is not periodic",
+            self.tile.len()
+        )]
+    }
+
+    fn achieved(&self) -> Box<dyn Fn([f64; 2]) -> f64 + '_> {
+        Box::new(|lag_m| self.covariance.at(lag_m))
+    }
+
+    fn make(&self, streams: &Streams) -> Result<Made, SynthesisError> {
+        let mut stream = streams.stream("normals");
+        let normals: Vec<f64> = (0..self.tile.len()).map(|_| stream.normal()).collect();
+        let least = PIVOT_MIN * self.covariance.at_distance(0.0);
+        let factor = Factor::new(self.tile.len().div_ceil(BLOCK), least, |i, j| self.block(i, j));
+        Ok(Made { heights_m: factor.times(&normals), covariance_error_max_m2: None, clip_share: 0.0 })
+    }
+}
+
+/// A lower factor in blocks: `columns[j][i - j]` is the block of block row i and block column j, row-major.
+struct Factor {
+    columns: Vec<Vec<Vec<f64>>>,
+}
+
+impl Factor {
+    /// The factor of the matrix whose block `(i, j)`, `i >= j`, is `matrix(i, j)`.
+    fn new(blocks: usize, least_pivot: f64, matrix: impl Fn(usize, usize) -> Vec<f64> + Sync) -> Self {
+        let mut columns: Vec<Vec<Vec<f64>>> = Vec::with_capacity(blocks);
+        for j in 0..blocks {
+            let reduced = |i: usize| {
+                let mut block = matrix(i, j);
+                columns.iter().enumerate().for_each(|(k, column)| {
+                    subtract_product(&mut block, &column[i - k], &column[j - k]);
+                });
+                block
+            };
+            let mut column: Vec<Vec<f64>> = (j..blocks).into_par_iter().map(reduced).collect();
+            let (diagonal, below) = column.split_at_mut(1);
+            factorise(&mut diagonal[0], least_pivot);
+            below.par_iter_mut().for_each(|block| divide(block, &diagonal[0]));
+            columns.push(column);
+        }
+        Self { columns }
+    }
+
+    /// `L f`.
+    fn times(&self, f: &[f64]) -> Vec<f64> {
+        let mut product = vec![0.0; f.len()];
+        for (j, column) in self.columns.iter().enumerate() {
+            let part = &f[j * BLOCK..f.len().min((j + 1) * BLOCK)];
+            for (offset, block) in column.iter().enumerate() {
+                let lines = block.chunks_exact(part.len());
+                for (sum, line) in product[(j + offset) * BLOCK..].iter_mut().zip(lines) {
+                    *sum += line.iter().zip(part).map(|(l, v)| l * v).sum::<f64>();
+                }
+            }
+        }
+        product
+    }
+}
+
+/// `block -= a b'`, all row-major; a and b have [`BLOCK`] columns.
+fn subtract_product(block: &mut [f64], a: &[f64], b: &[f64]) {
+    let columns = b.len() / BLOCK;
+    let mut transposed = vec![0.0; b.len()];
+    for (j, line) in b.chunks_exact(BLOCK).enumerate() {
+        line.iter().enumerate().for_each(|(k, v)| transposed[k * columns + j] = *v);
+    }
+    for (sum, line) in block.chunks_exact_mut(columns).zip(a.chunks_exact(BLOCK)) {
+        for (four, factors) in transposed.chunks_exact(4 * columns).zip(line.chunks_exact(4)) {
+            let (b0, rest) = four.split_at(columns);
+            let (b1, rest) = rest.split_at(columns);
+            let (b2, b3) = rest.split_at(columns);
+            for j in 0..columns {
+                sum[j] -= factors[0] * b0[j] + factors[1] * b1[j] + factors[2] * b2[j] + factors[3] * b3[j];
+            }
+        }
+    }
+}
+
+/// Replaces a square block by its lower factor; the rest of it by 0.
+fn factorise(block: &mut [f64], least_pivot: f64) {
+    let n = side(block);
+    for j in 0..n {
+        for i in 0..n {
+            let sum: f64 = (0..j.min(i)).map(|k| block[i * n + k] * block[j * n + k]).sum();
+            let rest = block[i * n + j] - sum;
+            block[i * n + j] = match i.cmp(&j) {
+                std::cmp::Ordering::Less => 0.0,
+                std::cmp::Ordering::Equal => {
+                    if rest > least_pivot {
+                        rest.sqrt()
+                    } else {
+                        0.0
+                    }
+                }
+                std::cmp::Ordering::Greater => ratio(rest, block[j * n + j]),
+            };
+        }
+    }
+}
+
+/// Replaces a block by the X with `X L' = block`.
+fn divide(block: &mut [f64], lower: &[f64]) {
+    let n = side(lower);
+    for line in block.chunks_exact_mut(n) {
+        for j in 0..n {
+            let sum: f64 = (0..j).map(|k| line[k] * lower[j * n + k]).sum();
+            line[j] = ratio(line[j] - sum, lower[j * n + j]);
+        }
+    }
+}
+
+/// What is left of a column whose pivot was rounding: nothing.
+fn ratio(rest: f64, pivot: f64) -> f64 {
+    if pivot > 0.0 { rest / pivot } else { 0.0 }
+}
+
+/// Side of a square block.
+fn side(block: &[f64]) -> usize {
+    (block.len() as f64).sqrt().round() as usize
+}
+
+#[cfg(test)]
+mod tests;
