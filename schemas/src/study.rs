@@ -170,14 +170,27 @@ impl Files {
 pub struct TextureItem {
     /// Id, `[a-z0-9][a-z0-9.-]{0,63}`, unique in the study.
     pub id: String,
-    /// Id of the fit to match.
-    pub fit: String,
+    /// Id of the fit to match, or a stated covariance: `{ model = "exponential", sigma_m = 0.03, range_m = 0.28 }`.
+    pub fit: FitReference,
     /// Synthesis method (see `sastrugi kinds`).
     #[serde(default = "default_method")]
     pub method: String,
+    /// Several methods side by side, `"all"` or a list, in place of `method`: a texture `<id>-<method>` of each, and the
+    /// table `scoreboard`.
+    #[serde(default)]
+    pub methods: Option<Methods>,
+    /// Realisations of each method that the scoreboard measures.
+    #[serde(default = "default_realisations")]
+    pub realisations: u32,
     /// Id of the terrain or DEM that the texture is added to; the texture stands alone when absent.
     #[serde(default)]
     pub onto: Option<String>,
+    /// Factor of the texture on its base: the id of a raster of factors, or a table by the base's slope.
+    #[serde(default)]
+    pub modulate: Option<Modulate>,
+    /// Id of a DEM whose cells without data are filled with texture that fits what is around them.
+    #[serde(default)]
+    pub fill: Option<String>,
     /// Label for statistics.
     #[serde(default)]
     pub group: Option<String>,
@@ -190,6 +203,52 @@ pub struct TextureItem {
     /// One item (or one set of replicates) per value of a parameter: `sweep.<parameter> = [...]`.
     #[serde(default)]
     pub sweep: BTreeMap<String, Vec<serde_json::Value>>,
+}
+
+/// Factor of a texture on its base.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged, expecting = "`modulate` is the id of a raster, or a table with lists `slope_deg` and `factor`")]
+pub enum Modulate {
+    /// Id of a raster of factors, 0 or above.
+    Raster(String),
+    /// By the base's slope: straight lines between the slopes given, the outer factors beyond them.
+    #[serde(rename_all = "snake_case")]
+    Slope {
+        /// Slopes, degrees, ascending.
+        slope_deg: Vec<f64>,
+        /// Factor at each slope.
+        factor: Vec<f64>,
+    },
+}
+
+/// What a texture matches.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged, expecting = "`fit` is the id of a fit, or a table with `model` and the numbers of that model")]
+pub enum FitReference {
+    /// Id of a fit.
+    Id(String),
+    /// A covariance without a measured surface.
+    Stated {
+        /// Covariance model, as in fit files.
+        model: String,
+        /// Its parameters.
+        #[serde(flatten)]
+        parameters: BTreeMap<String, f64>,
+    },
+}
+
+/// Synthesis methods.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged, expecting = "`methods` is \"all\" or a list of synthesis methods")]
+pub enum Methods {
+    /// `all`.
+    Word(String),
+    /// Some.
+    List(Vec<String>),
+}
+
+fn default_realisations() -> u32 {
+    8
 }
 
 fn default_method() -> String {

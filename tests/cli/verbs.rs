@@ -123,6 +123,28 @@ fn val_fit_texture_roughness_and_info_work_on_files() {
 }
 
 #[test]
+fn val_textures_are_tiled_shaped_and_fill_holes() {
+    let folder = area();
+    let path = folder.path();
+    write(path, "own.json", "{\"model\": \"exponential\", \"parameters\": {\"sigma_m\": 0.01, \"range_m\": 0.2}}");
+    let size = ["--size", "3x2", "--cell", "0.05"];
+    let tiled = ok_json(path, &[&["texture", "own.json", "--tile", "2x3", "-o", "tiled.tif"], &size[..]].concat());
+    assert_eq!((tiled["grid"]["rows"].as_u64(), tiled["grid"]["cols"].as_u64()), (Some(80), Some(180)));
+    for method in ["gaussians", "quasi_wavelets", "cholesky"] {
+        let made = ok_json(path, &[&["texture", "own.json", "--method", method, "-o", "m.tif"], &size[..]].concat());
+        assert_eq!(made["grid"]["cols"], 60, "{method}");
+    }
+    // Nine values around a hole.
+    write(
+        path,
+        "holed.asc",
+        "ncols 3\nnrows 3\nxllcorner 0\nyllcorner 0\ncellsize 0.05\nnodata_value -9999\n1 1.01 1\n1.02 -9999 1\n1 1 0.99\n",
+    );
+    let filled = ok_json(path, &["texture", "own.json", "--fill", "holed.asc", "-o", "filled.asc"]);
+    assert_eq!((filled["filled_cells"].as_u64(), filled["grid"]["valid"].as_u64()), (Some(1), Some(9)));
+}
+
+#[test]
 fn val_conversions_keep_the_heights() {
     let folder = area();
     let path = folder.path();

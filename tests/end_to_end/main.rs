@@ -48,6 +48,29 @@ fn val_a_release_has_its_layout() {
     assert_eq!(fs::read(folder.path().join("release/dem/site.tif")).unwrap(), original);
 }
 
+/// The snow paper's study: scenes, tiles, and a scoreboard in which Cholesky refuses the large scene.
+#[test]
+fn val_the_snow_study_compares_the_methods() {
+    let folder = area();
+    let study = sastrugi_fixtures::study("vecherin_2022.toml");
+    let call = sastrugi_in(folder.path(), &["run", study.to_str().unwrap(), "-o", "release", "--quiet"]);
+    assert_eq!(call.code, 0, "{}", call.stderr);
+    let sums = sums(&folder.path().join("release"));
+    for path in [
+        "texture/scene-0.28.tif",
+        "texture/tiled-0.28.tif",
+        "texture/methods-quasi-wavelets.tif",
+        "texture/methods-small-cholesky.tif",
+        "tables/scoreboard/part-0000.parquet",
+        "tables/scoreboard_covariance/part-0000.parquet",
+    ] {
+        assert!(sums.contains_key(path), "{path} is missing from {:?}", sums.keys());
+    }
+    assert!(!sums.contains_key("texture/methods-cholesky.tif"));
+    let page = fs::read_to_string(folder.path().join("release/report/index.html")).unwrap();
+    assert!(page.contains("12.8 GB") && page.contains("Which synthesis method"));
+}
+
 #[test]
 fn val_the_report_is_self_contained() {
     let folder = area();

@@ -9,7 +9,7 @@ use sastrugi_schemas::fit::FitFile;
 use sastrugi_schemas::manifest::FailedItem;
 use sastrugi_schemas::tables::{
     CandidateCurveRow, CandidateRow, CovarianceRow, FitRow, HeightDistributionRow, LikelihoodProfileRow, MissionRow,
-    ProfilePsdRow, PsdRow, SampleRow, StructureRow, SurfaceRow, TerrainRow,
+    ProfilePsdRow, PsdRow, SampleRow, ScoreCovarianceRow, ScoreRow, StructureRow, SurfaceRow, TerrainRow,
 };
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -87,6 +87,10 @@ pub struct Data {
     pub psd: Vec<PsdRow>,
     /// Histograms of heights.
     pub heights: Vec<HeightDistributionRow>,
+    /// Scoreboards of synthesis methods.
+    pub scoreboard: Vec<ScoreRow>,
+    /// Covariances of their methods.
+    pub scoreboard_covariance: Vec<ScoreCovarianceRow>,
     /// Missions.
     pub missions: Vec<MissionRow>,
     /// Files read on demand.

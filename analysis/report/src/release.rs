@@ -48,6 +48,8 @@ impl Data {
             profile_psd: release.rows()?,
             psd: release.rows()?,
             heights: release.rows()?,
+            scoreboard: release.rows()?,
+            scoreboard_covariance: release.rows()?,
             missions: release.rows()?,
             files: Box::new(release),
         })

@@ -66,7 +66,8 @@ pub enum Verb {
     /// Synthesise a texture that matches a fit.
     #[command(
         after_help = "Examples:\n  sastrugi texture fit.json --size 20x20 --cell 0.1 --seed 1 -o texture.tif\n  \
-        sastrugi texture fit.json --size 10x10 --cell 0.05 --onto terrain.tif -o textured.tif"
+        sastrugi texture fit.json --size 10x10 --cell 0.05 --onto terrain.tif -o textured.tif\n  \
+        sastrugi texture fit.json --fill snow.tif -o without-holes.tif"
     )]
     Texture(Texture),
     /// Classify and describe the roughness of a DEM.
@@ -321,6 +322,12 @@ pub struct Texture {
     /// Base DEM to add the texture to.
     #[arg(long, value_name = "DEM")]
     pub onto: Option<PathBuf>,
+    /// Raster of factors, 0 or above, by which the texture is multiplied on its base.
+    #[arg(long, value_name = "RASTER")]
+    pub amplitude: Option<PathBuf>,
+    /// Fill the cells of this DEM that hold no data, with texture that fits what is around them; makes no other texture.
+    #[arg(long, value_name = "DEM", conflicts_with_all = ["onto", "size", "cell", "tile", "phase", "method", "set"])]
+    pub fill: Option<PathBuf>,
     /// Any other parameter of the method (see `kinds`), `name=value`.
     #[arg(long = "set", value_name = "K=V")]
     pub set: Vec<String>,

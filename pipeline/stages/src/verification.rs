@@ -210,6 +210,8 @@ fn compare_tables(release: &Release, rows: Rows, samples: &Path) -> Result<Vec<D
         compare_rows(release, &rows.profile_psd)?,
         compare_rows(release, &rows.psd)?,
         compare_rows(release, &rows.height_distribution)?,
+        compare_rows(release, &rows.scoreboard)?,
+        compare_rows(release, &rows.scoreboard_covariance)?,
         compare_rows(release, &rows.missions)?,
         compare_rows(release, &samples)?,
     ];

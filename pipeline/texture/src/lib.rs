@@ -28,6 +28,6 @@ pub mod synth;
 mod gstools_tests;
 
 pub use fit::{FitError, FitOutcome, FitParameters, FitSettings, Heights, Profiles, fit};
-pub use onto::{OntoError, onto};
+pub use onto::{OntoError, SlopeFactors, amplitude, modulated_onto, onto};
 pub use registry::{kinds, prepare};
 pub use synth::{Synthesis, SynthesisError, TextureOutcome};

@@ -1,6 +1,7 @@
-//! A periodic texture laid onto a base terrain.
+//! A periodic texture laid onto a base terrain, its amplitude modulated by the base's slope or by a raster.
 
-use sastrugi_numeric::Grid;
+use sastrugi_numeric::{Grid, Surface};
+use sastrugi_schemas::ParameterError;
 
 /// Relative difference of cell sizes that counts as none.
 const CELL_TOLERANCE: f64 = 1e-6;
@@ -18,6 +19,99 @@ pub enum OntoError {
         /// Cell size of the base, m.
         base_m: [f64; 2],
     },
+    /// A raster of factors must say something of every cell of the base.
+    #[error("the raster of amplitudes has no value, or one below 0, at x = {x} m, y = {y} m; it must cover the base")]
+    Amplitude {
+        /// East, m.
+        x: f64,
+        /// North, m.
+        y: f64,
+    },
+}
+
+/// Factor of the texture by the base's slope: straight lines between given slopes, the outer values beyond them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SlopeFactors {
+    /// Slopes, degrees, ascending.
+    pub slope_deg: Vec<f64>,
+    /// Factor at each slope, 0 or above.
+    pub factor: Vec<f64>,
+}
+
+impl SlopeFactors {
+    /// Checks the table.
+    ///
+    /// # Errors
+    /// Lists of different lengths or without values; slopes that do not ascend; a factor below 0.
+    pub fn check(&self) -> Result<(), ParameterError> {
+        let (slopes, factors) = (&self.slope_deg, &self.factor);
+        if slopes.is_empty() || slopes.len() != factors.len() {
+            let message =
+                format!("holds {} slopes and {} factors; it takes as many of each", slopes.len(), factors.len());
+            return Err(ParameterError::new("modulate", message));
+        }
+        if !slopes.iter().all(|s| s.is_finite()) || slopes.windows(2).any(|pair| pair[0] >= pair[1]) {
+            return Err(ParameterError::new("modulate.slope_deg", "must hold finite slopes in ascending order"));
+        }
+        if !factors.iter().all(|f| f.is_finite() && *f >= 0.0) {
+            return Err(ParameterError::new("modulate.factor", "must hold finite factors, 0 or above"));
+        }
+        Ok(())
+    }
+
+    fn at(&self, slope_deg: f64) -> f64 {
+        let after = self.slope_deg.partition_point(|s| *s <= slope_deg);
+        match (after.checked_sub(1), self.slope_deg.get(after)) {
+            (None, _) => self.factor[0],
+            (Some(last), None) => self.factor[last],
+            (Some(low), Some(high_deg)) => {
+                let share = (slope_deg - self.slope_deg[low]) / (high_deg - self.slope_deg[low]);
+                self.factor[low] + share * (self.factor[after] - self.factor[low])
+            }
+        }
+    }
+
+    /// Factor of every cell of a base, by its slope: central differences, one-sided at edges and beside cells without data.
+    pub fn over(&self, base: &Grid) -> Grid {
+        let [dx, dy] = base.geometry.cell;
+        let (rows, cols) = (base.rows(), base.cols());
+        let difference = |here: f64, before: Option<f64>, after: Option<f64>, cell: f64| {
+            let known = |z: Option<f64>| z.filter(|z| z.is_finite());
+            match (known(before), known(after)) {
+                (Some(a), Some(b)) => (b - a) / (2.0 * cell),
+                (Some(a), None) => (here - a) / cell,
+                (None, Some(b)) => (b - here) / cell,
+                (None, None) => 0.0,
+            }
+        };
+        let at = |r: Option<usize>, c: Option<usize>| Some(base.at(r.filter(|r| *r < rows)?, c.filter(|c| *c < cols)?));
+        let factor = |r: usize, c: usize| {
+            let here = base.at(r, c);
+            let x = difference(here, at(Some(r), c.checked_sub(1)), at(Some(r), Some(c + 1)), dx);
+            let y = difference(here, at(r.checked_sub(1), Some(c)), at(Some(r + 1), Some(c)), dy);
+            self.at(libm::atan((x * x + y * y).sqrt()).to_degrees())
+        };
+        let values = (0..rows).flat_map(|r| (0..cols).map(move |c| (r, c))).map(|(r, c)| factor(r, c)).collect();
+        Grid::new(base.geometry, values)
+    }
+}
+
+/// A raster of factors on the cells of a base: bilinear, the nearest value at its rim.
+///
+/// # Errors
+/// A cell of the base with data but without a factor of 0 or above.
+pub fn amplitude(base: &Grid, raster: &Grid) -> Result<Grid, OntoError> {
+    let g = base.geometry;
+    let factor = |k: usize| {
+        let (x, y) = (g.x(k % g.cols), g.y(k / g.cols));
+        let nearest = || raster.geometry.cell_at(x, y).map(|(r, c)| raster.at(r, c));
+        match raster.height(x, y).or_else(nearest).filter(|f| *f >= 0.0) {
+            Some(factor) => Ok(factor),
+            None if base.values[k].is_nan() => Ok(f64::NAN),
+            None => Err(OntoError::Amplitude { x, y }),
+        }
+    };
+    Ok(Grid::new(g, (0..g.len()).map(factor).collect::<Result<_, _>>()?))
 }
 
 /// Base plus texture, cell by cell on the base's own cells. The texture is repeated as often as the base needs from the
@@ -26,6 +120,14 @@ pub enum OntoError {
 /// # Errors
 /// Cell sizes that differ.
 pub fn onto(base: &Grid, texture: &Grid) -> Result<Grid, OntoError> {
+    modulated_onto(base, texture, None)
+}
+
+/// As [`onto()`], the texture multiplied by a factor for each cell of the base.
+///
+/// # Errors
+/// Cell sizes that differ.
+pub fn modulated_onto(base: &Grid, texture: &Grid, factors: Option<&Grid>) -> Result<Grid, OntoError> {
     let (base_m, texture_m) = (base.geometry.cell, texture.geometry.cell);
     if (0..2).any(|k| (base_m[k] - texture_m[k]).abs() > CELL_TOLERANCE * base_m[k]) {
         return Err(OntoError::Cells { texture_m, base_m });
@@ -35,7 +137,13 @@ pub fn onto(base: &Grid, texture: &Grid) -> Result<Grid, OntoError> {
     for (r, line) in sum.values.chunks_exact_mut(base.cols()).enumerate() {
         let south = (rows - 1 - r) % tile_rows;
         let tile = texture.row(tile_rows - 1 - south);
-        line.iter_mut().enumerate().for_each(|(c, z)| *z += tile[c % tile_cols]);
+        match factors {
+            None => line.iter_mut().enumerate().for_each(|(c, z)| *z += tile[c % tile_cols]),
+            Some(factors) => {
+                let factors = factors.row(r).iter().enumerate();
+                line.iter_mut().zip(factors).for_each(|(z, (c, factor))| *z += factor * tile[c % tile_cols]);
+            }
+        }
     }
     Ok(sum)
 }
@@ -56,6 +164,31 @@ mod tests {
         assert_eq!(sum.row(3), [11.0, 12.0, 13.0, 11.0]);
         assert!(sum.at(0, 0).is_nan());
         assert_eq!(sum.at(0, 1), 15.0);
+    }
+
+    /// A plane of 45 degrees and a flat: factors by slope; a raster of factors at half the resolution.
+    #[test]
+    fn val_amplitudes() {
+        let g = Geometry::square(4, 8, 1.0);
+        let base = Grid::new(g, (0..32).map(|k| f64::max(0.0, (k % 8) as f64 - 4.0)).collect());
+        let factors = SlopeFactors { slope_deg: vec![0.0, 60.0], factor: vec![1.0, 0.2] };
+        factors.check().unwrap();
+        let by_slope = factors.over(&base);
+        assert!((by_slope.at(1, 1) - 1.0).abs() < 1e-12 && (by_slope.at(2, 6) - 0.4).abs() < 1e-12);
+        assert!((by_slope.at(0, 7) - 0.4).abs() < 1e-12, "{}", by_slope.at(0, 7));
+        let texture = Grid::filled(Geometry::square(2, 2, 1.0), 10.0);
+        let sum = modulated_onto(&base, &texture, Some(&by_slope)).unwrap();
+        assert!((sum.at(2, 6) - (2.0 + 4.0)).abs() < 1e-12);
+        let raster = Grid::filled(Geometry::square(2, 4, 2.0), 0.5);
+        assert!(amplitude(&base, &raster).unwrap().values.iter().all(|f| *f == 0.5));
+        let small = Grid::filled(Geometry::square(2, 2, 2.0), 0.5);
+        assert!(amplitude(&base, &small).unwrap_err().to_string().contains("x = 4.5 m"));
+        let wrong = |slope_deg: &[f64], factor: &[f64]| {
+            SlopeFactors { slope_deg: slope_deg.to_vec(), factor: factor.to_vec() }.check().is_err()
+        };
+        assert!(
+            wrong(&[], &[]) && wrong(&[1.0, 0.0], &[1.0, 1.0]) && wrong(&[0.0], &[-1.0]) && wrong(&[0.0], &[1.0, 2.0])
+        );
     }
 
     #[test]

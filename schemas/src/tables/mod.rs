@@ -12,6 +12,7 @@ pub mod missions;
 pub mod profile_psd;
 pub mod psd;
 pub mod samples;
+pub mod scoreboard;
 pub mod structure;
 pub mod surfaces;
 pub mod terrains;
@@ -26,6 +27,7 @@ pub use missions::MissionRow;
 pub use profile_psd::ProfilePsdRow;
 pub use psd::PsdRow;
 pub use samples::SampleRow;
+pub use scoreboard::{ScoreCovarianceRow, ScoreRow};
 pub use structure::StructureRow;
 pub use surfaces::SurfaceRow;
 pub use terrains::TerrainRow;
@@ -73,7 +75,7 @@ pub struct Table {
 }
 
 /// All tables, in the order of the report and of `schema`.
-pub const ALL: [&Table; 13] = [
+pub const ALL: [&Table; 15] = [
     &TerrainRow::TABLE,
     &SurfaceRow::TABLE,
     &FitRow::TABLE,
@@ -85,6 +87,8 @@ pub const ALL: [&Table; 13] = [
     &ProfilePsdRow::TABLE,
     &StructureRow::TABLE,
     &HeightDistributionRow::TABLE,
+    &ScoreRow::TABLE,
+    &ScoreCovarianceRow::TABLE,
     &MissionRow::TABLE,
     &SampleRow::TABLE,
 ];

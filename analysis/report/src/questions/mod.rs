@@ -7,6 +7,7 @@ pub mod missions;
 mod outcome;
 pub mod published;
 mod relief;
+pub mod scoreboard;
 pub mod terrain;
 pub mod texture;
 
@@ -28,11 +29,12 @@ pub struct Question {
 }
 
 /// All questions, in the order of the page.
-pub const ALL: [Question; 6] = [
+pub const ALL: [Question; 7] = [
     failures::QUESTION,
     terrain::QUESTION,
     covariance::QUESTION,
     texture::QUESTION,
+    scoreboard::QUESTION,
     missions::QUESTION,
     published::QUESTION,
 ];

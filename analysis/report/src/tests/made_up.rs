@@ -61,6 +61,8 @@ pub fn empty() -> Data {
         profile_psd: Vec::new(),
         psd: Vec::new(),
         heights: Vec::new(),
+        scoreboard: Vec::new(),
+        scoreboard_covariance: Vec::new(),
         missions: Vec::new(),
         files: Box::new(Shelf::default()),
     }

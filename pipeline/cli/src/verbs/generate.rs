@@ -39,6 +39,8 @@ pub fn texture(args: &Texture, common: &Common) -> Verdict {
         parameters: params,
         seed: args.seed.unwrap_or(0),
         onto: args.onto.as_deref(),
+        amplitude: args.amplitude.as_deref(),
+        fill: args.fill.as_deref(),
         output: &args.output,
         options: options(args.compress),
     };

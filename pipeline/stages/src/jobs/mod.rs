@@ -6,6 +6,7 @@ pub mod mask;
 pub mod missions;
 pub mod original;
 pub mod roughness;
+pub mod scoreboard;
 pub mod surface;
 pub mod terrain;
 pub mod texture;
@@ -14,7 +15,7 @@ pub mod traverse;
 use crate::revision::Room;
 use sastrugi_schemas::tables::{
     CandidateCurveRow, CandidateRow, CovarianceRow, FitRow, HeightDistributionRow, LikelihoodProfileRow, MissionRow,
-    ProfilePsdRow, PsdRow, StructureRow, SurfaceRow, TerrainRow,
+    ProfilePsdRow, PsdRow, ScoreCovarianceRow, ScoreRow, StructureRow, SurfaceRow, TerrainRow,
 };
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -156,6 +157,10 @@ pub struct Rows {
     pub psd: Vec<PsdRow>,
     /// Table `height_distribution`.
     pub height_distribution: Vec<HeightDistributionRow>,
+    /// Table `scoreboard`.
+    pub scoreboard: Vec<ScoreRow>,
+    /// Table `scoreboard_covariance`.
+    pub scoreboard_covariance: Vec<ScoreCovarianceRow>,
     /// Table `missions`.
     pub missions: Vec<MissionRow>,
 }

@@ -1,34 +1,103 @@
 //! Stage `texture`: a field that matches a fit, alone or on a base heightfield.
 
 use super::dem::{HEIGHTS, input_error};
+use super::scoreboard::{self, Entrant, ScoreboardJob};
 use super::surface::{Surface, describe_residual};
 use super::{Estimate, ItemRef, Job, JobError, Outcome, Product, Rows, Work, fit};
 use crate::registry::{BuildError, Builder, Heightfield, unknown_id};
 use crate::revision::Room;
 use crate::runner::graph::Node;
+use crate::study::{Entry, StudyError};
 use sastrugi_numeric::{Grid, Streams};
+use sastrugi_schemas::Kind;
 use sastrugi_schemas::fit::FitFile;
-use sastrugi_schemas::study::TextureItem;
-use sastrugi_schemas::{Kind, ParameterError};
+use sastrugi_schemas::study::{FitReference, Methods, Modulate, TextureItem};
 use sastrugi_store::dem::{self, Crs};
 use sastrugi_store::digest;
-use sastrugi_texture::{Synthesis, TextureOutcome};
+use sastrugi_texture::covariance::Covariance;
+use sastrugi_texture::synth::{conditional, fft_ma};
+use sastrugi_texture::{SlopeFactors, Synthesis, TextureOutcome};
 use serde_json::{Map, Value, json};
+use std::collections::BTreeSet;
 
 /// Name of the stage.
 pub const STAGE: &str = "texture";
+/// Most realisations of a scoreboard.
+const REALISATIONS_MAX: u32 = 1000;
 
 /// Synthesis methods.
 pub fn kinds() -> Vec<Kind> {
     sastrugi_texture::kinds().into_iter().filter(|k| k.family == "texture").collect()
 }
 
+/// What a texture matches.
+#[derive(Clone)]
+pub enum Matched {
+    /// A fit of the study.
+    Item(ItemRef),
+    /// A covariance that the study states.
+    Stated(FitFile),
+}
+
+impl Matched {
+    /// The fit file.
+    ///
+    /// # Errors
+    /// A file that cannot be read.
+    pub fn read(&self, work: &Work<'_>) -> Result<FitFile, JobError> {
+        match self {
+            Self::Stated(fit) => Ok(fit.clone()),
+            Self::Item(item) => {
+                let bytes = std::fs::read(work.parent(item, fit::FIT)?).map_err(JobError::new)?;
+                serde_json::from_slice(&bytes).map_err(JobError::new)
+            }
+        }
+    }
+
+    /// As a recipe and the table `terrains` name it.
+    pub fn describe(&self) -> Value {
+        match self {
+            Self::Item(item) => json!(item.id),
+            Self::Stated(fit) => json!({ "model": fit.model, "parameters": fit.parameters }),
+        }
+    }
+
+    fn parent(&self) -> Option<ItemRef> {
+        match self {
+            Self::Item(item) => Some(item.clone()),
+            Self::Stated(_) => None,
+        }
+    }
+
+    /// What parameters are checked against: the stated fit, or a stand-in for one that is not made yet.
+    fn stand_in(&self) -> FitFile {
+        let parameters = [("sigma_m".to_owned(), 1.0), ("range_m".to_owned(), 1.0)].into();
+        let height_quantiles_m = vec![-1.0, 1.0];
+        match self {
+            Self::Stated(fit) => fit.clone(),
+            Self::Item(_) => {
+                FitFile { model: "exponential".to_owned(), parameters, height_quantiles_m, ..FitFile::default() }
+            }
+        }
+    }
+}
+
+/// Factor of a texture on its base.
+#[derive(Clone)]
+enum Modulation {
+    Raster(ItemRef),
+    Slope(SlopeFactors),
+}
+
 struct TextureJob {
     id: String,
-    fit: ItemRef,
+    matched: Matched,
     base: Option<ItemRef>,
+    modulation: Option<Modulation>,
+    /// The DEM whose holes are filled.
+    fill: Option<ItemRef>,
     method: String,
-    /// Prepared with a stand-in fit: shape, memory and parameters do not depend on the fit's numbers.
+    /// Prepared with a stand-in for a fit that is not made yet: shape and parameters do not depend on the fit's numbers.
     draft: Box<dyn Synthesis>,
     streams: Streams,
 }
@@ -41,64 +110,178 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
     let kinds = kinds();
     for entry in builder.study.entries(STAGE)? {
         let (item, params): (TextureItem, Value) = entry.read()?;
-        if let Some(kind) = kinds.iter().find(|k| k.kind == item.method) {
-            entry.check_keys::<TextureItem>(&params, &kind.parameters)?;
-        }
-        if !builder.fits.contains(&item.fit) {
-            return Err(unknown_id(&entry, "fit", &item.fit, builder.fits.iter()).into());
-        }
-        let base_cells = item.onto.as_ref().and_then(|id| builder.heightfields.get(id)).map(|f| f.cells);
-        let base = match &item.onto {
-            None => None,
-            Some(id) => match builder.heightfields.get(id) {
-                Some(field) => Some(field.item.clone()),
-                None => return Err(unknown_id(&entry, "onto", id, builder.heightfields.keys()).into()),
-            },
-        };
-        let expanded = entry.expand(&item.id, item.count, &item.sweep, &params)?;
-        let ids = expanded.iter().map(|e| e.id.clone()).collect();
-        for one in expanded {
-            builder.claim(&entry, STAGE, &one.id)?;
-            let draft = draft(&item.method, &one.params).map_err(|e| entry.refuse(e))?;
+        let methods = methods(&entry, &item, &kinds)?;
+        entry.check_keys::<TextureItem>(&params, &joined_schema(&kinds, &methods))?;
+        let matched = matched(builder, &entry, &item)?;
+        check_purpose(&entry, &item)?;
+        let base = item.onto.as_deref().map(|id| heightfield(builder, &entry, "onto", id)).transpose()?;
+        let fill = item.fill.as_deref().map(|id| heightfield(builder, &entry, "fill", id)).transpose()?;
+        let modulation = modulation(builder, &entry, &item)?;
+        let mut ids = Vec::new();
+        for one in entry.expand(&item.id, item.count, &item.sweep, &params)? {
+            let side_by_side = item.methods.is_some();
             let streams = builder.streams(STAGE, &one.id, item.seed, one.replicate);
-            let field = Heightfield {
-                item: ItemRef::new(STAGE, &one.id),
-                group: item.group.clone().or(one.sweep_group),
-                kind: item.method.clone(),
-                parameters: parameters(&item, draft.as_ref()),
-                stream: Some(streams.label()),
-                release_path: format!("texture/{}.tif", one.id),
-                cells: base_cells.unwrap_or(draft.geometry().len() as u64),
-            };
-            let fit = ItemRef::new(fit::STAGE, &item.fit);
-            let parents = [fit.clone()].into_iter().chain(base.clone()).collect();
-            let method = item.method.clone();
-            let job = TextureJob { id: one.id.clone(), fit, base: base.clone(), method, draft, streams };
-            let stream = field.stream.clone();
-            let node = Node { item: field.item.clone(), parents, inputs: Vec::new(), stream, job: Box::new(job) };
-            builder.node(&entry, node)?;
-            builder.heightfield(&entry, &one.id, field)?;
+            let mut entrants = Vec::new();
+            let mut refusal = None;
+            for method in &methods {
+                let own = if side_by_side { own_parameters(&one.params, &kinds, method) } else { one.params.clone() };
+                let draft = sastrugi_texture::prepare(method, &own, &matched.stand_in());
+                let cost = draft.as_ref().ok().map(|d| (d.operations(), d.memory_bytes()));
+                entrants.push(Entrant { method: method.clone(), parameters: own, cost });
+                let draft = match draft {
+                    Ok(draft) => draft,
+                    Err(error) => {
+                        refusal = refusal.or(Some(error));
+                        continue;
+                    }
+                };
+                let id = if side_by_side { format!("{}-{}", one.id, method.replace('_', "-")) } else { one.id.clone() };
+                builder.claim(&entry, STAGE, &id)?;
+                let streams =
+                    if side_by_side { builder.streams(STAGE, &id, item.seed, one.replicate) } else { streams.clone() };
+                let field = Heightfield {
+                    item: ItemRef::new(STAGE, &id),
+                    group: item.group.clone().or_else(|| one.sweep_group.clone()),
+                    kind: method.clone(),
+                    parameters: parameters(&item, &matched, draft.as_ref()),
+                    stream: Some(streams.label()),
+                    release_path: format!("texture/{id}.tif"),
+                    cells: base.as_ref().or(fill.as_ref()).map_or(draft.geometry().len() as u64, |(_, cells)| *cells),
+                };
+                let [base, fill] = [&base, &fill].map(|field| field.as_ref().map(|(item, _)| item.clone()));
+                let raster = match &modulation {
+                    Some(Modulation::Raster(raster)) => Some(raster.clone()),
+                    _ => None,
+                };
+                let parents: BTreeSet<ItemRef> =
+                    [matched.parent(), base.clone(), fill.clone(), raster].into_iter().flatten().collect();
+                let parents = parents.into_iter().collect();
+                let (method, matched, modulation) = (method.clone(), matched.clone(), modulation.clone());
+                let job = TextureJob { id: id.clone(), matched, base, modulation, fill, method, draft, streams };
+                let stream = field.stream.clone();
+                let node = Node { item: field.item.clone(), parents, inputs: Vec::new(), stream, job: Box::new(job) };
+                builder.node(&entry, node)?;
+                builder.heightfield(&entry, &id, field)?;
+                ids.push(id);
+            }
+            if let Some(error) = refusal.filter(|_| entrants.iter().all(|e| e.cost.is_none())) {
+                return Err(entry.refuse(error).into());
+            }
+            if side_by_side && one.replicate == 0 {
+                builder.claim(&entry, scoreboard::STAGE, &one.id)?;
+                let stream = Some(streams.label());
+                let realisations = item.realisations;
+                let matched = matched.clone();
+                let parents = matched.parent().into_iter().collect();
+                let job = ScoreboardJob { id: one.id.clone(), matched, entrants, realisations, streams };
+                let item = ItemRef::new(scoreboard::STAGE, &one.id);
+                builder.node(&entry, Node { item, parents, inputs: Vec::new(), stream, job: Box::new(job) })?;
+            }
         }
         builder.families.insert(item.id, ids);
     }
     Ok(())
 }
 
-/// The method with its parameters checked against a stand-in fit.
-fn draft(method: &str, params: &Value) -> Result<Box<dyn Synthesis>, ParameterError> {
-    let parameters = [("sigma_m".to_owned(), 1.0), ("range_m".to_owned(), 1.0)].into();
-    let height_quantiles_m = vec![-1.0, 1.0];
-    let fit = FitFile { model: "exponential".to_owned(), parameters, height_quantiles_m, ..FitFile::default() };
-    sastrugi_texture::prepare(method, params, &fit)
+/// Refuses keys that do not go together.
+fn check_purpose(entry: &Entry<'_>, item: &TextureItem) -> Result<(), StudyError> {
+    if item.modulate.is_some() && item.onto.is_none() {
+        return Err(entry.error("modulate", "`modulate` needs `onto`, the base whose texture it changes"));
+    }
+    let alone = item.onto.is_none() && item.methods.is_none() && item.method == fft_ma::kind().kind;
+    if item.fill.is_some() && !alone {
+        return Err(entry.error("fill", "`fill` goes with neither `onto`, `methods` nor a method other than `fft_ma`"));
+    }
+    Ok(())
+}
+
+/// A heightfield that the item names, with its number of cells.
+fn heightfield(builder: &Builder<'_>, entry: &Entry<'_>, key: &str, id: &str) -> Result<(ItemRef, u64), StudyError> {
+    let field = builder.heightfields.get(id);
+    let field = field.ok_or_else(|| unknown_id(entry, key, id, builder.heightfields.keys()))?;
+    Ok((field.item.clone(), field.cells))
+}
+
+fn modulation(builder: &Builder<'_>, entry: &Entry<'_>, item: &TextureItem) -> Result<Option<Modulation>, StudyError> {
+    Ok(match item.modulate.clone() {
+        None => None,
+        Some(Modulate::Raster(id)) => Some(Modulation::Raster(heightfield(builder, entry, "modulate", &id)?.0)),
+        Some(Modulate::Slope { slope_deg, factor }) => {
+            let factors = SlopeFactors { slope_deg, factor };
+            factors.check().map_err(|e| entry.refuse(e))?;
+            Some(Modulation::Slope(factors))
+        }
+    })
+}
+
+/// The methods of an item.
+fn methods(entry: &Entry<'_>, item: &TextureItem, kinds: &[Kind]) -> Result<Vec<String>, StudyError> {
+    let known: Vec<String> = kinds.iter().map(|k| k.kind.to_owned()).collect();
+    let (key, wanted) = match &item.methods {
+        None => ("method", vec![item.method.clone()]),
+        Some(Methods::Word(word)) if word == "all" => ("methods", known.clone()),
+        Some(Methods::Word(word)) => ("methods", vec![word.clone()]),
+        Some(Methods::List(list)) => ("methods", list.clone()),
+    };
+    if item.realisations == 0 || item.realisations > REALISATIONS_MAX {
+        let message = format!("`realisations` is {}; it must lie in 1 to {REALISATIONS_MAX}", item.realisations);
+        return Err(entry.error("realisations", message));
+    }
+    match wanted.iter().find(|w| !known.contains(w)) {
+        Some(other) => {
+            let message = format!("`{key}` is `{other}`; known texture methods: {}", known.join(", "));
+            Err(entry.error(key, message))
+        }
+        None if wanted.is_empty() => Err(entry.error(key, "`methods` is empty; name at least one, or \"all\"")),
+        None => Ok(wanted),
+    }
+}
+
+/// What the item matches.
+fn matched(builder: &Builder<'_>, entry: &Entry<'_>, item: &TextureItem) -> Result<Matched, BuildError> {
+    match &item.fit {
+        FitReference::Id(id) if builder.fits.contains(id) => Ok(Matched::Item(ItemRef::new(fit::STAGE, id))),
+        FitReference::Id(id) => Err(unknown_id(entry, "fit", id, builder.fits.iter()).into()),
+        FitReference::Stated { model, parameters } => {
+            let fit = FitFile { model: model.clone(), parameters: parameters.clone(), ..FitFile::default() };
+            Covariance::of_fit(&fit).map_err(|e| entry.refuse(e.within("fit")))?;
+            Ok(Matched::Stated(fit))
+        }
+    }
+}
+
+/// JSON Schema with the parameters of several methods.
+fn joined_schema(kinds: &[Kind], methods: &[String]) -> Value {
+    let mut joined = json!({ "properties": {}, "$defs": {} });
+    for kind in kinds.iter().filter(|k| methods.iter().any(|m| m == k.kind)) {
+        for part in ["properties", "$defs"] {
+            for (key, value) in kind.parameters[part].as_object().into_iter().flatten() {
+                joined[part][key] = value.clone();
+            }
+        }
+    }
+    joined
+}
+
+/// Those of the parameters that a method has.
+fn own_parameters(params: &Value, kinds: &[Kind], method: &str) -> Value {
+    let known = kinds.iter().find(|k| k.kind == method).map(|k| &k.parameters["properties"]);
+    let has = |key: &String| known.is_some_and(|properties| properties.get(key).is_some());
+    Value::Object(
+        params.as_object().into_iter().flatten().filter(|(k, _)| has(k)).map(|(k, v)| (k.clone(), v.clone())).collect(),
+    )
 }
 
 /// What the table `terrains` says of a texture.
-fn parameters(item: &TextureItem, draft: &dyn Synthesis) -> Value {
+fn parameters(item: &TextureItem, matched: &Matched, draft: &dyn Synthesis) -> Value {
     let mut all = Map::new();
-    all.insert("fit".to_owned(), json!(item.fit));
-    if let Some(onto) = &item.onto {
-        all.insert("onto".to_owned(), json!(onto));
-    }
+    all.insert("fit".to_owned(), matched.describe());
+    let more = [
+        ("onto", item.onto.as_ref().map(|id| json!(id))),
+        ("modulate", item.modulate.as_ref().map(|m| json!(m))),
+        ("fill", item.fill.as_ref().map(|id| json!(id))),
+    ];
+    all.extend(more.into_iter().filter_map(|(key, value)| Some((key.to_owned(), value?))));
     if let Value::Object(own) = draft.parameters() {
         all.extend(own);
     }
@@ -109,9 +292,9 @@ fn parameters(item: &TextureItem, draft: &dyn Synthesis) -> Value {
 ///
 /// # Errors
 /// Cell sizes that differ, or a base larger than such a texture.
-pub fn lay_onto(base: &Grid, texture: &Grid, parameters: &Value) -> Result<Grid, JobError> {
+pub fn lay_onto(base: &Grid, texture: &Grid, periodic: bool, factors: Option<&Grid>) -> Result<Grid, JobError> {
     let larger = base.rows() > texture.rows() || base.cols() > texture.cols();
-    if larger && parameters["periodic"] == json!(false) {
+    if larger && !periodic {
         return Err(JobError::new(format!(
             "the base of {} x {} cells is larger than the texture of {} x {}, which does not repeat without seams; make the \
              texture larger or periodic",
@@ -121,23 +304,27 @@ pub fn lay_onto(base: &Grid, texture: &Grid, parameters: &Value) -> Result<Grid,
             texture.cols()
         )));
     }
-    sastrugi_texture::onto(base, texture).map_err(JobError::new)
-}
-
-impl TextureJob {
-    /// The texture, without its base, detrended and trimmed as the fit's residual was: what that residual is compared with.
-    fn alike(&self, texture: &Grid, fit: &FitFile) -> Rows {
-        let Some(residual) = sastrugi_texture::shown::alike(texture, fit) else { return Rows::default() };
-        let id = format!("{}.residual", self.id);
-        let surface = Surface { id: &id, stage: "alike", fit_id: Some(&self.fit.id), grid: &residual };
-        describe_residual(&surface, fit)
-    }
+    sastrugi_texture::modulated_onto(base, texture, factors).map_err(JobError::new)
 }
 
 impl Job for TextureJob {
     fn recipe(&self) -> Value {
         let base = self.base.as_ref().map(ToString::to_string);
-        json!({ "method": self.method, "params": self.draft.parameters(), "fit": self.fit.id, "onto": base })
+        let mut recipe = json!({
+            "method": self.method,
+            "params": self.draft.parameters(),
+            "fit": self.matched.describe(),
+            "onto": base,
+        });
+        match &self.modulation {
+            None => {}
+            Some(Modulation::Raster(raster)) => recipe["modulate"] = json!(raster.to_string()),
+            Some(Modulation::Slope(f)) => recipe["modulate"] = json!({ "slope_deg": f.slope_deg, "factor": f.factor }),
+        }
+        if let Some(dem) = &self.fill {
+            recipe["fill"] = json!(dem.to_string());
+        }
+        recipe
     }
 
     fn rooms(&self) -> &'static [Room] {
@@ -155,8 +342,10 @@ impl Job for TextureJob {
     }
 
     fn run(&self, work: &Work<'_>) -> Result<Outcome, JobError> {
-        let bytes = std::fs::read(work.parent(&self.fit, fit::FIT)?).map_err(JobError::new)?;
-        let fit: FitFile = serde_json::from_slice(&bytes).map_err(JobError::new)?;
+        let fit = self.matched.read(work)?;
+        if let Some(dem) = &self.fill {
+            return self.filled(work, dem, &fit);
+        }
         let synthesis =
             sastrugi_texture::prepare(&self.method, &self.draft.parameters(), &fit).map_err(JobError::new)?;
         let TextureOutcome { grid, covariance_error_max_m2, clip_share } =
@@ -172,11 +361,55 @@ impl Job for TextureJob {
             None => (grid, Crs::default()),
             Some(base) => {
                 let base = dem::read(&work.parent(base, HEIGHTS)?).map_err(|e| input_error(&e))?;
-                (lay_onto(&base.grid, &grid, &synthesis.parameters())?, base.info.crs)
+                let factors = self.factors(work, &base.grid)?;
+                (lay_onto(&base.grid, &grid, synthesis.is_periodic(), factors.as_ref())?, base.info.crs)
             }
         };
-        dem::write(&work.output(HEIGHTS), &heights, &crs, &Default::default()).map_err(JobError::new)?;
-        let content = digest::heights(&heights);
+        self.released(work, &heights, &crs, rows, notes)
+    }
+}
+
+impl TextureJob {
+    /// The texture, without its base, detrended and trimmed as the fit's residual was: what that residual is compared with.
+    fn alike(&self, texture: &Grid, fit: &FitFile) -> Rows {
+        let Matched::Item(item) = &self.matched else { return Rows::default() };
+        let Some(residual) = sastrugi_texture::shown::alike(texture, fit) else { return Rows::default() };
+        let id = format!("{}.residual", self.id);
+        let surface = Surface { id: &id, stage: "alike", fit_id: Some(&item.id), grid: &residual };
+        describe_residual(&surface, fit)
+    }
+
+    /// The DEM with its holes filled.
+    fn filled(&self, work: &Work<'_>, dem: &ItemRef, fit: &FitFile) -> Result<Outcome, JobError> {
+        let dem = dem::read(&work.parent(dem, HEIGHTS)?).map_err(|e| input_error(&e))?;
+        let covariance = Covariance::of_fit(fit).map_err(JobError::new)?;
+        let filled = conditional::fill(&dem.grid, &covariance, &self.streams).map_err(JobError::new)?;
+        let notes = vec![format!("{} cells without data were filled", filled.cells)];
+        self.released(work, &filled.grid, &dem.info.crs, Rows::default(), notes)
+    }
+
+    /// Factors of the texture on its base.
+    fn factors(&self, work: &Work<'_>, base: &Grid) -> Result<Option<Grid>, JobError> {
+        Ok(match &self.modulation {
+            None => None,
+            Some(Modulation::Slope(factors)) => Some(factors.over(base)),
+            Some(Modulation::Raster(raster)) => {
+                let raster = dem::read(&work.parent(raster, HEIGHTS)?).map_err(|e| input_error(&e))?;
+                Some(sastrugi_texture::amplitude(base, &raster.grid).map_err(JobError::input)?)
+            }
+        })
+    }
+
+    fn released(
+        &self,
+        work: &Work<'_>,
+        heights: &Grid,
+        crs: &Crs,
+        rows: Rows,
+        notes: Vec<String>,
+    ) -> Result<Outcome, JobError> {
+        dem::write(&work.output(HEIGHTS), heights, crs, &Default::default()).map_err(JobError::new)?;
+        let content = digest::heights(heights);
         let products = vec![Product::released(HEIGHTS, format!("texture/{}.tif", self.id), Some(content))];
         Ok(Outcome { products, rows, notes })
     }

@@ -6,7 +6,7 @@ use super::cache::{Record, load_record};
 use super::execute::Failure;
 use super::progress::Progress;
 use crate::error::Error;
-use crate::jobs::{ItemRef, Rows, fit, roughness, texture, traverse};
+use crate::jobs::{ItemRef, Rows, fit, roughness, scoreboard, texture, traverse};
 use sastrugi_schemas::Record as Row;
 use sastrugi_schemas::manifest::{FailedItem, ItemNote, Origin};
 use sastrugi_schemas::study::StudyHead;
@@ -164,6 +164,8 @@ fn add_tables(builder: &mut ReleaseBuilder, contents: &Contents<'_>) -> Result<(
     add_table(builder, contents, &[fit::STAGE], |rows| rows.candidate_curves)?;
     add_table(builder, contents, &[fit::STAGE], |rows| rows.likelihood_profile)?;
     add_described(builder, contents)?;
+    add_table(builder, contents, &[scoreboard::STAGE], |rows| rows.scoreboard)?;
+    add_table(builder, contents, &[scoreboard::STAGE], |rows| rows.scoreboard_covariance)?;
     add_missions(builder, contents)
 }
 

@@ -8,6 +8,8 @@ use sastrugi_numeric::Streams;
 use sastrugi_schemas::fit::FitFile;
 use sastrugi_store::dem::{self, Crs, WriteOptions};
 use sastrugi_store::points::GridSettings;
+use sastrugi_texture::covariance::Covariance;
+use sastrugi_texture::synth::conditional;
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -23,6 +25,10 @@ pub struct Request<'a> {
     pub seed: u64,
     /// Base DEM to add the texture to.
     pub onto: Option<&'a Path>,
+    /// Raster of factors of the texture on its base.
+    pub amplitude: Option<&'a Path>,
+    /// DEM whose holes are filled, in place of a texture.
+    pub fill: Option<&'a Path>,
     /// DEM to write.
     pub output: &'a Path,
     /// How to write.
@@ -39,6 +45,12 @@ pub fn texture(request: &Request<'_>) -> Result<Value, Error> {
         parameters::check(&request.parameters, known)?;
     }
     let fit = read_fit(request.fit)?;
+    if let Some(dem) = request.fill {
+        return fill(request, dem, &fit);
+    }
+    if request.amplitude.is_some() && request.onto.is_none() {
+        return Err(Error::Usage("`--amplitude` needs `--onto`, the base whose texture it changes".to_owned()));
+    }
     let synthesis = sastrugi_texture::prepare(request.method, &request.parameters, &fit)?;
     super::check_output(request.output)?;
     let streams = Streams::for_seed(request.seed, STAGE);
@@ -49,9 +61,18 @@ pub fn texture(request: &Request<'_>) -> Result<Value, Error> {
         Some(path) => {
             // A point cloud is gridded to the texture's cells.
             let gridding = GridSettings { cell_m: Some(outcome.grid.geometry.cell[0]), ..GridSettings::default() };
-            let Read { dem: base, notes: read_notes, .. } = read(path, &Reading { gridding, ..Reading::default() })?;
+            let reading = Reading { gridding, ..Reading::default() };
+            let Read { dem: base, notes: read_notes, .. } = read(path, &reading)?;
             notes.extend(read_notes);
-            let sum = lay_onto(&base.grid, &outcome.grid, &synthesis.parameters());
+            let factors = match request.amplitude {
+                None => None,
+                Some(path) => {
+                    let raster = read(path, &reading)?.dem.grid;
+                    let factors = sastrugi_texture::amplitude(&base.grid, &raster);
+                    Some(factors.map_err(|e| Error::Input(format!("{}: {e}", path.display())))?)
+                }
+            };
+            let sum = lay_onto(&base.grid, &outcome.grid, synthesis.is_periodic(), factors.as_ref());
             (sum.map_err(|e| Error::Usage(e.message))?, base.info.crs)
         }
     };
@@ -65,6 +86,27 @@ pub fn texture(request: &Request<'_>) -> Result<Value, Error> {
         "covariance_error_max_m2": outcome.covariance_error_max_m2,
         "clip_share": outcome.clip_share,
         "grid": super::describe_grid(&heights),
+        "notes": notes,
+    }))
+}
+
+/// Fills the holes of a DEM and writes it.
+fn fill(request: &Request<'_>, path: &Path, fit: &FitFile) -> Result<Value, Error> {
+    super::check_output(request.output)?;
+    let Read { dem, mut notes, .. } = read(path, &Reading::default())?;
+    let streams = Streams::for_seed(request.seed, STAGE);
+    let covariance = Covariance::of_fit(fit).map_err(|e| Error::Input(format!("{}: {e}", request.fit.display())))?;
+    let filled = conditional::fill(&dem.grid, &covariance, &streams)
+        .map_err(|e| Error::Input(format!("{}: {e}", path.display())))?;
+    notes.push(format!("{} cells without data were filled", filled.cells));
+    let lost = dem::write(request.output, &filled.grid, &dem.info.crs, &request.options);
+    notes.extend(lost.map_err(super::write_error)?);
+    Ok(json!({
+        "file": request.output.display().to_string(),
+        "seed": request.seed,
+        "stream": streams.label(),
+        "filled_cells": filled.cells,
+        "grid": super::describe_grid(&filled.grid),
         "notes": notes,
     }))
 }

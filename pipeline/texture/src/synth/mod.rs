@@ -10,11 +10,13 @@
 
 mod bumps;
 pub mod cholesky;
+pub mod conditional;
 pub mod fft_ma;
 pub mod gaussians;
 pub mod marginal;
 pub mod quasi_wavelets;
 pub mod reach;
+pub mod scoreboard;
 pub mod tile;
 
 use crate::covariance::Covariance;
@@ -47,6 +49,12 @@ pub trait Synthesis: Send + Sync {
     /// The covariance that an ensemble of these textures has beside the one that was asked for, at lags along rows, columns
     /// and diagonals: up to half a periodic tile, up to the whole of another one.
     fn covariance(&self) -> Vec<LagCovariance>;
+
+    /// Range across the long axis over range along it that was asked for.
+    fn ratio(&self) -> f64;
+
+    /// Whether the texture repeats without seams.
+    fn is_periodic(&self) -> bool;
 
     /// One field from the named streams.
     ///
@@ -139,6 +147,11 @@ pub struct Made {
     pub covariance_error_max_m2: Option<f64>,
     /// Share of the spectrum that was negative and set to 0.
     pub clip_share: f64,
+}
+
+/// A length without the digits that rounding left: to a micrometre.
+fn tidy(length_m: f64) -> f64 {
+    (length_m * 1e6).round() / 1e6
 }
 
 /// What a texture should match.
@@ -244,7 +257,7 @@ impl<K: Kernel> Texture<K> {
         let lags = self.covariance();
         let worst = lags.iter().max_by(|a, b| a.error_m2().total_cmp(&b.error_m2()))?;
         let variance_m2 = lags[0].wanted_m2;
-        let [east_m, north_m] = worst.lag_m;
+        let [east_m, north_m] = worst.lag_m.map(tidy);
         (worst.error_m2() > ERROR_NOTE * variance_m2).then(|| {
             let share = 100.0 * worst.error_m2() / variance_m2;
             let error_m2 = worst.error_m2();
@@ -299,6 +312,14 @@ impl<K: Kernel> Synthesis for Texture<K> {
         self.lags()
             .map(|lag_m| LagCovariance { lag_m, wanted_m2: self.wanted.at(lag_m), achieved_m2: bent(achieved(lag_m)) })
             .collect()
+    }
+
+    fn ratio(&self) -> f64 {
+        self.wanted.ratio
+    }
+
+    fn is_periodic(&self) -> bool {
+        self.tile.periodic
     }
 
     fn generate(&self, streams: &Streams) -> Result<TextureOutcome, SynthesisError> {

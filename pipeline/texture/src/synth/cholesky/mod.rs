@@ -22,6 +22,7 @@ use sastrugi_schemas::{Kind, ParameterError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
+use std::sync::OnceLock;
 
 /// Most cells: 100 x 100, a matrix of 0.8 GB.
 pub const CELLS_MAX: usize = 10_000;
@@ -39,6 +40,8 @@ pub struct CholeskyParameters {}
 pub struct Cholesky {
     covariance: Covariance,
     tile: Geometry,
+    /// Made once for all realisations.
+    factor: OnceLock<Factor>,
 }
 
 /// Registry entry.
@@ -72,7 +75,7 @@ impl Cholesky {
             );
             return Err(ParameterError::new("size_m", message));
         }
-        Ok(Self { covariance: wanted.clone(), tile: tile.geometry })
+        Ok(Self { covariance: wanted.clone(), tile: tile.geometry, factor: OnceLock::new() })
     }
 
     /// Rows `i` and columns `j` of the covariance matrix, row-major.
@@ -127,7 +130,8 @@ impl Kernel for Cholesky {
         let mut stream = streams.stream("normals");
         let normals: Vec<f64> = (0..self.tile.len()).map(|_| stream.normal()).collect();
         let least = PIVOT_MIN * self.covariance.at_distance(0.0);
-        let factor = Factor::new(self.tile.len().div_ceil(BLOCK), least, |i, j| self.block(i, j));
+        let blocks = self.tile.len().div_ceil(BLOCK);
+        let factor = self.factor.get_or_init(|| Factor::new(blocks, least, |i, j| self.block(i, j)));
         Ok(Made { heights_m: factor.times(&normals), covariance_error_max_m2: None, clip_share: 0.0 })
     }
 }

@@ -181,7 +181,7 @@ fn is_plain_exponential(covariance: &Covariance) -> bool {
 
 /// Sentences about cells too coarse and tiles too small for the covariance.
 pub(super) fn size_notes(covariance: &Covariance, tile: &Geometry, periodic: bool) -> Vec<String> {
-    let ranges = reach::extent(covariance).map(|e| e * covariance.range_m());
+    let ranges = reach::extent(covariance).map(|e| super::tidy(e * covariance.range_m()));
     let ([dx, dy], [width_m, height_m]) = (tile.cell, tile.size());
     let mut notes = Vec::new();
     if let Some((cell_m, range_m)) = [(dx, ranges[0]), (dy, ranges[1])].into_iter().find(|(c, b)| *c > 0.5 * b) {

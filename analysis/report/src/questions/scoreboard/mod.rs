@@ -1,0 +1,116 @@
+//! Which synthesis method to use: all of them on one fit, their covariances beside the one that was asked for.
+
+use super::Question;
+use super::curves::HEIGHT;
+use crate::ReportError;
+use crate::content::{Block, Figure, Numbers, Size, TableBlock, slug};
+use crate::data::Data;
+use crate::render::axis::Axis;
+use crate::render::chart::{Mark, Plot, WIDTH};
+use crate::render::number as set;
+use crate::render::svg::{Paint, Stroke};
+use sastrugi_schemas::tables::{ScoreCovarianceRow, ScoreRow};
+use std::collections::BTreeSet;
+
+/// Registry entry.
+pub const QUESTION: Question = Question {
+    id: "scoreboard",
+    name: "Methods",
+    title: "Which synthesis method makes the covariance that was asked for?",
+    answer,
+};
+
+/// The figure ends where the covariance asked for has fallen to this share.
+const DRAWN_SHARE: f64 = 0.005;
+
+fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
+    let textures: BTreeSet<&str> = data.scoreboard.iter().map(|s| s.texture_id.as_str()).collect();
+    let mut blocks = Vec::new();
+    for texture in textures {
+        let scores: Vec<&ScoreRow> = data.scoreboard.iter().filter(|s| s.texture_id == texture).collect();
+        blocks.push(Block::Heading(format!("Texture {texture}")));
+        blocks.push(Block::Figures(figures(data, texture, &scores)));
+        blocks.push(Block::Table(table(texture, &scores)));
+        let refused = scores.iter().filter(|s| !s.refused.is_empty());
+        blocks.extend(refused.map(|s| Block::Text(format!("{} was not used: {}.", s.method, s.refused))));
+    }
+    Ok(blocks)
+}
+
+fn curve<'a>(data: &'a Data, texture: &str, method: &str) -> Vec<&'a ScoreCovarianceRow> {
+    data.scoreboard_covariance.iter().filter(|r| r.texture_id == texture && r.method == method).collect()
+}
+
+/// One figure per method that was used, on common axes.
+fn figures(data: &Data, texture: &str, scores: &[&ScoreRow]) -> Vec<Figure> {
+    let curves: Vec<(&ScoreRow, Vec<&ScoreCovarianceRow>)> =
+        scores.iter().map(|s| (*s, curve(data, texture, &s.method))).filter(|(_, curve)| !curve.is_empty()).collect();
+    let all = || curves.iter().flat_map(|(_, curve)| curve.iter());
+    let variance = all().map(|r| r.wanted_m2).fold(0.0, f64::max);
+    let far = all().filter(|r| r.wanted_m2 > DRAWN_SHARE * variance).map(|r| r.lag_m).fold(0.0, f64::max);
+    let near = || all().filter(|r| r.lag_m <= far).flat_map(|r| [r.wanted_m2, r.achieved_m2, r.measured_m2]);
+    let (low, high) = (near().fold(0.0, f64::min), near().fold(0.0, f64::max));
+    let x = Axis::linear(0.0, 1.03 * far);
+    let y = Axis::linear(low - 0.04 * (high - low), high + 0.06 * (high - low));
+    curves.iter().map(|(score, curve)| figure(texture, score, curve, x, y)).collect()
+}
+
+fn figure(texture: &str, score: &ScoreRow, curve: &[&ScoreCovarianceRow], x: Axis, y: Axis) -> Figure {
+    let id = slug(&format!("scoreboard-{texture}-{}", score.method));
+    let wanted = Stroke { paint: Paint::Ink, width: 4.5, dash: "", opacity: 0.3 };
+    let achieved = Stroke::new(Paint::Series(1), 2.0);
+    let measured = Stroke::new(Paint::Series(0), 1.8).dashed("4 3");
+    let legend = [
+        (Mark::Line(wanted), "asked for".to_owned()),
+        (Mark::Line(achieved), "on average".to_owned()),
+        (Mark::Line(measured), format!("mean of {} made", score.realisations)),
+    ];
+    let mut plot = Plot::new((WIDTH, HEIGHT + 20.0), (x, "lag, m"), (y, "covariance, m²"), &legend);
+    plot.line([(0.0, 0.0), (x.range().1, 0.0)], Stroke::new(Paint::Muted, 1.0));
+    plot.clip(&format!("{id}-clip"));
+    plot.line(curve.iter().map(|r| (r.lag_m, r.wanted_m2)), wanted);
+    plot.line(curve.iter().map(|r| (r.lag_m, r.achieved_m2)), achieved);
+    plot.line(curve.iter().map(|r| (r.lag_m, r.measured_m2)), measured);
+    plot.svg.close();
+    plot.note(0, &format!("largest error {} %", set::significant(100.0 * score.covariance_error_max, 2)));
+    let names = ["bin", "lag_m", "wanted_m2", "achieved_m2", "measured_m2"];
+    let query = format!("tables/scoreboard_covariance where texture_id = '{texture}' and method = '{}'", score.method);
+    Figure {
+        id,
+        title: format!("{}.", score.method),
+        caption: "Covariance along rows: asked for, given by the method on average, and found in the realisations."
+            .into(),
+        description: format!(
+            "Covariance of method {} against lag; its largest error is {} of the variance.",
+            score.method,
+            set::significant(score.covariance_error_max, 2)
+        ),
+        svg: plot.svg,
+        size: Size::Column,
+        numbers: Numbers::select(query, curve.iter().copied(), &names),
+    }
+}
+
+fn table(texture: &str, scores: &[&ScoreRow]) -> TableBlock {
+    let names = [
+        "method",
+        "covariance_error_max",
+        "covariance_error_rms",
+        "variance_mean",
+        "variance_spread",
+        "ratio_wanted",
+        "ratio_found",
+        "seam_jump_ratio",
+        "operations",
+        "memory_bytes",
+    ];
+    let query = format!("tables/scoreboard where texture_id = '{texture}'");
+    TableBlock {
+        id: slug(&format!("scoreboard-{texture}")),
+        caption: format!(
+            "Methods for {texture}. Errors, variances and their spread are shares of the variance asked for; a seam jump of 1 is \
+             no seam; operations and bytes are predicted."
+        ),
+        numbers: Numbers::select(query, scores.iter().copied(), &names),
+    }
+}

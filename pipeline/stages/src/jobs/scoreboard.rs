@@ -1,0 +1,133 @@
+//! Stage `scoreboard`: all methods of a texture side by side.
+
+use super::texture::Matched;
+use super::{Estimate, Job, JobError, Outcome, Rows, Work};
+use crate::revision::Room;
+use sastrugi_numeric::Streams;
+use sastrugi_schemas::tables::{ScoreCovarianceRow, ScoreRow};
+use sastrugi_texture::synth::scoreboard::{Score, score};
+use serde_json::{Value, json};
+
+/// Name of the stage.
+pub const STAGE: &str = "scoreboard";
+
+/// One method with its parameters.
+pub struct Entrant {
+    /// Method.
+    pub method: String,
+    /// Raw parameters.
+    pub parameters: Value,
+    /// Predicted operations and bytes, unless the method refused the parameters.
+    pub cost: Option<(f64, u64)>,
+}
+
+/// The scoreboard of one texture.
+pub struct ScoreboardJob {
+    /// Id of the texture.
+    pub id: String,
+    /// What the texture matches.
+    pub matched: Matched,
+    /// Methods.
+    pub entrants: Vec<Entrant>,
+    /// Realisations of each.
+    pub realisations: u32,
+    /// Random streams.
+    pub streams: Streams,
+}
+
+impl ScoreboardJob {
+    fn rows(&self, entrant: &Entrant, work: &Work<'_>) -> Result<(ScoreRow, Vec<ScoreCovarianceRow>), JobError> {
+        let fit = self.matched.read(work)?;
+        let scored = sastrugi_texture::prepare(&entrant.method, &entrant.parameters, &fit)
+            .map_err(|e| e.to_string())
+            .and_then(|s| score(s.as_ref(), &self.streams, self.realisations).map_err(|e| e.to_string()));
+        Ok(match scored {
+            Ok(score) => (self.row(entrant, &score), self.curve(entrant, &score)),
+            Err(reason) => (self.refusal(entrant, reason), Vec::new()),
+        })
+    }
+
+    fn row(&self, entrant: &Entrant, score: &Score) -> ScoreRow {
+        ScoreRow {
+            texture_id: self.id.clone(),
+            method: entrant.method.clone(),
+            covariance_error_max: score.error_max,
+            covariance_error_rms: score.error_rms,
+            realisations: i64::from(self.realisations),
+            variance_mean: score.variance_mean,
+            variance_spread: score.variance_spread,
+            ratio_wanted: score.ratio_wanted,
+            ratio_found: score.ratio_found,
+            seam_jump_ratio: score.seam_jump_ratio,
+            operations: score.operations,
+            memory_bytes: score.memory_bytes as f64,
+            refused: String::new(),
+        }
+    }
+
+    fn refusal(&self, entrant: &Entrant, refused: String) -> ScoreRow {
+        let none = f64::NAN;
+        ScoreRow {
+            texture_id: self.id.clone(),
+            method: entrant.method.clone(),
+            covariance_error_max: none,
+            covariance_error_rms: none,
+            realisations: 0,
+            variance_mean: none,
+            variance_spread: none,
+            ratio_wanted: none,
+            ratio_found: none,
+            seam_jump_ratio: none,
+            operations: none,
+            memory_bytes: none,
+            refused,
+        }
+    }
+
+    fn curve(&self, entrant: &Entrant, score: &Score) -> Vec<ScoreCovarianceRow> {
+        let row = |(bin, point): (usize, &sastrugi_texture::synth::scoreboard::CurvePoint)| ScoreCovarianceRow {
+            texture_id: self.id.clone(),
+            method: entrant.method.clone(),
+            bin: bin as i64,
+            lag_m: point.lag_m,
+            wanted_m2: point.wanted_m2,
+            achieved_m2: point.achieved_m2,
+            measured_m2: point.measured_m2,
+        };
+        score.curve.iter().enumerate().map(row).collect()
+    }
+}
+
+impl Job for ScoreboardJob {
+    fn recipe(&self) -> Value {
+        let methods: Vec<Value> =
+            self.entrants.iter().map(|e| json!({ "method": e.method, "params": e.parameters })).collect();
+        json!({ "fit": self.matched.describe(), "methods": methods, "realisations": self.realisations })
+    }
+
+    fn rooms(&self) -> &'static [Room] {
+        &[Room::Roughness, Room::Statistics, Room::Texture]
+    }
+
+    fn memory_bytes(&self) -> u64 {
+        self.entrants.iter().filter_map(|e| e.cost).map(|(_, bytes)| bytes).max().unwrap_or(0)
+    }
+
+    fn estimate(&self) -> Estimate {
+        let operations: f64 = self.entrants.iter().filter_map(|e| e.cost).map(|(operations, _)| operations).sum();
+        // 5e9 operations a second measured, on average over the methods.
+        Estimate { seconds: 2e-10 * operations * f64::from(self.realisations), bytes: 1e5 }
+    }
+
+    fn run(&self, work: &Work<'_>) -> Result<Outcome, JobError> {
+        let mut rows = Rows::default();
+        let mut entrants: Vec<&Entrant> = self.entrants.iter().collect();
+        entrants.sort_by(|a, b| a.method.cmp(&b.method));
+        for entrant in entrants {
+            let (row, curve) = self.rows(entrant, work)?;
+            rows.scoreboard.push(row);
+            rows.scoreboard_covariance.extend(curve);
+        }
+        Ok(Outcome { rows, ..Outcome::default() })
+    }
+}

@@ -1,0 +1,259 @@
+//! All methods side by side on one fit: what each promises, and what a few realisations show.
+//!
+//! * covariance: largest and root mean square difference, over the lags of [`Synthesis::covariance`], between what a method
+//!   gives on average and what was asked for, as shares of the variance;
+//! * variance of each realisation about zero, its mean and spread over all of them, as shares of the variance;
+//! * anisotropy: range across over range along, from the lags at which the mean covariance of the realisations has fallen to
+//!   0.3 of its value at lag 0, in 18 directions; an ellipse is laid through them by least squares;
+//! * seam: mean square step from the last row or column to the first, over that between neighbours inside: 1 without a seam;
+//! * operations and bytes as predicted: measured times differ by machine and are in the benches.
+//!
+//! Source: Vecherin et al. 2022, section 4, whose conclusions this makes a table of. Cost: the realisations, and two
+//! transforms of each.
+
+use super::{LagCovariance, Synthesis, SynthesisError};
+use crate::covariance::{MaskedCovariance, masked_covariance};
+use sastrugi_numeric::{Grid, Streams, sums};
+use std::f64::consts::PI;
+
+/// Share of the covariance at lag 0 whose contour is the ellipse of anisotropy.
+const CONTOUR: f64 = 0.3;
+/// Directions in half a turn.
+const DIRECTIONS: usize = 18;
+/// Lags of a curve that follow each other; further ones are spaced by a tenth.
+const DENSE_LAGS: usize = 40;
+
+/// What a method does on one fit.
+#[derive(Clone, Debug)]
+pub struct Score {
+    /// Largest error of the mean covariance, share of the variance.
+    pub error_max: f64,
+    /// Root mean square error of the mean covariance, share of the variance.
+    pub error_rms: f64,
+    /// Mean of the realisations' variances over the variance asked for.
+    pub variance_mean: f64,
+    /// Standard deviation of the realisations' variances over the variance asked for.
+    pub variance_spread: f64,
+    /// Range across over range along that was asked for.
+    pub ratio_wanted: f64,
+    /// The same as the realisations have it; NaN when the contour leaves half a tile.
+    pub ratio_found: f64,
+    /// Mean square step across the edges over that inside.
+    pub seam_jump_ratio: f64,
+    /// Predicted arithmetic operations of one realisation.
+    pub operations: f64,
+    /// Predicted working memory, bytes.
+    pub memory_bytes: u64,
+    /// Covariance along rows.
+    pub curve: Vec<CurvePoint>,
+}
+
+/// Covariance at a lag along rows, m2.
+#[derive(Clone, Copy, Debug)]
+pub struct CurvePoint {
+    /// Lag, m.
+    pub lag_m: f64,
+    /// Asked for.
+    pub wanted_m2: f64,
+    /// What the method gives on average.
+    pub achieved_m2: f64,
+    /// Mean over the realisations.
+    pub measured_m2: f64,
+}
+
+/// The score of a method over some realisations.
+///
+/// # Errors
+/// See [`SynthesisError`].
+pub fn score(synthesis: &dyn Synthesis, streams: &Streams, realisations: u32) -> Result<Score, SynthesisError> {
+    let lags = synthesis.covariance();
+    let variance_m2 = lags[0].wanted_m2;
+    let errors: Vec<f64> = lags.iter().map(|l| (l.achieved_m2 - l.wanted_m2).abs() / variance_m2).collect();
+    let along_rows = thinned(&lags);
+    let mut tally = Tally { measured: vec![0.0; along_rows.len()], ..Tally::default() };
+    for k in 0..realisations {
+        let grid = synthesis.generate(&streams.child(&format!("realisation-{k}")))?.grid;
+        tally.add(&grid, &along_rows, synthesis.is_periodic());
+    }
+    let share = f64::from(realisations);
+    let curve = along_rows.iter().zip(&tally.measured).map(|((_, lag), sum)| CurvePoint {
+        lag_m: lag.lag_m[0],
+        wanted_m2: lag.wanted_m2,
+        achieved_m2: lag.achieved_m2,
+        measured_m2: sum / share,
+    });
+    Ok(Score {
+        error_max: errors.iter().copied().fold(0.0, f64::max),
+        error_rms: sums::mean(&errors.iter().map(|e| e * e).collect::<Vec<_>>()).sqrt(),
+        variance_mean: sums::mean(&tally.variances) / variance_m2,
+        variance_spread: spread(&tally.variances) / variance_m2,
+        ratio_wanted: synthesis.ratio(),
+        ratio_found: ratio(&tally.maps, synthesis.geometry().cell).unwrap_or(f64::NAN),
+        seam_jump_ratio: tally.seam / tally.inside,
+        operations: synthesis.operations(),
+        memory_bytes: synthesis.memory_bytes(),
+        curve: curve.collect(),
+    })
+}
+
+/// Sums over realisations.
+#[derive(Default)]
+struct Tally {
+    variances: Vec<f64>,
+    measured: Vec<f64>,
+    maps: Vec<MaskedCovariance>,
+    seam: f64,
+    inside: f64,
+}
+
+impl Tally {
+    fn add(&mut self, grid: &Grid, lags: &[(usize, LagCovariance)], periodic: bool) {
+        let squares: Vec<f64> = grid.values.iter().map(|z| z * z).collect();
+        self.variances.push(sums::mean(&squares));
+        self.measured.iter_mut().zip(lags).for_each(|(sum, (cells, _))| *sum += along_rows(grid, *cells, periodic));
+        let half = [grid.rows() / 2, grid.cols() / 2];
+        self.maps.push(masked_covariance(&grid.values, grid.cols(), half));
+        let [seam, inside] = steps(grid);
+        self.seam += seam;
+        self.inside += inside;
+    }
+}
+
+/// Lags along rows that a curve shows, with their cells.
+fn thinned(lags: &[LagCovariance]) -> Vec<(usize, LagCovariance)> {
+    let mut kept: Vec<(usize, LagCovariance)> = Vec::new();
+    for (cells, lag) in lags.iter().enumerate().take_while(|(k, l)| *k == 0 || l.lag_m[0] > 0.0 && l.lag_m[1] == 0.0) {
+        if cells < DENSE_LAGS || kept.last().is_some_and(|(last, _)| 10 * cells >= 11 * last) {
+            kept.push((cells, *lag));
+        }
+    }
+    kept
+}
+
+/// Mean product of cells that far apart in a row; round the edge, where the field is periodic.
+fn along_rows(grid: &Grid, lag: usize, periodic: bool) -> f64 {
+    let pairs = if periodic { grid.cols() } else { grid.cols() - lag };
+    let of_row = |r: usize| {
+        let row = grid.row(r);
+        sums::mean(&(0..pairs).map(|c| row[c] * row[(c + lag) % row.len()]).collect::<Vec<_>>())
+    };
+    sums::mean(&(0..grid.rows()).map(of_row).collect::<Vec<_>>())
+}
+
+/// Mean square step across the edges, and between neighbours inside.
+fn steps(grid: &Grid) -> [f64; 2] {
+    let (rows, cols) = (grid.rows(), grid.cols());
+    let square = |a: (usize, usize), b: (usize, usize)| {
+        let step = grid.at(a.0, a.1) - grid.at(b.0, b.1);
+        step * step
+    };
+    let east = |c: usize| (0..rows).map(move |r| ((r, c), (r, (c + 1) % cols)));
+    let south = |r: usize| (0..cols).map(move |c| ((r, c), ((r + 1) % rows, c)));
+    let mean = |columns: std::ops::Range<usize>, lines: std::ops::Range<usize>| {
+        let pairs = columns.flat_map(east).chain(lines.flat_map(south));
+        sums::mean(&pairs.map(|(a, b)| square(a, b)).collect::<Vec<_>>())
+    };
+    [mean(cols - 1..cols, rows - 1..rows), mean(0..cols - 1, 0..rows - 1)]
+}
+
+/// Standard deviation with n - 1; 0 of one value.
+fn spread(values: &[f64]) -> f64 {
+    let n = values.len() as f64;
+    if n < 2.0 { 0.0 } else { (sums::variance(values) * n / (n - 1.0)).sqrt() }
+}
+
+/// Short over long axis of the contour of the maps' mean; `None` when it leaves them.
+fn ratio(maps: &[MaskedCovariance], [dx, dy]: [f64; 2]) -> Option<f64> {
+    let [max_row, max_col] = maps.first()?.max_lag;
+    let mean = |row: isize, col: isize| {
+        let values: Option<Vec<f64>> = maps.iter().map(|m| m.covariance(row, col)).collect();
+        values.map(|v| sums::mean(&v))
+    };
+    let level = CONTOUR * mean(0, 0)?;
+    // Between four lags, in cells south and east.
+    let at = |south: f64, east: f64| {
+        let (r, c) = (south.floor(), east.floor());
+        let (v, u) = (south - r, east - c);
+        let corner = |i: isize, j: isize| mean(r as isize + i, c as isize + j);
+        Some(
+            (1.0 - v) * ((1.0 - u) * corner(0, 0)? + u * corner(0, 1)?)
+                + v * ((1.0 - u) * corner(1, 0)? + u * corner(1, 1)?),
+        )
+    };
+    let (mut normal, mut right) = ([[0.0; 3]; 3], [0.0; 3]);
+    for k in 0..DIRECTIONS {
+        let (sin, cos) = libm::sincos(PI * k as f64 / DIRECTIONS as f64);
+        let step = 0.25 * dx.min(dy);
+        let along = |n: usize| at(-(n as f64) * step * sin / dy, n as f64 * step * cos / dx);
+        let last = (2.0 * (max_row as f64 * dy + max_col as f64 * dx) / step) as usize;
+        let beyond = (1..last).map_while(|n| along(n).map(|c| (n, c))).find(|(_, c)| *c < level)?.0;
+        let (before, after) = (along(beyond - 1)?, along(beyond)?);
+        let distance = (beyond as f64 - (level - after) / (before - after)) * step;
+        let (x, y) = (distance * cos, distance * sin);
+        let terms = [x * x, 2.0 * x * y, y * y];
+        for i in 0..3 {
+            right[i] += terms[i];
+            (0..3).for_each(|j| normal[i][j] += terms[i] * terms[j]);
+        }
+    }
+    let [a, b, c] = solve(normal, right);
+    let (middle, half) = (0.5 * (a + c), (0.25 * (a - c) * (a - c) + b * b).sqrt());
+    Some(((middle - half) / (middle + half)).sqrt())
+}
+
+/// Three equations by Cramer's rule.
+fn solve(m: [[f64; 3]; 3], right: [f64; 3]) -> [f64; 3] {
+    let det = |m: &[[f64; 3]; 3]| {
+        let minor = |a: usize, b: usize| m[1][a] * m[2][b] - m[1][b] * m[2][a];
+        m[0][0] * minor(1, 2) - m[0][1] * minor(0, 2) + m[0][2] * minor(0, 1)
+    };
+    [0, 1, 2].map(|k| {
+        let mut replaced = m;
+        (0..3).for_each(|row| replaced[row][k] = right[row]);
+        det(&replaced) / det(&m)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::registry::prepare;
+    use sastrugi_schemas::fit::FitFile;
+    use serde_json::{Value, json};
+
+    fn scored(method: &str, parameters: Value) -> Score {
+        let parameters_of_fit = [("sigma_m", 0.05), ("range_m", 0.5)].map(|(k, v)| (k.to_owned(), v)).into();
+        let fit = FitFile { model: "exponential".to_owned(), parameters: parameters_of_fit, ..FitFile::default() };
+        let synthesis = prepare(method, &parameters, &fit).unwrap();
+        score(synthesis.as_ref(), &Streams::for_seed(1, "texture"), 6).unwrap()
+    }
+
+    /// FFT-MA with unit phases: no error, no spread of the variance, no seam (200 x 6 steps of two edges: standard error
+    /// about 5 %, limit 30 %), and the ratio of ranges within 2 % of the one asked for.
+    #[test]
+    fn val_fft_ma_is_exact() {
+        let s = scored("fft_ma", json!({ "size_m": [20.0, 20.0], "ratio": 0.5, "azimuth_deg": 30.0 }));
+        assert!(s.error_max < 1e-12 && s.error_rms < 1e-12 && s.variance_spread < 1e-12, "{s:?}");
+        assert!((s.variance_mean - 1.0).abs() < 1e-12);
+        assert!((s.seam_jump_ratio - 1.0).abs() < 0.3, "{}", s.seam_jump_ratio);
+        assert!((s.ratio_found / 0.5 - 1.0).abs() < 0.05, "{}", s.ratio_found);
+        assert!(s.curve.iter().all(|p| (p.measured_m2 - p.wanted_m2).abs() < 1e-12 * 0.0025));
+    }
+
+    /// Cholesky: exact on average, a seam where its edges meet: steps of `2 C(0)` instead of `2 (C(0) - C(1))`, 5.5 times.
+    #[test]
+    fn stat_cholesky_has_a_seam() {
+        let s = scored("cholesky", json!({ "size_m": [3.0, 2.0] }));
+        assert!(s.error_max < 1e-12 && s.variance_spread > 0.02, "{s:?}");
+        assert!(s.seam_jump_ratio > 2.0, "{}", s.seam_jump_ratio);
+    }
+
+    /// The paper's verdict: Gaussians miss the exponential covariance, quasi-wavelets meet it, FFT-MA costs least.
+    #[test]
+    fn val_the_papers_order() {
+        let size = || json!({ "size_m": [12.0, 12.0] });
+        let [fft, gaussians, quasi] = ["fft_ma", "gaussians", "quasi_wavelets"].map(|m| scored(m, size()));
+        assert!(gaussians.error_max > 0.05 && quasi.error_max < 0.02, "{} {}", gaussians.error_max, quasi.error_max);
+        assert!(fft.operations < quasi.operations);
+    }
+}
