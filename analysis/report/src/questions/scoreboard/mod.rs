@@ -108,7 +108,7 @@ fn table(texture: &str, scores: &[&ScoreRow]) -> TableBlock {
     TableBlock {
         id: slug(&format!("scoreboard-{texture}")),
         caption: format!(
-            "Methods for {texture}. Errors, variances and their spread are shares of the variance asked for; a seam jump of 1 is \
+            "Methods of texture {texture}. Errors, variances and their spread are shares of the variance asked for; a seam jump of 1 is \
              no seam; operations and bytes are predicted."
         ),
         numbers: Numbers::select(query, scores.iter().copied(), &names),

@@ -5,9 +5,8 @@
 //! periodic.
 //!
 //! Source: Vecherin et al. 2022, section 3.2. The factor is made in blocks of [`BLOCK`] cells, column of blocks by column of
-//! blocks; each element is the same sum in the same order on any number of threads. A pivot below 1e-10 of the variance
-//! is none (smooth covariances on fine grids are singular to rounding): its column is left out, an error of at most 1e-4 of
-//! the variance.
+//! blocks; each element is the same sum in the same order on any number of threads. Each cell has 1e-9 of the variance more than
+//! it should ([`JITTER`]): smooth covariances on fine grids are singular to rounding, and a factor without it is not stable.
 //!
 //! Cost, for N cells: `N^3 / 3` operations, `4 N^2` bytes (half of the matrix). 100 x 100 cells are a matrix of 0.8 GB, 0.4 GB
 //! of it kept; more than [`CELLS_MAX`] cells are refused before anything is done. [`super::fft_ma`] gives the same fields at a
@@ -28,8 +27,8 @@ use std::sync::OnceLock;
 pub const CELLS_MAX: usize = 10_000;
 /// Cells per block: a block of 32 kB stays in the first cache.
 const BLOCK: usize = 64;
-/// Pivots below this share of the variance are rounding.
-const PIVOT_MIN: f64 = 1e-10;
+/// White variance added, as a share of the variance.
+const JITTER: f64 = 1e-9;
 
 /// A Cholesky texture has no parameters beside those of its tile.
 #[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
@@ -87,7 +86,8 @@ impl Cholesky {
             block.extend(columns.clone().map(|b| {
                 let east = (a % cols) as f64 - (b % cols) as f64;
                 let south = (a / cols) as f64 - (b / cols) as f64;
-                self.covariance.at([east * dx, -south * dy])
+                let jitter = if a == b { 1.0 + JITTER } else { 1.0 };
+                jitter * self.covariance.at([east * dx, -south * dy])
             }));
         }
         block
@@ -129,9 +129,8 @@ impl Kernel for Cholesky {
     fn make(&self, streams: &Streams) -> Result<Made, SynthesisError> {
         let mut stream = streams.stream("normals");
         let normals: Vec<f64> = (0..self.tile.len()).map(|_| stream.normal()).collect();
-        let least = PIVOT_MIN * self.covariance.at_distance(0.0);
         let blocks = self.tile.len().div_ceil(BLOCK);
-        let factor = self.factor.get_or_init(|| Factor::new(blocks, least, |i, j| self.block(i, j)));
+        let factor = self.factor.get_or_init(|| Factor::new(blocks, |i, j| self.block(i, j)));
         Ok(Made { heights_m: factor.times(&normals), covariance_error_max_m2: None, clip_share: 0.0 })
     }
 }
@@ -143,7 +142,7 @@ struct Factor {
 
 impl Factor {
     /// The factor of the matrix whose block `(i, j)`, `i >= j`, is `matrix(i, j)`.
-    fn new(blocks: usize, least_pivot: f64, matrix: impl Fn(usize, usize) -> Vec<f64> + Sync) -> Self {
+    fn new(blocks: usize, matrix: impl Fn(usize, usize) -> Vec<f64> + Sync) -> Self {
         let mut columns: Vec<Vec<Vec<f64>>> = Vec::with_capacity(blocks);
         for j in 0..blocks {
             let reduced = |i: usize| {
@@ -155,7 +154,7 @@ impl Factor {
             };
             let mut column: Vec<Vec<f64>> = (j..blocks).into_par_iter().map(reduced).collect();
             let (diagonal, below) = column.split_at_mut(1);
-            factorise(&mut diagonal[0], least_pivot);
+            factorise(&mut diagonal[0]);
             below.par_iter_mut().for_each(|block| divide(block, &diagonal[0]));
             columns.push(column);
         }
@@ -198,7 +197,7 @@ fn subtract_product(block: &mut [f64], a: &[f64], b: &[f64]) {
 }
 
 /// Replaces a square block by its lower factor; the rest of it by 0.
-fn factorise(block: &mut [f64], least_pivot: f64) {
+fn factorise(block: &mut [f64]) {
     let n = side(block);
     for j in 0..n {
         for i in 0..n {
@@ -207,7 +206,7 @@ fn factorise(block: &mut [f64], least_pivot: f64) {
             block[i * n + j] = match i.cmp(&j) {
                 std::cmp::Ordering::Less => 0.0,
                 std::cmp::Ordering::Equal => {
-                    if rest > least_pivot {
+                    if rest > 0.0 {
                         rest.sqrt()
                     } else {
                         0.0
@@ -230,7 +229,7 @@ fn divide(block: &mut [f64], lower: &[f64]) {
     }
 }
 
-/// What is left of a column whose pivot was rounding: nothing.
+/// What is left of a column whose pivot is lost to rounding: nothing.
 fn ratio(rest: f64, pivot: f64) -> f64 {
     if pivot > 0.0 { rest / pivot } else { 0.0 }
 }
