@@ -188,7 +188,7 @@ pub struct TextureItem {
     /// Factor of the texture on its base: the id of a raster of factors, or a table by the base's slope.
     #[serde(default)]
     pub modulate: Option<Modulate>,
-    /// Id of a DEM whose cells without data are filled with texture that fits what is around them.
+    /// Id of a DEM whose holes are filled with texture that fits what is around them.
     #[serde(default)]
     pub fill: Option<String>,
     /// Label for statistics.

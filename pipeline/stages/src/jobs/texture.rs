@@ -36,7 +36,7 @@ pub enum Matched {
     /// A fit of the study.
     Item(ItemRef),
     /// A covariance that the study states.
-    Stated(FitFile),
+    Stated(Box<FitFile>),
 }
 
 impl Matched {
@@ -46,7 +46,7 @@ impl Matched {
     /// A file that cannot be read.
     pub fn read(&self, work: &Work<'_>) -> Result<FitFile, JobError> {
         match self {
-            Self::Stated(fit) => Ok(fit.clone()),
+            Self::Stated(fit) => Ok(FitFile::clone(fit)),
             Self::Item(item) => {
                 let bytes = std::fs::read(work.parent(item, fit::FIT)?).map_err(JobError::new)?;
                 serde_json::from_slice(&bytes).map_err(JobError::new)
@@ -74,7 +74,7 @@ impl Matched {
         let parameters = [("sigma_m".to_owned(), 1.0), ("range_m".to_owned(), 1.0)].into();
         let height_quantiles_m = vec![-1.0, 1.0];
         match self {
-            Self::Stated(fit) => fit.clone(),
+            Self::Stated(fit) => FitFile::clone(fit),
             Self::Item(_) => {
                 FitFile { model: "exponential".to_owned(), parameters, height_quantiles_m, ..FitFile::default() }
             }
@@ -245,7 +245,7 @@ fn matched(builder: &Builder<'_>, entry: &Entry<'_>, item: &TextureItem) -> Resu
         FitReference::Stated { model, parameters } => {
             let fit = FitFile { model: model.clone(), parameters: parameters.clone(), ..FitFile::default() };
             Covariance::of_fit(&fit).map_err(|e| entry.refuse(e.within("fit")))?;
-            Ok(Matched::Stated(fit))
+            Ok(Matched::Stated(Box::new(fit)))
         }
     }
 }
@@ -384,7 +384,7 @@ impl TextureJob {
         let dem = dem::read(&work.parent(dem, HEIGHTS)?).map_err(|e| input_error(&e))?;
         let covariance = Covariance::of_fit(fit).map_err(JobError::new)?;
         let filled = conditional::fill(&dem.grid, &covariance, &self.streams).map_err(JobError::new)?;
-        let notes = vec![format!("{} cells without data were filled", filled.cells)];
+        let notes = vec![filled.to_string()];
         self.released(work, &filled.grid, &dem.info.crs, Rows::default(), notes)
     }
 

@@ -98,7 +98,7 @@ fn fill(request: &Request<'_>, path: &Path, fit: &FitFile) -> Result<Value, Erro
     let covariance = Covariance::of_fit(fit).map_err(|e| Error::Input(format!("{}: {e}", request.fit.display())))?;
     let filled = conditional::fill(&dem.grid, &covariance, &streams)
         .map_err(|e| Error::Input(format!("{}: {e}", path.display())))?;
-    notes.push(format!("{} cells without data were filled", filled.cells));
+    notes.push(filled.to_string());
     let lost = dem::write(request.output, &filled.grid, &dem.info.crs, &request.options);
     notes.extend(lost.map_err(super::write_error)?);
     Ok(json!({

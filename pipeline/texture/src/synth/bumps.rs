@@ -166,10 +166,10 @@ impl Torus {
             let y = (bump.row - row as f64) * dy;
             let mut col = west.rem_euclid(cols as i64) as usize;
             let along = bump.height_m * libm::exp(-self.square(class, [0.0, y]));
-            for step in 0..(east - west + 1).max(0) as usize {
-                line[col] += match separable {
-                    true => along * profile[step],
-                    false => bump.height_m * libm::exp(-self.square(class, [x(west + step as i64), y])),
+            for (step, place) in (west..=east).enumerate() {
+                line[col] += match profile.get(step) {
+                    Some(across) => along * across,
+                    None => bump.height_m * libm::exp(-self.square(class, [x(place), y])),
                 };
                 col = if col + 1 == cols { 0 } else { col + 1 };
             }

@@ -6,7 +6,8 @@
 //!
 //! K is kriging with a plane as drift, because the fitted covariance is that of the texture and the background beneath
 //! it is not known: weights w with `sum of w_j C(h_ij) + drift = C(h_i0)`, `sum of w_j f(x_j) = f(x_0)` for `f = 1, x, y`. A
-//! hole that is open to one side has the mean alone as drift: planes run away there. The cells that are used lie in
+//! hole that is open to one side has the mean alone as drift: planes run away there. Cells with data in fewer than
+//! [`ENCLOSED`] directions lie outside of what was measured rather than in a hole of it, and stay without data. The cells that are used lie in
 //! [`RAYS`] directions from the one that is filled, the first [`PER_RAY`] with data in each: those farther away are screened.
 //!
 //! Source: Journel and Huijbregts 1978, Mining Geostatistics, section VII.A; Chiles and Delfiner 2012, Geostatistics, sections
@@ -47,6 +48,8 @@ const RAYS: [[isize; 2]; 16] = [
 const PER_RAY: usize = 3;
 /// Directions that must hold data for a plane as drift.
 const SURROUNDED: usize = 13;
+/// Directions that must hold data for a cell to be filled.
+const ENCLOSED: usize = 9;
 /// Share of the variance that two cells are taken to differ by at least, so that smooth covariances can be solved.
 const JITTER: f64 = 1e-9;
 
@@ -57,6 +60,18 @@ pub struct Filled {
     pub grid: Grid,
     /// Cells that were filled.
     pub cells: usize,
+    /// Cells that stay without data: there is none around them.
+    pub left: usize,
+}
+
+impl std::fmt::Display for Filled {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} cells without data were filled", self.cells)?;
+        if self.left > 0 {
+            write!(f, "; {} stay without: there is no data around them", self.left)?;
+        }
+        Ok(())
+    }
 }
 
 /// Why a surface cannot be filled.
@@ -76,7 +91,7 @@ impl From<ParameterError> for FillError {
     }
 }
 
-/// The surface with every cell without data (NaN) filled.
+/// The surface with the cells of its holes (NaN, data around) filled.
 ///
 /// # Errors
 /// A surface without data; one too large for an unconditional field.
@@ -90,8 +105,9 @@ pub fn fill(dem: &Grid, covariance: &Covariance, streams: &Streams) -> Result<Fi
     let fill_one = |k: &usize| estimate(dem, &unconditional, &covariance, [k / dem.cols(), k % dem.cols()]);
     let filled: Vec<f64> = holes.par_iter().map(fill_one).collect();
     let mut grid = dem.clone();
-    holes.iter().zip(filled).for_each(|(k, z)| grid.values[*k] = z);
-    Ok(Filled { grid, cells: holes.len() })
+    let left = filled.iter().filter(|z| z.is_nan()).count();
+    holes.iter().zip(&filled).for_each(|(k, z)| grid.values[*k] = *z);
+    Ok(Filled { grid, cells: holes.len() - left, left })
 }
 
 /// A normal field with the covariance on the cells of the DEM, from a torus so wide that its edges do not know each other.
@@ -131,15 +147,13 @@ fn neighbours(dem: &Grid, [row, col]: [usize; 2]) -> (Vec<[usize; 2]>, usize) {
     (cells, hit)
 }
 
-/// Height of one cell of a hole.
+/// Height of one cell of a hole; NaN outside of what was measured.
 fn estimate(dem: &Grid, unconditional: &Grid, covariance: &Covariance, at: [usize; 2]) -> f64 {
     let (cells, hit) = neighbours(dem, at);
     let [dx, dy] = dem.geometry.cell;
     let here = unconditional.at(at[0], at[1]);
-    if cells.is_empty() {
-        // No direction holds data: the mean of all that is measured stands in for the hole's surroundings.
-        let measured = sastrugi_numeric::sums::finite(&dem.values);
-        return sastrugi_numeric::sums::mean(&measured) + here;
+    if hit < ENCLOSED {
+        return f64::NAN;
     }
     let n = cells.len();
     let drift = if hit >= SURROUNDED && n >= 8 { 3 } else { 1 };
@@ -266,10 +280,13 @@ mod tests {
     #[test]
     fn val_open_holes_and_empty_surfaces() {
         let mut dem = surface(3);
-        (0..20).flat_map(|r| (0..40).map(move |c| r * 40 + c)).for_each(|k| dem.values[k] = f64::NAN);
+        // A bay that is open to the west has data in nine directions near its east end; what lies south does not count.
+        (10..14).flat_map(|r| (0..20).map(move |c| r * 40 + c)).for_each(|k| dem.values[k] = f64::NAN);
+        (30..40).flat_map(|r| (0..40).map(move |c| r * 40 + c)).for_each(|k| dem.values[k] = f64::NAN);
         let streams = Streams::for_seed(1, "texture");
-        let filled = fill(&dem, &exponential(), &streams).unwrap().grid;
-        assert!(filled.values.iter().all(|z| z.abs() < 1.0));
+        let filled = fill(&dem, &exponential(), &streams).unwrap();
+        assert!(filled.grid.at(12, 18).is_finite() && filled.grid.at(38, 20).is_nan());
+        assert_eq!((filled.cells + filled.left, filled.grid.finite_count()), (480, 1120 + filled.cells));
         let empty = Grid::filled(dem.geometry, f64::NAN);
         assert_eq!(fill(&empty, &exponential(), &streams).unwrap_err(), FillError::NoData);
     }

@@ -232,10 +232,10 @@ fn axes_ratio(points: &[[f64; 2]]) -> f64 {
     let (mut normal, mut right) = ([[0.0; 3]; 3], [0.0; 3]);
     for [x, y] in points {
         let terms = [x * x, 2.0 * x * y, y * y];
-        for i in 0..3 {
+        (0..3).for_each(|i| {
             right[i] += terms[i];
             (0..3).for_each(|j| normal[i][j] += terms[i] * terms[j]);
-        }
+        });
     }
     let [a, b, c] = solve(normal, right);
     let (middle, half) = (0.5 * (a + c), (0.25 * (a - c) * (a - c) + b * b).sqrt());

@@ -189,8 +189,8 @@ fn subtract_product(block: &mut [f64], a: &[f64], b: &[f64]) {
             let (b0, rest) = four.split_at(columns);
             let (b1, rest) = rest.split_at(columns);
             let (b2, b3) = rest.split_at(columns);
-            for j in 0..columns {
-                sum[j] -= factors[0] * b0[j] + factors[1] * b1[j] + factors[2] * b2[j] + factors[3] * b3[j];
+            for ((((s, x0), x1), x2), x3) in sum.iter_mut().zip(b0).zip(b1).zip(b2).zip(b3) {
+                *s -= factors[0] * x0 + factors[1] * x1 + factors[2] * x2 + factors[3] * x3;
             }
         }
     }

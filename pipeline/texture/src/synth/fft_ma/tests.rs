@@ -107,10 +107,10 @@ fn val_anisotropy_is_recovered() {
             let distance = -libm::log(c / covariance[0]);
             let (x, y) = (0.1 * east as f64, -0.1 * south as f64);
             let terms = [x * x, 2.0 * x * y, y * y];
-            for i in 0..3 {
+            (0..3).for_each(|i| {
                 right[i] += terms[i] * distance * distance;
                 (0..3).for_each(|j| normal[i][j] += terms[i] * terms[j]);
-            }
+            });
         }
         let [a, b, c] = solve3(normal, right);
         // The larger eigenvalue's direction is across the long axis, here counter-clockwise from east.

@@ -178,9 +178,9 @@ fn match_variances(torus: &Torus, classes: &mut [Class], lags: &[[f64; 2]], want
 fn non_negative_least_squares(gram: &[Vec<f64>], right: &[f64]) -> Vec<f64> {
     let mut x = vec![0.0; right.len()];
     for _ in 0..ROUNDS {
-        for k in 0..x.len() {
-            let slope: f64 = gram[k].iter().zip(&x).map(|(g, v)| g * v).sum::<f64>() - right[k];
-            x[k] = f64::max(0.0, x[k] - slope / gram[k][k]);
+        for (k, (row, wanted)) in gram.iter().zip(right).enumerate() {
+            let slope = row.iter().zip(&x).map(|(g, v)| g * v).sum::<f64>() - wanted;
+            x[k] = f64::max(0.0, x[k] - slope / row[k]);
         }
     }
     x
