@@ -134,14 +134,12 @@ fn val_textures_are_tiled_shaped_and_fill_holes() {
         let made = ok_json(path, &[&["texture", "own.json", "--method", method, "-o", "m.tif"], &size[..]].concat());
         assert_eq!(made["grid"]["cols"], 60, "{method}");
     }
-    // Nine values around a hole.
-    write(
-        path,
-        "holed.asc",
-        "ncols 3\nnrows 3\nxllcorner 0\nyllcorner 0\ncellsize 0.05\nnodata_value -9999\n1 1.01 1\n1.02 -9999 1\n1 1 0.99\n",
-    );
+    // 24 values around a hole.
+    let rows = ["1 1.01 1 1 1.02"; 2].join("\n");
+    let head = "ncols 5\nnrows 5\nxllcorner 0\nyllcorner 0\ncellsize 0.05\nnodata_value -9999";
+    write(path, "holed.asc", &format!("{head}\n{rows}\n1 1.02 -9999 1 0.99\n{rows}\n"));
     let filled = ok_json(path, &["texture", "own.json", "--fill", "holed.asc", "-o", "filled.asc"]);
-    assert_eq!((filled["filled_cells"].as_u64(), filled["grid"]["valid"].as_u64()), (Some(1), Some(9)));
+    assert_eq!((filled["filled_cells"].as_u64(), filled["grid"]["valid"].as_u64()), (Some(1), Some(25)));
 }
 
 #[test]
