@@ -9,7 +9,7 @@
 //! whatever the kind of place (Campbell 1909): A follows from the variance that is wanted, and C is exact on average. The
 //! field is nearly normal: excess kurtosis `1 / (pi n a a_across)`.
 //!
-//! Cost: every bump adds to the cells within [`CUT`] half axes. Rows are summed in bands, each over all bumps in their order,
+//! Cost: every bump adds to the cells within 4.5 half axes. Rows are summed in bands, each over all bumps in their order,
 //! so that bits do not depend on threads. Memory: 32 bytes per bump of one class.
 
 use rayon::prelude::*;

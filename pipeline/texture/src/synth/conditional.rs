@@ -7,8 +7,8 @@
 //! K is kriging with a plane as drift, because the fitted covariance is that of the texture and the background beneath
 //! it is not known: weights w with `sum of w_j C(h_ij) + drift = C(h_i0)`, `sum of w_j f(x_j) = f(x_0)` for `f = 1, x, y`. A
 //! hole that is open to one side has the mean alone as drift: planes run away there. Cells with data in fewer than
-//! [`ENCLOSED`] directions lie outside of what was measured rather than in a hole of it, and stay without data. The cells that are used lie in
-//! [`RAYS`] directions from the one that is filled, the first [`PER_RAY`] with data in each: those farther away are screened.
+//! nine directions lie outside of what was measured rather than in a hole of it, and stay without data. The cells that are used lie in
+//! 16 directions from the one that is filled, the first three with data in each: those farther away are screened.
 //!
 //! Source: Journel and Huijbregts 1978, Mining Geostatistics, section VII.A; Chiles and Delfiner 2012, Geostatistics, sections
 //! 3.4 and 7.3. A self-affine covariance is made as its stationary twin over the DEM's longer side.

@@ -23,7 +23,7 @@ const BOUND: f64 = 8.0;
 /// Quantiles that are kept of a measured surface.
 const QUANTILES: usize = 101;
 
-/// Heights at [`QUANTILES`] equally spaced probabilities from 0 to 1, m; none where there are no heights (NaN).
+/// Heights at 101 equally spaced probabilities from 0 to 1, m; none where there are no heights (NaN).
 pub fn quantiles_m(heights_m: &[f64]) -> Vec<f64> {
     let mut heights = sums::finite(heights_m);
     heights.sort_by(f64::total_cmp);

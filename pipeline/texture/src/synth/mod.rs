@@ -8,7 +8,7 @@
 //! 2022, section 3.2) is not offered: it needs the matrix that [`cholesky`] needs, and stratifying each cell's values over
 //! an ensemble does nothing for the one surface that is wanted.
 
-mod bumps;
+pub mod bumps;
 pub mod cholesky;
 pub mod conditional;
 pub mod fft_ma;

@@ -4,9 +4,9 @@
 //! covariances of all pairs of cells. Exact on average on any grid, for any covariance, and in no need of a torus: hence not
 //! periodic.
 //!
-//! Source: Vecherin et al. 2022, section 3.2. The factor is made in blocks of [`BLOCK`] cells, column of blocks by column of
+//! Source: Vecherin et al. 2022, section 3.2. The factor is made in blocks of 64 cells, column of blocks by column of
 //! blocks; each element is the same sum in the same order on any number of threads. Each cell has 1e-9 of the variance more than
-//! it should ([`JITTER`]): smooth covariances on fine grids are singular to rounding, and a factor without it is not stable.
+//! it should: smooth covariances on fine grids are singular to rounding, and a factor without it is not stable.
 //!
 //! Cost, for N cells: `N^3 / 3` operations, `4 N^2` bytes (half of the matrix). 100 x 100 cells are a matrix of 0.8 GB, 0.4 GB
 //! of it kept; more than [`CELLS_MAX`] cells are refused before anything is done. [`super::fft_ma`] gives the same fields at a
