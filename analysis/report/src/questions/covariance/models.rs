@@ -17,7 +17,7 @@ const CANDIDATES_MAX: usize = 6;
 /// Rise of the sum of squares at the edge of a 95 % interval (chi-squared, one degree of freedom).
 const EDGE: f64 = 3.84;
 /// Highest rise that is drawn over the edge of the interval.
-const RISE_MAX: f64 = 8.0;
+const RISE_MAX: f64 = 4.0;
 /// Dashes that tell lines apart without colour.
 const DASHES: [&str; 6] = ["", "7 4", "2 3", "9 3 2 3", "4 2", "12 4"];
 

@@ -16,15 +16,15 @@ const ROWS: [Row; 15] = [
     ("kurtosis Sku", "1", |s| s.sku),
     ("peak Sp", "m", |s| s.sp_m),
     ("pit Sv", "m", |s| s.sv_m),
-    ("peak over pit Sz", "m", |s| s.sz_m),
+    ("relief Sz", "m", |s| s.sz_m),
     ("RMS slope Sdq", "1", |s| s.sdq),
-    ("RMS slope, east-west", "1", |s| s.rms_slope_x),
-    ("RMS slope, north-south", "1", |s| s.rms_slope_y),
-    ("autocorrelation length Sal", "m", |s| s.sal_m),
+    ("RMS slope, E-W", "1", |s| s.rms_slope_x),
+    ("RMS slope, N-S", "1", |s| s.rms_slope_y),
+    ("length Sal", "m", |s| s.sal_m),
     ("aspect ratio Str", "1", |s| s.aspect_ratio),
     ("direction Std", "deg", |s| s.direction_deg),
     ("Hurst exponent", "1", |s| s.hurst_exponent),
-    ("its standard error", "1", |s| s.hurst_standard_error),
+    ("standard error", "1", |s| s.hurst_standard_error),
 ];
 
 /// Id under which a texture's stage stores what the fit would see of it.
@@ -72,7 +72,7 @@ fn rounded(value: f64, name: &str) -> Cell {
     match (value.is_finite(), name) {
         (false, _) => number(value),
         (true, "direction Std") => text(set::fixed(value, 0)),
-        (true, "its standard error") => text(set::significant(value, 2)),
+        (true, "standard error") => text(set::significant(value, 2)),
         (true, "skewness Ssk") => text(set::fixed(value, 3)),
         (true, _) => text(set::significant(value, 3)),
     }
