@@ -7,35 +7,26 @@
 
 use divan::Bencher;
 use divan::counter::ItemsCount;
+use sastrugi_benches::floor;
 use sastrugi_numeric::Streams;
 use sastrugi_numeric::fft::RealFft2;
 use sastrugi_schemas::fit::FitFile;
 use serde_json::{Value, json};
-use std::process::Command;
 
 const SIZES: [usize; 2] = [2048, 4096];
 
 fn main() {
     for n in SIZES {
-        match numpy_seconds(n) {
-            Some([whole, alone]) => println!(
+        match floor("fft_ma.py", &[&n.to_string()]).as_deref() {
+            Some(&[whole, alone]) => println!(
                 "numpy rfft2 FFT-MA {n}: {:.0} ms, the field alone from amplitudes at hand {:.0} ms",
                 1e3 * whole,
                 1e3 * alone
             ),
-            None => println!("numpy rfft2 FFT-MA {n}: python3 with numpy is not there"),
+            _ => println!("numpy rfft2 FFT-MA {n}: no Python with numpy"),
         }
     }
     divan::main();
-}
-
-/// The fastest of five runs of numpy, in a process of its own with one thread: the whole, and without its amplitudes.
-fn numpy_seconds(n: usize) -> Option<[f64; 2]> {
-    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/floors/fft_ma.py");
-    let run = Command::new("python3").args([script, &n.to_string()]).env("OMP_NUM_THREADS", "1").output().ok()?;
-    let words = String::from_utf8(run.stdout).ok()?;
-    let seconds: Option<Vec<f64>> = words.split_whitespace().map(|w| w.parse().ok()).collect();
-    seconds?.try_into().ok()
 }
 
 /// The floor: one inverse real transform.

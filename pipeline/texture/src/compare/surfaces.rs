@@ -9,7 +9,7 @@ use crate::covariance::form::{Role, half_turn};
 use crate::covariance::{Covariance, Form, LagBins, masked_covariance};
 use crate::fit::FitError;
 use crate::fit::case::Case;
-use crate::fit::estimator::{Estimate, Estimator, Likelihood, ordinary};
+use crate::fit::estimator::{Estimate, Estimator, Likelihood, Refits, ordinary};
 use crate::fit::resampling::{self, Part, upper_p};
 use crate::fit::simulate::{Shape, Simulator};
 use crate::fit::survey::{Detrended, Trim};
@@ -144,6 +144,7 @@ impl<'a> Side<'a> {
         let [round, long] = [(&self.rings, &self.round), (&self.directions, &self.long)]
             .map(|(estimator, own)| centred(estimator, &own.form, covariance));
         let freedom = (self.rings.bins.len().saturating_sub(round.at.len())).max(1) as f64;
+        let (round_refits, long_refits) = (self.rings.refits(&round), self.directions.refits(&long));
         (0..count)
             .into_par_iter()
             .map(|k| {
@@ -155,10 +156,10 @@ impl<'a> Side<'a> {
                 let mut trimmed = residual;
                 trim.apply(&mut trimmed);
                 let estimate = masked_covariance(&trimmed, part.cols, case.max_lag);
-                let refit = |estimator: &Estimator, from: &Estimate| {
-                    estimator.refit(from, &means(&estimator.bins.bin_sums(&estimate)), trim.threshold_m)
+                let refit = |estimator: &Estimator, refits: &Refits| {
+                    refits.to(&means(&estimator.bins.bin_sums(&estimate)), trim.threshold_m)
                 };
-                let (near, far) = (refit(&self.rings, &round), refit(&self.directions, &long));
+                let (near, far) = (refit(&self.rings, &round_refits), refit(&self.directions, &long_refits));
                 let shrink = |found: &[f64], centre: &[f64]| -> Vec<f64> {
                     found.iter().zip(centre).map(|(f, c)| c + part.scale * (f - c)).collect()
                 };

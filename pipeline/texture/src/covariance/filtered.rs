@@ -69,6 +69,11 @@ impl DetrendFilter {
         Self { shape, cell_m, measurement, fft, response }
     }
 
+    /// How the surface was measured.
+    pub fn measurement(&self) -> Measurement {
+        self.measurement
+    }
+
     /// Covariance of the measured surface.
     pub fn measured_covariance(&self, model: &Covariance) -> LagField {
         let mut values = torus_covariance(self.shape, self.cell_m, model);

@@ -8,7 +8,7 @@
 //! for. Pairs and cells follow a low-discrepancy sequence (Kronecker with powers of the generalised golden ratio: Roberts,
 //! 2018): nothing is random.
 
-use super::bins::{LagBins, Member};
+use super::bins::{LagBins, Member, length_m};
 use super::filtered::LagField;
 use crate::bitmap::Bitmap;
 use crate::detrend::BoxWindow;
@@ -87,12 +87,55 @@ impl PartialWindows {
 
     /// What is added in each bin for a surface with the covariance `measured`, m2.
     pub fn correction(&self, measured: &LagField) -> Vec<f64> {
-        if self.weights.iter().all(Vec::is_empty) {
+        if self.is_empty() {
             return vec![0.0; self.weights.len()];
         }
         let [rows, cols] = self.reach;
         let covariance: Vec<f64> = (0..=rows).flat_map(|r| (-cols..=cols).map(move |c| measured.at([r, c]))).collect();
         self.weights.iter().map(|line| line.iter().zip(&covariance).map(|(w, c)| w * c).sum()).collect()
+    }
+
+    /// The same for surfaces whose covariance depends on the distance only, on cells of `cell_m`.
+    pub fn by_distance(&self, cell_m: [f64; 2]) -> ByDistance {
+        let step_m = cell_m[0].min(cell_m[1]) / STEPS_PER_CELL;
+        let [rows, cols] = self.reach;
+        let longest = length_m([rows, cols], cell_m);
+        let nodes = (longest / step_m) as usize + 2;
+        let spread = |line: &Vec<f64>| {
+            let mut weights = vec![0.0; if line.is_empty() { 0 } else { nodes }];
+            let lags = (0..=rows).flat_map(|r| (-cols..=cols).map(move |c| [r, c]));
+            for (lag, weight) in lags.zip(line) {
+                let place = length_m(lag, cell_m) / step_m;
+                let (node, part) = (place as usize, fraction(place));
+                weights[node] += (1.0 - part) * weight;
+                weights[node + 1] += part * weight;
+            }
+            weights
+        };
+        ByDistance { step_m, weights: self.weights.iter().map(spread).collect() }
+    }
+
+    fn is_empty(&self) -> bool {
+        self.weights.iter().all(Vec::is_empty)
+    }
+}
+
+/// Nodes per cell between which a covariance is taken for a straight line: for a range of four cells that errs by 1e-4 of
+/// the correction.
+const STEPS_PER_CELL: f64 = 8.0;
+
+/// [`PartialWindows`] as weights of the covariance by distance: some hundred numbers instead of some ten thousand.
+pub struct ByDistance {
+    step_m: f64,
+    weights: Vec<Vec<f64>>,
+}
+
+impl ByDistance {
+    /// What is added in each bin for a surface with this covariance at a distance in m, m2.
+    pub fn correction(&self, covariance_m2: impl Fn(f64) -> f64) -> Vec<f64> {
+        let nodes = self.weights.iter().map(Vec::len).max().unwrap_or(0);
+        let at: Vec<f64> = (0..nodes).map(|k| covariance_m2(k as f64 * self.step_m)).collect();
+        self.weights.iter().map(|line| line.iter().zip(&at).map(|(w, c)| w * c).sum()).collect()
     }
 }
 

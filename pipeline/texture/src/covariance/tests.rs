@@ -242,7 +242,10 @@ fn partial_windows_case(missing: impl Fn(usize, usize) -> bool, range_m: f64) ->
     let filter = filtered::DetrendFilter::new(window, [1.0; 2], [4; 2], Measurement::default());
     let measured = filter.measured_covariance(&model);
     let complete = bins.average(|lag| filter.residual_covariance(&measured).at(lag));
-    let added = partial::PartialWindows::new(&cells, window, &bins, partial::PAIRS_FINE).correction(&measured);
+    let windows = partial::PartialWindows::new(&cells, window, &bins, partial::PAIRS_FINE);
+    let added = windows.correction(&measured);
+    let by_distance = windows.by_distance([1.0; 2]).correction(|d| model.at_distance(d));
+    added.iter().zip(&by_distance).for_each(|(a, b)| assert!((a - b).abs() < 1e-4, "{a} {b}"));
     let fast = complete.iter().zip(&added).map(|(a, b)| a + b).collect();
 
     let squares: Vec<f64> = (0..=800).map(|s| model.at_distance(f64::from(s).sqrt())).collect();

@@ -2,7 +2,7 @@
 
 use super::case::Case;
 use super::expectation::Expectation;
-use super::least_squares::{Cholesky, Minimum, curvature, minimise};
+use super::least_squares::{self, Cholesky, Chord, Minimum, curvature, minimise, slopes};
 use crate::covariance::bins::length_m;
 use crate::covariance::filtered::DetrendFilter;
 use crate::covariance::form::Role;
@@ -95,9 +95,11 @@ impl<'a> Estimator<'a> {
 
     fn with_pairs(case: &'a Case<'a>, bins: &'a LagBins, pairs: f64) -> Self {
         let measurement = case.settings.measurement();
+        let partial = PartialWindows::new(&case.survey.cells(), case.window, bins, pairs);
         let expectation = Expectation {
             filter: DetrendFilter::new(case.window, case.geometry.cell, case.max_lag, measurement),
-            partial: PartialWindows::new(&case.survey.cells(), case.window, bins, pairs),
+            partial_by_distance: partial.by_distance(case.geometry.cell),
+            partial,
             bins,
             cells: case.survey.detrended,
         };
@@ -165,13 +167,16 @@ impl<'a> Estimator<'a> {
         }
     }
 
-    /// The fit to other data in the same bins, with the weights of an estimate and from it; for resampling.
-    pub fn refit(&self, estimate: &Estimate, data: &[f64], threshold_m: f64) -> Minimum {
-        let coordinates = self.case.coordinates(&estimate.form);
+    /// Fits to other data in the same bins, with the weights of an estimate and from it; for resampling.
+    pub fn refits<'e>(&'e self, estimate: &'e Estimate) -> Refits<'e> {
         let weights = estimate.likelihood.as_ref().map(|l| &l.weights);
-        minimise(&estimate.at, &coordinates.bounds(), |p| {
-            self.whitened(&self.expectation.mean(&coordinates.decode(p), threshold_m), weights, data)
-        })
+        let slopes = slopes(&estimate.at, |p| self.misfit(&estimate.form, p, weights, &self.bins.covariance_m2));
+        Refits { estimator: self, estimate, chord: Chord::new(slopes) }
+    }
+
+    /// One of [`Self::refits`].
+    pub fn refit(&self, estimate: &Estimate, data: &[f64], threshold_m: f64) -> Minimum {
+        self.refits(estimate).to(data, threshold_m)
     }
 
     /// The fit with one coordinate held at `value` and the others fitted again; `None` without a likelihood.
@@ -193,10 +198,32 @@ impl<'a> Estimator<'a> {
             // sigma^2 / b is what the data tells best.
             start[0] += 0.5 * (held - estimate.at[coordinate]);
         }
-        let end = minimise(&start, &open, |others| {
+        let end = least_squares::least(&start, &open, |others| {
             self.misfit(&estimate.form, &whole(others), Some(&likelihood.weights), &self.bins.covariance_m2)
         });
         Some(Held { rise: (end.value - likelihood.chi2).max(0.0), at: whole(&end.at) })
+    }
+}
+
+/// Fits to resampled data: a few steps with the slopes at the estimate, and a full search where these do not get there.
+pub struct Refits<'e> {
+    estimator: &'e Estimator<'e>,
+    estimate: &'e Estimate,
+    chord: Option<Chord>,
+}
+
+impl Refits<'_> {
+    /// The fit to these bins, trimmed at `threshold_m`.
+    pub fn to(&self, data: &[f64], threshold_m: f64) -> Minimum {
+        let Self { estimator, estimate, chord } = self;
+        let coordinates = estimator.case.coordinates(&estimate.form);
+        let weights = estimate.likelihood.as_ref().map(|l| &l.weights);
+        let residuals = |p: &[f64]| {
+            estimator.whitened(&estimator.expectation.mean(&coordinates.decode(p), threshold_m), weights, data)
+        };
+        let bounds = coordinates.bounds();
+        let near = chord.as_ref().and_then(|chord| chord.minimise(&estimate.at, &bounds, residuals));
+        near.unwrap_or_else(|| minimise(&estimate.at, &bounds, residuals))
     }
 }
 

@@ -15,8 +15,8 @@
 
 use crate::covariance::Covariance;
 use crate::covariance::bins::{LagBins, Member};
-use crate::covariance::filtered::{DetrendFilter, LagField};
-use crate::covariance::partial::PartialWindows;
+use crate::covariance::filtered::{DetrendFilter, LagField, Measurement};
+use crate::covariance::partial::{ByDistance, PartialWindows};
 use crate::covariance::trimmed::TrimmedNormal;
 
 /// Lags that stand for a bin in the covariance of the bins.
@@ -32,6 +32,8 @@ pub struct Expectation<'a> {
     pub filter: DetrendFilter,
     /// What partial windows change.
     pub partial: PartialWindows,
+    /// The same for models without a direction, of sharp surfaces.
+    pub partial_by_distance: ByDistance,
     /// The bins of the data.
     pub bins: &'a LagBins,
     /// Number of residuals before trimming.
@@ -43,7 +45,7 @@ impl Expectation<'_> {
     pub fn mean(&self, model: &Covariance, threshold_m: f64) -> Vec<f64> {
         let measured = self.filter.measured_covariance(model);
         let residual = self.filter.residual_covariance(&measured);
-        let partial = self.partial.correction(&measured);
+        let partial = self.correction(model, &measured);
         let variance = residual.at([0, 0]) + partial[0];
         let trimmed = trimmed(variance, threshold_m);
         let mut mean = vec![0.0; self.bins.len()];
@@ -51,6 +53,18 @@ impl Expectation<'_> {
             mean[m.bin] += m.weight * variance * trimmed.covariance((residual.at(m.lag) + partial[m.bin]) / variance);
         }
         mean
+    }
+
+    /// What partial windows add in each bin, m2.
+    fn correction(&self, model: &Covariance, measured: &LagField) -> Vec<f64> {
+        let Measurement { inner_scale_m, noise_sigma_m } = self.filter.measurement();
+        if inner_scale_m > 0.0 || !model.is_isotropic() {
+            return self.partial.correction(measured);
+        }
+        self.partial_by_distance.correction(|distance_m| {
+            let noise_m2 = if distance_m == 0.0 { noise_sigma_m * noise_sigma_m } else { 0.0 };
+            model.at_distance(distance_m) + noise_m2
+        })
     }
 
     /// Covariance of the bins' estimates, row-major, m4.

@@ -2,8 +2,10 @@
 
 /// Largest number of steps.
 const STEPS: usize = 60;
-/// Relative fall of the sum of squares below which the search ends.
+/// Relative fall of the sum of squares below which a search ends.
 const TOLERANCE: f64 = 1e-12;
+/// The same where the sum is wanted, not the parameters.
+const ROUGH_TOLERANCE: f64 = 1e-6;
 /// Step of the difference quotients: parameters are logarithms, so this is relative.
 const DIFFERENCE: f64 = 1e-6;
 
@@ -21,7 +23,16 @@ pub struct Minimum {
 /// Minimises the sum of squared `residuals(p)` by Levenberg (1944) and Marquardt (1963), with forward differences, from
 /// `start`, inside `bounds` (steps are cut to them).
 pub fn minimise(start: &[f64], bounds: &[(f64, f64)], residuals: impl Fn(&[f64]) -> Vec<f64>) -> Minimum {
-    let squares = |r: &[f64]| r.iter().map(|v| v * v).sum::<f64>();
+    search(start, bounds, TOLERANCE, residuals)
+}
+
+/// As [`minimise`], to a millionth of the sum.
+pub fn least(start: &[f64], bounds: &[(f64, f64)], residuals: impl Fn(&[f64]) -> Vec<f64>) -> Minimum {
+    search(start, bounds, ROUGH_TOLERANCE, residuals)
+}
+
+fn search(start: &[f64], bounds: &[(f64, f64)], tolerance: f64, residuals: impl Fn(&[f64]) -> Vec<f64>) -> Minimum {
+    let squares = |r: &[f64]| dot(r, r);
     let mut at = start.to_vec();
     let mut current = residuals(&at);
     let (mut damping, mut steps) = (1e-3, 0);
@@ -42,7 +53,7 @@ pub fn minimise(start: &[f64], bounds: &[(f64, f64)], residuals: impl Fn(&[f64])
         let Some((trial, there)) = improved else { break };
         let fall = squares(&current) - squares(&there);
         (at, current) = (trial, there);
-        if fall <= TOLERANCE * squares(&current) {
+        if fall <= tolerance * squares(&current) {
             break;
         }
     }
@@ -57,16 +68,92 @@ pub fn curvature(at: &[f64], residuals: impl Fn(&[f64]) -> Vec<f64>) -> Vec<f64>
 
 /// `J'J` (row-major) and `J'r`.
 fn normal_equations(at: &[f64], r: &[f64], residuals: impl Fn(&[f64]) -> Vec<f64>) -> (Vec<f64>, Vec<f64>) {
-    let slope = |k: usize| -> Vec<f64> {
-        let mut moved = at.to_vec();
-        moved[k] += DIFFERENCE;
-        residuals(&moved).iter().zip(r).map(|(a, b)| (a - b) / DIFFERENCE).collect()
-    };
-    let slopes: Vec<Vec<f64>> = (0..at.len()).map(slope).collect();
-    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
+    let slopes = slopes_from(at, r, residuals);
     let normal = slopes.iter().flat_map(|a| slopes.iter().map(move |b| dot(a, b))).collect();
     let gradient = slopes.iter().map(|a| dot(a, r)).collect();
     (normal, gradient)
+}
+
+/// The columns of J at a point.
+pub fn slopes(at: &[f64], residuals: impl Fn(&[f64]) -> Vec<f64>) -> Vec<Vec<f64>> {
+    slopes_from(at, &residuals(at), &residuals)
+}
+
+fn slopes_from(at: &[f64], here: &[f64], residuals: impl Fn(&[f64]) -> Vec<f64>) -> Vec<Vec<f64>> {
+    let slope = |k: usize| -> Vec<f64> {
+        let mut moved = at.to_vec();
+        moved[k] += DIFFERENCE;
+        residuals(&moved).iter().zip(here).map(|(a, b)| (a - b) / DIFFERENCE).collect()
+    };
+    (0..at.len()).map(slope).collect()
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(x, y)| x * y).sum()
+}
+
+/// Most steps of a chord search.
+const CHORD_STEPS: usize = 12;
+/// A chord search with the slopes of elsewhere ends when no parameter moves more, one with its own slopes thereafter.
+const CHORD_CONVERGED: [f64; 2] = [1e-2, 1e-6];
+
+/// Gauss-Newton steps with slopes that are taken once, for many problems that lie near to each other: one evaluation a
+/// step. Where residuals stay, slopes of elsewhere lead beside the minimum; so slopes are taken once more near it.
+pub struct Chord {
+    slopes: Vec<Vec<f64>>,
+    normal: Cholesky,
+}
+
+impl Chord {
+    /// From the columns of J; `None` when parameters cannot be told apart.
+    pub fn new(slopes: Vec<Vec<f64>>) -> Option<Self> {
+        let normal: Vec<f64> = slopes.iter().flat_map(|a| slopes.iter().map(move |b| dot(a, b))).collect();
+        let normal = Cholesky::new(&normal, slopes.len())?;
+        Some(Self { slopes, normal })
+    }
+
+    /// Minimises the sum of squared `residuals(p)` from `start`; `None` when that takes many steps, does not fall, or leads to
+    /// a bound.
+    pub fn minimise(
+        &self,
+        start: &[f64],
+        bounds: &[(f64, f64)],
+        residuals: impl Fn(&[f64]) -> Vec<f64>,
+    ) -> Option<Minimum> {
+        let near = self.descend(start, bounds, CHORD_CONVERGED[0], &residuals)?;
+        let own = Self::new(slopes(&near.at, &residuals))?;
+        own.descend(&near.at, bounds, CHORD_CONVERGED[1], &residuals)
+    }
+
+    fn descend(
+        &self,
+        start: &[f64],
+        bounds: &[(f64, f64)],
+        converged: f64,
+        residuals: impl Fn(&[f64]) -> Vec<f64>,
+    ) -> Option<Minimum> {
+        let mut at = start.to_vec();
+        let mut here = residuals(&at);
+        for steps in 1..=CHORD_STEPS {
+            let gradient: Vec<f64> = self.slopes.iter().map(|s| dot(s, &here)).collect();
+            let step = self.normal.solve(&gradient);
+            let next: Vec<f64> = at.iter().zip(&step).map(|(a, s)| a - s).collect();
+            if next.iter().zip(bounds).any(|(v, (low, high))| !(*low < *v && *v < *high)) {
+                return None;
+            }
+            let there = residuals(&next);
+            let moved = step.iter().fold(0.0, |m: f64, s| m.max(s.abs()));
+            let (before, value) = (dot(&here, &here), dot(&there, &there));
+            if moved <= converged {
+                return Some(Minimum { value, at: next, steps });
+            }
+            if value > before {
+                return None;
+            }
+            (at, here) = (next, there);
+        }
+        None
+    }
 }
 
 fn damped_step(at: &[f64], bounds: &[(f64, f64)], normal: &[f64], gradient: &[f64], damping: f64) -> Vec<f64> {
@@ -135,5 +222,31 @@ impl Cholesky {
         let unit = |k: usize| (0..self.n).map(|i| f64::from(u8::from(i == k))).collect::<Vec<f64>>();
         // Symmetric: columns are rows.
         (0..self.n).flat_map(|k| self.solve(&unit(k))).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A curve that its parameters bend, with data off it: both searches end at the same minimum.
+    #[test]
+    fn val_chords_end_where_the_search_does() {
+        let curve = |p: &[f64], x: f64| libm::exp(p[0]) * libm::exp(-x / libm::exp(p[1]));
+        let data: Vec<f64> =
+            (0..12).map(|k| curve(&[0.1, -0.2], 0.2 * f64::from(k)) + 0.05 * f64::from(k % 3)).collect();
+        let residuals =
+            |p: &[f64]| -> Vec<f64> { data.iter().enumerate().map(|(k, d)| curve(p, 0.2 * k as f64) - d).collect() };
+        let bounds = [(-5.0, 5.0), (-5.0, 5.0)];
+        let exact = minimise(&[0.0, 0.0], &bounds, residuals);
+        let start = [exact.at[0] + 0.1, exact.at[1] - 0.1];
+        let chord = Chord::new(slopes(&start, residuals)).unwrap();
+        let near = chord.minimise(&start, &bounds, residuals).unwrap();
+        for k in 0..2 {
+            assert!((near.at[k] - exact.at[k]).abs() < 1e-4, "{:?} {:?}", near.at, exact.at);
+        }
+        assert!((near.value / exact.value - 1.0).abs() < 1e-6);
+        let tight = [(start[0] - 0.01, start[0] + 0.01), (-5.0, 5.0)];
+        assert!(chord.minimise(&start, &tight, residuals).is_none());
     }
 }

@@ -53,6 +53,10 @@ pub struct FitParameters {
     pub max_lag_m: Option<f64>,
     /// Cells count when more than this share of their window has data. Default 0.5; 0.9 in `paper` mode.
     pub min_valid_share: Option<f64>,
+    /// Whether objects (trees, rocks, structures) are found and left out before the moving average. Default true. Of a bare
+    /// site whose heights are not normal (gullies, dunes) it takes the steepest parts away: set it to false there. `paper`
+    /// mode looks for none.
+    pub find_outliers: bool,
     /// Replicates of the parametric bootstrap that gives intervals; 0 for none. Default 99. `paper` mode has none.
     pub bootstrap: u32,
     /// Standard deviation of the Gaussian point spread that blurred the DEM (photogrammetry's smoothing), m. Default 0.
@@ -84,6 +88,7 @@ impl Default for FitParameters {
             model: "exponential".to_owned(),
             max_lag_m: None,
             min_valid_share: None,
+            find_outliers: true,
             bootstrap: 99,
             inner_scale_m: 0.0,
             noise_sigma_m: 0.0,
@@ -163,6 +168,10 @@ impl FitSettings {
     pub(super) fn at_outer_scale(&self, outer_scale_m: f64) -> Self {
         let parameters = FitParameters { outer_scale_m, max_lag_m: None, ..self.parameters.clone() };
         Self { parameters, ..self.clone() }
+    }
+
+    pub(super) fn find_outliers(&self) -> bool {
+        self.parameters.find_outliers && self.mode() == Mode::Corrected
     }
 
     pub(super) fn trim(&self) -> f64 {

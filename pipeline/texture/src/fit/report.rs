@@ -215,11 +215,12 @@ impl Figures {
         let told = sill_over_range(&estimate.covariance)?;
         (self.naive_range_windows > NAIVE_RANGE_MAX).then(|| {
             format!(
-                "b is not identifiable from this window: the uncorrected fit gives {:.3} m, {:.2} of the window of {:.3} m, \
-                 where every exponential ends up near 0.135 or below; sigma^2 / b = {told:.4e} m is what the data tells",
-                naive.covariance.range_m(),
+                "b is not identifiable from this window: the uncorrected fit gives {} m, {:.2} of the window of {} m, where \
+                 every exponential ends up near 0.135 or below; sigma^2 / b = {} m is what the data tells",
+                figure(naive.covariance.range_m()),
                 self.naive_range_windows,
-                case.window_m(),
+                figure(case.window_m()),
+                figure(told),
             )
         })
     }
@@ -229,10 +230,13 @@ impl Figures {
         let coordinate = estimate.coordinate(Role::Range(0))?;
         let (_, end) = case.coordinates(&estimate.form).bounds()[coordinate];
         if estimate.at[coordinate] > end - 1e-3 {
-            return Some(format!("b = {b:.3} m is where the search ends: all that the data tells is that b is long"));
+            return Some(format!(
+                "b = {} m is where the search ends: all that the data tells is that b is long",
+                figure(b)
+            ));
         }
         let flat = self.rise_at_3b(findings)? < LIKELIHOOD_RISE;
-        flat.then(|| format!("the likelihood is flat: b = {b:.3} m cannot be told from {:.3} m", 3.0 * b))
+        flat.then(|| format!("the likelihood is flat: b = {} m cannot be told from {} m", figure(b), figure(3.0 * b)))
     }
 
     fn misfit_warning(&self, case: &Case, estimate: &Estimate, findings: &Findings) -> Option<String> {
@@ -252,11 +256,18 @@ impl Figures {
         let outliers = (case.survey.measured - self.trusted) as f64 / case.survey.measured as f64;
         (outliers > OUTLIER_SHARE_MAX).then(|| {
             format!(
-                "{:.1} % of the measured cells were taken for outliers; a site with that many objects is better masked by hand",
+                "{:.1} % of the measured cells were taken for outliers: objects are better masked by hand, and a bare site fitted \
+                 with find_outliers = false",
                 100.0 * outliers
             )
         })
     }
+}
+
+/// A positive figure to four digits.
+fn figure(value: f64) -> String {
+    let decimals = 3.0 - libm::floor(libm::log10(value));
+    format!("{value:.*}", decimals.clamp(0.0, 12.0) as usize)
 }
 
 fn separation_warning(findings: &Findings) -> Option<String> {

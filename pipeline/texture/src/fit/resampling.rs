@@ -64,6 +64,7 @@ pub fn parametric(estimator: &Estimator, estimate: &Estimate, count: usize, stre
     let simulator = Simulator::new(&estimate.covariance, measurement, shape, case.geometry.cell, outer_m);
     let freedom = (estimator.bins.len() - estimate.at.len()).max(1) as f64;
     let scale = part.scale;
+    let refits = estimator.refits(estimate);
     let results: Vec<(Vec<f64>, f64, f64)> = (0..count)
         .into_par_iter()
         .map(|k| {
@@ -73,7 +74,7 @@ pub fn parametric(estimator: &Estimator, estimate: &Estimate, count: usize, stre
             let trim = Trim::of(&Sizes::of(&residual), case.settings);
             trim.apply(&mut residual);
             let sums = estimator.bins.bin_sums(&masked_covariance(&residual, part.cols, case.max_lag));
-            let end = estimator.refit(estimate, &means(&sums), trim.threshold_m);
+            let end = refits.to(&means(&sums), trim.threshold_m);
             let at = end.at.iter().zip(&estimate.at).map(|(a, e)| e + scale * (a - e)).collect();
             // A smaller part scatters more: its sum of squares is larger by the square of the scale.
             (at, end.value * scale * scale / freedom, trim.median_size_m / trim.threshold_m)
@@ -201,13 +202,14 @@ pub fn block_replicates(
     };
     // Pairs across blocks are missing: deviations are taken from what all blocks once give.
     let once: Vec<usize> = (0..blocks.len()).collect();
-    let centre = estimator.refit(estimate, &together(&once), threshold_m).at;
+    let refits = estimator.refits(estimate);
+    let centre = refits.to(&together(&once), threshold_m).at;
     (0..BLOCK_REPLICATES * count)
         .into_par_iter()
         .map(|k| {
             let mut stream: Stream = streams.stream(&format!("blocks-{k}"));
             let chosen: Vec<usize> = once.iter().map(|_| stream.below(blocks.len() as u64) as usize).collect();
-            let at = estimator.refit(estimate, &together(&chosen), threshold_m).at;
+            let at = refits.to(&together(&chosen), threshold_m).at;
             at.iter().zip(&centre).zip(&estimate.at).map(|((a, c), e)| e + scale * (a - c)).collect()
         })
         .collect()

@@ -212,9 +212,9 @@ impl Reading<'_> {
         for strip in self.strips() {
             let wide = self.widened(&strip, margin, rows);
             let heights = self.part(wide.clone(), 0..cols)?;
-            let outlier = match self.settings.mode() {
-                Mode::Paper => Vec::new(),
-                Mode::Corrected => outliers::find(&heights, cols, self.window),
+            let outlier = match self.settings.find_outliers() {
+                true => outliers::find(&heights, cols, self.window),
+                false => Vec::new(),
             };
             let own = (strip.start - wide.start) * cols..(strip.end - wide.start) * cols;
             for (k, z) in heights[own.clone()].iter().enumerate() {
