@@ -37,12 +37,24 @@ impl<'a> Case<'a> {
         }
         let window = settings.window(&geometry, profiles)?;
         let max_lag_m = settings.max_lag_m(&geometry);
+        let [width_m, height_m] = geometry.size();
+        let half_m = 0.5 * if profiles { width_m } else { width_m.min(height_m) };
+        if max_lag_m > half_m {
+            let message =
+                format!("is {max_lag_m} m; pairs at more than half the DEM's side, {half_m} m, are too few to tell");
+            return Err(ParameterError::new("max_lag_m", message).into());
+        }
         let cells = |axis: usize| (max_lag_m / geometry.cell[axis] * (1.0 + 1e-9)) as usize;
         let max_lag = [if profiles { 0 } else { cells(1) }, cells(0)];
         let survey = Survey::new(heights, settings, window, max_lag)?;
         let bins = LagBins::of(&survey.covariance, geometry.cell, max_lag_m, Layout::ISOTROPIC);
         if bins.len() < BINS_MIN {
             return Err(FitError::TooFewLags { found: bins.len(), needed: BINS_MIN });
+        }
+        let (noise_m, residual_m) = (settings.measurement().noise_sigma_m, bins.covariance_m2[0].sqrt());
+        if noise_m >= residual_m {
+            let message = format!("is {noise_m} m; the whole residual has a standard deviation of {residual_m:.3e} m");
+            return Err(ParameterError::new("noise_sigma_m", message).into());
         }
         Ok(Self { heights, settings, geometry, window, max_lag, max_lag_m, survey, bins })
     }

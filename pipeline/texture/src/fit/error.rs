@@ -73,6 +73,12 @@ pub enum FitError {
         /// Larger cell size, m.
         cell_m: f64,
     },
+    /// The model's covariance cannot be computed where the search ended.
+    #[error("no {model} model could be fitted: heights, noise or ranges are too large or too small to compute with")]
+    NoFit {
+        /// Covariance model.
+        model: String,
+    },
     /// Too few distances.
     #[error("pairs of cells were found at {found} distances only; a fit needs at least {needed}")]
     TooFewLags {

@@ -9,7 +9,8 @@ pub trait Heights: Sync {
     /// Shape and place; cells in m.
     fn geometry(&self) -> Geometry;
 
-    /// Heights in m of some rows and columns, row-major; not finite where there is no data.
+    /// Heights in m of some rows and columns, row-major; not finite where there is no data. A fit asks from one thread, and
+    /// never from a job of the thread pool.
     ///
     /// # Errors
     /// What keeps the part from being read, as a sentence.

@@ -86,7 +86,7 @@ pub fn fit(heights: &dyn Heights, settings: &FitSettings, streams: &Streams) -> 
         Mode::Paper => paper(&case, &naive)?,
         Mode::Corrected => corrected(&case, &naive, streams)?,
     };
-    let (rows, cols) = middle(&case.geometry);
+    let (rows, cols) = middle(&case);
     // The shape of the heights is that before trimming.
     let residual = case.survey.detrended(heights, settings, rows, cols)?.residual;
     let fit = FitFile { height_quantiles_m: quantiles_m(&residual), ..fit };
@@ -106,9 +106,16 @@ fn corrected(case: &Case, naive: &Estimate, streams: &Streams) -> Result<FitFile
     let directional = settings.forms.iter().any(Form::is_anisotropic);
     // Models with and without an axis are compared on the same bins.
     let bins = if directional { &by_direction } else { &case.bins };
+    let needed = 1 + settings.forms.iter().map(|f| f.parameters().len()).max().unwrap_or(0);
+    if bins.len() < needed {
+        return Err(FitError::TooFewLags { found: bins.len(), needed });
+    }
     let estimator = Estimator::new(case, bins);
     let estimates = estimator.candidates(naive);
     let Some(estimate) = best(&estimates) else { return Err(FitError::TooFewLags { found: bins.len(), needed: 3 }) };
+    if estimator.mean(&estimate.covariance).iter().any(|m| !m.is_finite()) {
+        return Err(FitError::NoFit { model: estimate.form.name().to_owned() });
+    }
     refuse_white(case, estimate)?;
 
     let replicates =
@@ -130,7 +137,7 @@ fn corrected(case: &Case, naive: &Estimate, streams: &Streams) -> Result<FitFile
         isotropy: rough.as_ref().and_then(|rough| verdicts::isotropy(rough, estimate)),
         stationarity: verdicts::stationarity(&estimator, estimate, &blocks),
         misfit_p: verdicts::misfit_p(estimate, replicates.as_ref()),
-        normality_p: replicates.as_ref().map(|r| verdicts::normality_p(case, r)),
+        normality_p: replicates.as_ref().and_then(|r| verdicts::normality_p(case, r)),
         directions: rough.map_or_else(Vec::new, |rough| report::directions(&rough, estimate)),
     };
     let rings = match directional {
@@ -152,20 +159,19 @@ fn refuse_white(case: &Case, estimate: &Estimate) -> Result<(), FitError> {
 
 /// The part of a DEM that is fitted again at other windows: all of it, or its middle.
 fn examined(case: &Case) -> Result<Box<dyn Heights>, FitError> {
-    let (rows, cols) = middle(&case.geometry);
+    let (rows, cols) = middle(case);
     let geometry = case.geometry.window(rows.start, cols.start, rows.len(), cols.len());
     let part = Grid::new(geometry, case.heights.part(rows, cols).map_err(FitError::Unreadable)?);
     Ok(if case.heights.are_profiles() { Box::new(Profiles::of(part)) } else { Box::new(part) })
 }
 
-/// Rows and columns of all of a raster, or of as much about its middle as is looked at twice.
-fn middle(geometry: &Geometry) -> (Range<usize>, Range<usize>) {
-    let share = (resampling::CELLS_MAX as f64 / geometry.len() as f64).sqrt().min(1.0);
-    let span = |n: usize| {
-        let width = ((n as f64 * share) as usize).max(1);
-        (n - width) / 2..(n - width) / 2 + width
-    };
-    (span(geometry.rows), span(geometry.cols))
+/// Rows and columns of all of a raster, or of as much about its middle as is looked at twice, wide enough for windows of
+/// twice the size.
+fn middle(case: &Case) -> (Range<usize>, Range<usize>) {
+    let Geometry { rows, cols, .. } = case.geometry;
+    let [height, width] = resampling::shrunk([rows, cols], case.window.cells().map(|w| 7 * w));
+    let span = |n: usize, part: usize| (n - part) / 2..(n - part) / 2 + part;
+    (span(rows, height), span(cols, width))
 }
 
 #[cfg(test)]

@@ -68,6 +68,8 @@ pub struct FitParameters {
 /// What `auto` tries.
 const AUTO: [&str; 7] =
     ["exponential", "gaussian", "spherical", "matern", "self_affine", "exponential+nugget", "exponential+gaussian"];
+/// Fewest replicates of which 2.5 % is one.
+const BOOTSTRAP_MIN: u32 = 39;
 /// Most replicates.
 const BOOTSTRAP_MAX: u32 = 100_000;
 /// Outer scale of the paper, m.
@@ -113,6 +115,11 @@ impl TryFrom<FitParameters> for FitSettings {
         if let Some(lag) = parameters.max_lag_m {
             ParameterError::positive("max_lag_m", lag)?;
         }
+        if parameters.inner_scale_m >= parameters.outer_scale_m {
+            let (inner, outer) = (parameters.inner_scale_m, parameters.outer_scale_m);
+            let message = format!("is {inner} m, not below the outer scale of {outer} m");
+            return Err(ParameterError::new("inner_scale_m", message));
+        }
         let share_default = if parameters.mode == Mode::Paper { 0.9 } else { 0.5 };
         let share = parameters.min_valid_share.unwrap_or(share_default);
         if !(0.0..1.0).contains(&share) {
@@ -120,14 +127,25 @@ impl TryFrom<FitParameters> for FitSettings {
         }
         ParameterError::not_negative("inner_scale_m", parameters.inner_scale_m)?;
         ParameterError::not_negative("noise_sigma_m", parameters.noise_sigma_m)?;
-        if parameters.bootstrap > BOOTSTRAP_MAX {
-            let message = format!("is {}; at most {BOOTSTRAP_MAX} replicates are made", parameters.bootstrap);
+        if parameters.bootstrap > 0 && !(BOOTSTRAP_MIN..=BOOTSTRAP_MAX).contains(&parameters.bootstrap) {
+            let message = format!(
+                "is {}; it is 0 (no intervals) or {BOOTSTRAP_MIN} to {BOOTSTRAP_MAX}: fewer say nothing at 95 %",
+                parameters.bootstrap
+            );
             return Err(ParameterError::new("bootstrap", message));
         }
         let forms = forms(&parameters.model)?;
         if parameters.mode == Mode::Paper && (forms.len() > 1 || forms[0].is_anisotropic()) {
             let message = format!("is `{}`; the published procedure fits one isotropic model", parameters.model);
             return Err(ParameterError::new("model", message));
+        }
+        if parameters.mode == Mode::Paper && !forms[0].unit().is_stationary() {
+            let message = format!("is `{}`, which has no variance; the published procedure fits one", parameters.model);
+            return Err(ParameterError::new("model", message));
+        }
+        if parameters.mode == Mode::Paper && (parameters.inner_scale_m > 0.0 || parameters.noise_sigma_m > 0.0) {
+            let message = "is `paper`, which knows neither an inner scale nor noise; leave them out or fit `corrected`";
+            return Err(ParameterError::new("mode", message));
         }
         Ok(Self { parameters, forms, min_valid_share: share })
     }

@@ -12,7 +12,7 @@
 //! A range whose profile likelihood (`profile.rs`) is open at an end, or that replicates cannot tell from the end of the search, has its
 //! interval from the profile: replicates of a surface whose range nobody can tell say little.
 //!
-//! Rasters of more than [`CELLS_MAX`] cells are examined on a part of that size, and the deviations scaled by the square root
+//! Rasters of more than [`CELLS_MAX`] cells are examined on a part of that size (or three windows each way), and the deviations scaled by the square root
 //! of the share of residuals in it.
 
 use super::FitError;
@@ -62,7 +62,7 @@ pub fn parametric(estimator: &Estimator, estimate: &Estimate, count: usize, stre
     let outer_m = 8.0 * case.window_m();
     let measurement = case.settings.measurement();
     let simulator = Simulator::new(&estimate.covariance, measurement, shape, case.geometry.cell, outer_m);
-    let freedom = (estimator.bins.len() - estimate.at.len()).max(1) as f64;
+    let freedom = estimator.bins.len().saturating_sub(estimate.at.len()).max(1) as f64;
     let scale = part.scale;
     let refits = estimator.refits(estimate);
     let results: Vec<(Vec<f64>, f64, f64)> = (0..count)
@@ -105,8 +105,7 @@ impl Part {
     /// The whole, or a window about the middle with as much of it as may be.
     pub fn of(case: &Case) -> Self {
         let (rows, cols) = (case.geometry.rows, case.geometry.cols);
-        let shrink = (CELLS_MAX as f64 / (rows * cols) as f64).sqrt().min(1.0);
-        let part = [rows, cols].map(|n| ((n as f64 * shrink) as usize).max(3 * case.window.cells()[0]).min(n));
+        let part = shrunk([rows, cols], case.window.cells().map(|w| 3 * w));
         let places = places([rows, cols], part)
             .into_iter()
             .map(|at| (at, case.survey.used_count(at[0]..at[0] + part[0], at[1]..at[1] + part[1])));
@@ -115,6 +114,16 @@ impl Part {
         let scale = (used.max(1) as f64 / case.survey.detrended.max(1) as f64).sqrt().min(1.0);
         Self { rows: part[0], cols: part[1], mask, scale }
     }
+}
+
+/// Sides of a part of about [`CELLS_MAX`] cells at most, of the raster's proportions unless a side would fall below its
+/// floor; the whole where that is less.
+pub fn shrunk(shape: [usize; 2], floor: [usize; 2]) -> [usize; 2] {
+    let share = (CELLS_MAX as f64 / (shape[0] as f64 * shape[1] as f64)).sqrt().min(1.0);
+    let side = |k: usize, wanted: usize| wanted.max(floor[k]).clamp(1, shape[k]);
+    let [rows, cols] = [0, 1].map(|k| side(k, (shape[k] as f64 * share) as usize));
+    // A side that was kept at its floor leaves less to the other.
+    [side(0, rows.min(CELLS_MAX / cols)), side(1, cols.min(CELLS_MAX / rows))]
 }
 
 /// Up to 3 x 3 places of a part, the middle first.
@@ -155,27 +164,29 @@ pub fn blocks(case: &Case, bins: &LagBins, with_pairs: bool) -> Result<Vec<Block
     };
     let span = |axis: usize, index: usize| {
         let [from, to] = [index, index + 1].map(|k| k * shape[axis] / along[axis]);
-        let cut = (to - from).saturating_sub(BLOCK_SIDE_MAX) / 2;
+        let cut = (to - from).saturating_sub(BLOCK_SIDE_MAX.max(2 * width[axis])) / 2;
         from + cut..to - cut
     };
-    let places: Vec<[usize; 2]> = (0..along[0]).flat_map(|r| (0..along[1]).map(move |c| [r, c])).collect();
-    let all = places
-        .into_par_iter()
-        .map(|[r, c]| {
-            let (rows, cols) = (span(0, r), span(1, c));
-            let part = case.trimmed(rows, cols.clone())?;
-            let data = sums::finite(&part);
-            let sums = match with_pairs {
-                true => bins.bin_sums(&masked_covariance(&part, cols.len(), case.max_lag)),
-                false => Vec::new(),
-            };
-            let squares: Vec<f64> = data.iter().map(|r| r * r).collect();
-            Ok(Block { cells: data.len() as u64, squares_m2: sums::sum(&squares), sums })
-        })
-        .collect::<Result<Vec<Block>, FitError>>()?;
-    let full: Vec<Block> =
-        all.into_iter().filter(|b| b.cells > 0 && b.sums.iter().all(|(_, pairs)| *pairs > 0)).collect();
-    Ok(if full.len() < BLOCKS_MIN { Vec::new() } else { full })
+    let block = |(part, cols): &(Vec<f64>, usize)| {
+        let data = sums::finite(part);
+        let sums = match with_pairs {
+            true => bins.bin_sums(&masked_covariance(part, *cols, case.max_lag)),
+            false => Vec::new(),
+        };
+        let squares: Vec<f64> = data.iter().map(|r| r * r).collect();
+        Block { cells: data.len() as u64, squares_m2: sums::sum(&squares), sums }
+    };
+    let mut all: Vec<Block> = Vec::new();
+    for r in 0..along[0] {
+        // Heights are read by one thread.
+        let parts = (0..along[1]).map(|c| Ok((case.trimmed(span(0, r), span(1, c))?, span(1, c).len())));
+        let parts = parts.collect::<Result<Vec<_>, FitError>>()?;
+        all.par_extend(parts.par_iter().map(block));
+    }
+    // A block of less than a window's cells tells nothing.
+    let least = case.window.area() as u64;
+    all.retain(|b| b.cells >= least && b.sums.iter().all(|(_, pairs)| *pairs > 0));
+    Ok(if all.len() < BLOCKS_MIN { Vec::new() } else { all })
 }
 
 /// Search coordinates of resampled blocks.

@@ -314,7 +314,7 @@ fn stat_transects_are_fitted_in_one_dimension() {
     transects[3].truncate(250);
     transects[5][100..120].fill(f64::NAN);
     let profiles = Profiles::new(CELL_M, &transects).unwrap();
-    let fit = fit(&profiles, &with_bootstrap("exponential", 19), &streams()).unwrap().fit;
+    let fit = fit(&profiles, &with_bootstrap("exponential", 39), &streams()).unwrap().fit;
     let (sigma_m, range_m) = (fit.parameters["sigma_m"], fit.parameters["range_m"]);
     assert!((sigma_m / 0.1 - 1.0).abs() < 0.05 && (range_m / 0.28 - 1.0).abs() < 0.1, "{sigma_m} {range_m}");
     assert!(fit.directions.is_empty() && fit.intervals.is_some() && fit.block_intervals.is_some());
@@ -461,7 +461,7 @@ fn val_models_are_recovered() {
 #[test]
 fn val_a_full_fit_has_intervals_and_verdicts() {
     let dem = field(0.15, 256, CELL_M, 4);
-    let fit = fit(&dem, &with_bootstrap("auto", 39), &streams()).unwrap().fit;
+    let fit = fit(&dem, &with_bootstrap("auto", 99), &streams()).unwrap().fit;
     assert_eq!(fit.candidates.len(), 7);
     assert_eq!(fit.candidates[0].aicc_above_best, Some(0.0));
     let exponential = fit.candidates.iter().find(|c| c.model == "exponential").unwrap();

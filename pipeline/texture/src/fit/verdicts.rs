@@ -12,6 +12,8 @@ use sastrugi_schemas::fit::Candidate;
 use sastrugi_statistics::normal;
 use serde_json::{Value, json};
 
+/// Replicates without which no p-value of 1 % comes about.
+const REPLICATES_MIN: usize = 99;
 /// Standard errors that two windows may differ by. Both see the same surface, so that their difference scatters less than
 /// this test takes it to.
 const WINDOWS_Z: f64 = 2.58;
@@ -114,15 +116,19 @@ pub fn chi_squared_upper(chi2: f64, freedom: f64) -> f64 {
 pub fn misfit_p(estimate: &Estimate, replicates: Option<&Replicates>) -> Option<f64> {
     let ratio = estimate.misfit_ratio()?;
     let freedom = (estimate.likelihood.as_ref()?.bins.saturating_sub(estimate.at.len())) as f64;
-    Some(match replicates {
+    Some(match replicates.filter(|r| r.misfit_ratio.len() >= REPLICATES_MIN) {
         Some(r) => upper_p(ratio, &r.misfit_ratio),
         None => chi_squared_upper(ratio * freedom, freedom),
     })
 }
 
-/// p-value of the residual's shape: its median size over the trimming threshold, against normal surfaces.
-pub fn normality_p(case: &Case, replicates: &Replicates) -> f64 {
-    two_sided_p(case.survey.trim.median_size_m / case.survey.trim.threshold_m, &replicates.median_over_threshold)
+/// p-value of the residual's shape: its median size over the trimming threshold, against normal surfaces. `None` where they
+/// are too few to tell.
+pub fn normality_p(case: &Case, replicates: &Replicates) -> Option<f64> {
+    let enough = replicates.median_over_threshold.len() >= REPLICATES_MIN;
+    enough.then(|| {
+        two_sided_p(case.survey.trim.median_size_m / case.survey.trim.threshold_m, &replicates.median_over_threshold)
+    })
 }
 
 /// Every model tried, the best first.

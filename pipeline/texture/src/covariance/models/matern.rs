@@ -49,9 +49,10 @@ impl Model for Matern {
 const ALIASES: i32 = 4;
 
 /// Eigenvalue of the covariance of unit variance on cells of `cell_m`, at an angular wavenumber `[east, north]` in rad per
-/// m: the spectral density `nu b^2 / pi (1 + b^2 k^2)^(-nu - 1)` with what is above half a wave per cell folded back, the far
+/// m, for a covariance whose long axis lies at `axis = [sin, cos]` of the azimuth and whose range across is `ratio` times that
+/// along: the spectral density `nu b^2 / pi (1 + b^2 k^2)^(-nu - 1)` with what is above half a wave per cell folded back, the far
 /// part of it as an integral. Positive whatever the torus, unlike the transform of a covariance cut to it.
-pub fn eigenvalue(k: [f64; 2], range_m: f64, nu: f64, cell_m: [f64; 2]) -> f64 {
+pub fn eigenvalue(k: [f64; 2], range_m: f64, nu: f64, cell_m: [f64; 2], [sin, cos]: [f64; 2], ratio: f64) -> f64 {
     use std::f64::consts::PI;
     let b2 = range_m * range_m;
     let density = |k2: f64| {
@@ -64,13 +65,15 @@ pub fn eigenvalue(k: [f64; 2], range_m: f64, nu: f64, cell_m: [f64; 2]) -> f64 {
         .flat_map(|i| (-ALIASES..=ALIASES).map(move |j| [f64::from(i), f64::from(j)]))
         .map(|[i, j]| {
             let [x, y] = [k[0] + i * turn[0], k[1] + j * turn[1]];
-            density(x * x + y * y)
+            // Across the long axis distances are stretched by 1 / ratio, wavenumbers shrunk.
+            let (along, across) = (x * sin + y * cos, (x * cos - y * sin) * ratio);
+            density(along * along + across * across)
         })
         .sum();
     // Beyond a square of as many wavenumbers as a circle of this radius.
     let radius2 = (2.0 * f64::from(ALIASES) + 1.0) * (2.0 * f64::from(ALIASES) + 1.0) * turn[0] * turn[1] / PI;
-    let far = libm::exp(-nu * libm::log1p(b2 * radius2));
-    near * nu * b2 / PI * turn[0] * turn[1] + far
+    let far = libm::exp(-nu * libm::log1p(b2 * radius2 * ratio));
+    near * ratio * nu * b2 / PI * turn[0] * turn[1] + far
 }
 
 /// Ratio below which the correlation is taken as 1.
@@ -219,7 +222,7 @@ mod tests {
             for (kx, ky) in [(0usize, 0usize), (1, 0), (3, 7), (40, 20), (100, 100), (100, 3)] {
                 let wave = |k: usize| 2.0 * std::f64::consts::PI * k as f64 / (n as f64 * cell);
                 let expected = spectrum.values[kx * n + ky].re;
-                let found = eigenvalue([wave(kx), wave(ky)], 1.0, nu, [cell; 2]);
+                let found = eigenvalue([wave(kx), wave(ky)], 1.0, nu, [cell; 2], [0.0, 1.0], 1.0);
                 assert!((found / expected - 1.0).abs() < 5e-3, "nu {nu}, ({kx}, {ky}): {found} {expected}");
             }
         }
