@@ -54,6 +54,9 @@ pub struct FitFile {
     pub gstools: Option<GsTools>,
     /// Sentences a reader must know.
     pub warnings: Vec<String>,
+    /// Every parameter of the fit, as a study states them; absent in a hand-written file.
+    #[serde(skip_serializing_if = "Value::is_null")]
+    pub settings: Value,
     /// Where the DEM came from.
     pub source: Option<Source>,
 }

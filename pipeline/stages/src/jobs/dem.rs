@@ -66,6 +66,12 @@ impl Place {
         Geometry { rows, cols, cell: self.cell, origin: self.origin }
     }
 
+    /// True where the heights of the item have other cells than its raster: they were in degrees and are in metres, from their
+    /// own corner.
+    pub fn was_converted(&self, heights: &Geometry) -> bool {
+        (0..2).any(|k| (heights.cell[k] / self.cell[k] - 1.0).abs() > 1e-6)
+    }
+
     /// The window of what covers the whole raster.
     pub fn part<T: Copy>(&self, whole: Grid<T>) -> Grid<T> {
         let ([row, col], [rows, cols]) = (self.corner, self.size);

@@ -1,6 +1,6 @@
 //! Stage `fit`: the covariance of a measured DEM.
 
-use super::dem::{HEIGHTS, input_error};
+use super::dem::{HEIGHTS, PLACE, Place, input_error};
 use super::mask::{self, Mask};
 use super::surface::{Surface, describe_residual};
 use super::{Estimate, ItemRef, Job, JobError, Outcome, Product, Rows, Work};
@@ -69,12 +69,21 @@ impl Subtrahend {
         Ok(Self { id: id.to_owned(), dem: field.item.clone(), source: builder.source_of(id, field) })
     }
 
-    /// The DEM less this one.
-    fn subtract(&self, dem: &Dem, work: &Work<'_>) -> Result<(Grid, Minus), JobError> {
+    /// The DEM of an item less this one.
+    fn subtract(&self, item: &ItemRef, dem: &Dem, work: &Work<'_>) -> Result<(Grid, Minus), JobError> {
         let other = dem::read(&work.parent(&self.dem, HEIGHTS)?).map_err(|e| input_error(&e))?;
+        for (item, heights) in [(item, &dem.grid), (&self.dem, &other.grid)] {
+            let place = Place::read(&work.parent(item, PLACE)?, &heights.geometry)?;
+            if place.was_converted(&heights.geometry) {
+                return Err(JobError::input(format!("{}: {IN_DEGREES}", item.id)));
+            }
+        }
         subtract(dem, &other, &self.source.file, &self.source.sha256)
     }
 }
+
+/// Degrees become metres from each DEM's own corner, and their places are lost.
+pub const IN_DEGREES: &str = "is in degrees; DEMs are subtracted in metres: reproject both (gdalwarp -t_srs EPSG:...)";
 
 /// One DEM less another, laid onto it, and the record of that.
 ///
@@ -179,7 +188,7 @@ impl Job for FitJob {
         let masked_share = mask::of_item(&mut read.grid, &self.dem, &self.masks, work)?;
         let mut source = Source { masked_share, ..self.source.clone() };
         if let Some(subtrahend) = &self.minus {
-            let (difference, minus) = subtrahend.subtract(&read, work)?;
+            let (difference, minus) = subtrahend.subtract(&self.dem, &read, work)?;
             read.grid = difference;
             source.minus = Some(minus);
         }
@@ -225,7 +234,10 @@ pub fn to_json(fit: &FitFile) -> Result<String, JobError> {
 fn fit_row(id: &str, dem_id: &str, fit: &FitFile) -> FitRow {
     let parameter = |name: &str| fit.parameters.get(name).copied().unwrap_or(f64::NAN);
     let window = fit.window_m.unwrap_or([f64::NAN; 2]);
-    let (sigma, range) = (parameter("sigma_m"), parameter("range_m"));
+    // A sum of terms has no one sigma and b.
+    let single = !fit.parameters.contains_key("sigma_2_m");
+    let of_one = |name: &str| if single { parameter(name) } else { f64::NAN };
+    let (sigma, range) = (of_one("sigma_m"), of_one("range_m"));
     let or = |name: &str, otherwise: f64| fit.parameters.get(name).copied().unwrap_or(otherwise);
     let finding = |name: &str| fit.diagnostics.get(name).and_then(Value::as_f64).unwrap_or(f64::NAN);
     let ends = |intervals: &Option<Intervals>, name: &str| {

@@ -99,6 +99,10 @@ struct TextureJob {
     method: String,
     /// Prepared with a stand-in for a fit that is not made yet: shape and parameters do not depend on the fit's numbers.
     draft: Box<dyn Synthesis>,
+    /// Whether it is one of several realisations.
+    one_of_many: bool,
+    /// Cells of the heightfield that is written.
+    cells: u64,
     streams: Streams,
 }
 
@@ -148,6 +152,8 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
                     release_path: format!("texture/{id}.tif"),
                     cells: base.as_ref().or(fill.as_ref()).map_or(draft.geometry().len() as u64, |(_, cells)| *cells),
                 };
+                let cells = field.cells;
+                let one_of_many = item.count.is_some_and(|count| count > 1);
                 let [base, fill] = [&base, &fill].map(|field| field.as_ref().map(|(item, _)| item.clone()));
                 let raster = match &modulation {
                     Some(Modulation::Raster(raster)) => Some(raster.clone()),
@@ -157,7 +163,18 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
                     [matched.parent(), base.clone(), fill.clone(), raster].into_iter().flatten().collect();
                 let parents = parents.into_iter().collect();
                 let (method, matched, modulation) = (method.clone(), matched.clone(), modulation.clone());
-                let job = TextureJob { id: id.clone(), matched, base, modulation, fill, method, draft, streams };
+                let job = TextureJob {
+                    id: id.clone(),
+                    matched,
+                    base,
+                    modulation,
+                    fill,
+                    method,
+                    draft,
+                    one_of_many,
+                    cells,
+                    streams,
+                };
                 let stream = field.stream.clone();
                 let node = Node { item: field.item.clone(), parents, inputs: Vec::new(), stream, job: Box::new(job) };
                 builder.node(&entry, node)?;
@@ -332,8 +349,8 @@ impl Job for TextureJob {
     }
 
     fn memory_bytes(&self) -> u64 {
-        // The texture, and what describes it once it is detrended as the fit's residual was.
-        self.draft.memory_bytes().max((64 << 20) + 110 * self.draft.geometry().len() as u64)
+        // The texture, what describes it once it is detrended as the fit's residual was, and a base or a DEM to fill.
+        self.draft.memory_bytes().max((64 << 20) + 110 * self.cells)
     }
 
     fn estimate(&self) -> Estimate {
@@ -351,6 +368,12 @@ impl Job for TextureJob {
         let TextureOutcome { grid, covariance_error_max_m2, clip_share } =
             synthesis.generate(&self.streams).map_err(JobError::new)?;
         let mut notes = synthesis.notes();
+        if self.one_of_many && synthesis.parameters()["phase"] == "unit" {
+            notes.push(
+                "one of several textures with unit phases, which are too alike: for their spread take phase = \"gaussian\""
+                    .to_owned(),
+            );
+        }
         if clip_share > 0.0 {
             notes.push(format!(
                 "{clip_share:.1e} of the spectrum was negative and set to 0; the covariance is off by at most {covariance_error_max_m2:.1e} m2"

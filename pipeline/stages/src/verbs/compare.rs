@@ -130,15 +130,17 @@ fn read(side: &Side<'_>, request: &Request<'_>) -> Result<Read, Error> {
     Ok(Read { content: Content::Fit(Box::new(read_fit(side.path)?)), notes: Vec::new() })
 }
 
-/// A DEM fitted as a fit was: its model, window and trimming.
+/// A DEM fitted as a fit was: with its settings, or of an older file with its model, window and trimming.
 fn like(dem: &Grid, fit: &FitFile, settings: &CompareSettings, streams: &Streams) -> Result<FitFile, Error> {
     let own = settings.parameters();
+    let given: FitParameters = serde_json::from_value(fit.settings.clone()).unwrap_or_default();
     let parameters = FitParameters {
+        mode: sastrugi_texture::fit::Mode::Corrected,
         model: fit.model.clone(),
         outer_scale_m: fit.window_m.map_or(own.outer_scale_m, |w| 0.5 * (w[0] + w[1])),
         trim: fit.trim.map(|t| t.level).filter(|level| *level > 0.0).unwrap_or(own.trim),
         bootstrap: own.simulations,
-        ..FitParameters::default()
+        ..given
     };
     let settings = FitSettings::try_from(parameters)?;
     let outcome = sastrugi_texture::fit(dem, &settings, &streams.child("fit"));

@@ -3,7 +3,7 @@
 use super::{Read, Reading, parameters, read, transects};
 use crate::error::Error;
 use crate::jobs::dem::{input_error, metres_note};
-use crate::jobs::fit::{STAGE, minus_note, subtract, to_json};
+use crate::jobs::fit::{IN_DEGREES, STAGE, minus_note, subtract, to_json};
 use sastrugi_numeric::resample::in_metres;
 use sastrugi_numeric::{Geometry, Streams};
 use sastrugi_schemas::coregistration::Minus;
@@ -151,9 +151,7 @@ fn subtracted(read: &mut Dem, request: &Request<'_>, path: &Path) -> Result<Minu
     let options = ReadOptions { cell_m: request.reading.cell_m };
     let metric = |path: &Path| {
         let dem = dem::read_with(path, &options).map_err(|e| Error::from(input_error(&e)))?;
-        // Degrees become metres from each DEM's own corner, and their places are lost.
-        let message = "is in degrees; DEMs are subtracted in metres: reproject both (gdalwarp -t_srs EPSG:...)";
-        if dem.info.crs.geographic { Err(Error::Input(format!("{}: {message}", path.display()))) } else { Ok(dem) }
+        if dem.info.crs.geographic { Err(Error::Input(format!("{}: {IN_DEGREES}", path.display()))) } else { Ok(dem) }
     };
     metric(request.dem)?;
     let other = metric(path)?;

@@ -62,7 +62,15 @@ impl Covariance {
     /// # Errors
     /// An unknown model; a parameter that is missing, unknown or out of range.
     pub fn of_fit(fit: &FitFile) -> Result<Self, ParameterError> {
-        Form::parse(&fit.model)?.covariance(&fit.parameters).map_err(|e| e.within("parameters"))
+        let covariance = Form::parse(&fit.model)?.covariance(&fit.parameters).map_err(|e| e.within("parameters"))?;
+        let variance_m2 = covariance.variance_m2();
+        if !(variance_m2.is_normal() && covariance.nugget_m2.is_finite()) {
+            return Err(ParameterError::new(
+                "parameters",
+                format!("give a variance of {variance_m2:e} m2, beyond all computing"),
+            ));
+        }
+        Ok(covariance)
     }
 
     /// Covariance in m2 at a lag of `[east, north]` m.

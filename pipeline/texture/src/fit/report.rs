@@ -70,6 +70,8 @@ pub fn fit_file(case: &Case, naive: &Estimate, estimate: &Estimate, binned: Vec<
         directions: findings.directions.clone(),
         gstools: gstools(&estimate.form, &estimate.covariance),
         warnings: figures.warnings(case, naive, estimate, findings),
+        // A plain struct of numbers and words always has a JSON form.
+        settings: serde_json::to_value(case.settings.parameters()).unwrap_or_default(),
         source: None,
         height_quantiles_m: Vec::new(),
     }
@@ -99,7 +101,10 @@ pub fn gstools(form: &Form, covariance: &Covariance) -> Option<GsTools> {
         "gaussian" => ("Gaussian", term.range_m, vec![("rescale", 1.0)]),
         "spherical" => ("Spherical", term.range_m, vec![("rescale", 1.0)]),
         // GSTools' argument is sqrt(nu) h / len_scale.
-        "matern" => ("Matern", term.range_m * term.shape.sqrt(), vec![("rescale", 1.0), ("nu", term.shape)]),
+        // GSTools takes a smoothness of 0.2 and above.
+        "matern" if term.shape >= 0.2 => {
+            ("Matern", term.range_m * term.shape.sqrt(), vec![("rescale", 1.0), ("nu", term.shape)])
+        }
         _ => return None,
     };
     Some(GsTools {

@@ -16,7 +16,7 @@ const DEFAULT_SIZE_M: [f64; 2] = [20.0; 2];
 /// Vecherin et al. 2022, section 3.2.
 const DEFAULT_CELL_M: f64 = 0.1;
 /// Most cells of a texture: 2 GiB of heights, as many as a raster may have when it is read back.
-const CELLS_MAX: u64 = 1 << 28;
+pub const CELLS_MAX: u64 = 1 << 28;
 /// A quotient this near to an integer is that integer.
 const INTEGER_TOLERANCE: f64 = 1e-6;
 /// Smallest ratio of anisotropy, that of fit files.

@@ -34,7 +34,7 @@
 
 mod spectrum;
 
-use super::tile::{self, Tile, TileParameters};
+use super::tile::{self, CELLS_MAX, Tile, TileParameters};
 use super::{Kernel, Made, Synthesis, SynthesisError, Texture, Wanted, reach};
 use crate::covariance::Covariance;
 use rayon::prelude::*;
@@ -146,10 +146,20 @@ impl FftMa {
         }
         let Geometry { rows, cols, cell: [dx, dy], .. } = tile.geometry;
         let [width_m, height_m] = reach::torus_m(wanted);
-        let torus = [(rows, height_m, dy), (cols, width_m, dx)].map(|(n, side_m, cell_m)| match parameters.periodic {
-            true => n,
-            false => smooth_length((2 * n).max((side_m / cell_m).ceil() as usize)),
+        let enough = [(rows, height_m, dy), (cols, width_m, dx)].map(|(n, side_m, cell_m)| match parameters.periodic {
+            true => n as f64,
+            false => (2.0 * n as f64).max((side_m / cell_m).ceil()),
         });
+        if enough[0] * enough[1] > CELLS_MAX as f64 {
+            let message = format!(
+                "is false, for which the range of {} m needs a torus of {:.1e} cells; at most {CELLS_MAX} are made: larger cells, \
+                 or a shorter range",
+                wanted.range_m(),
+                enough[0] * enough[1]
+            );
+            return Err(ParameterError::new("periodic", message));
+        }
+        let torus = enough.map(|n| if parameters.periodic { n as usize } else { smooth_length(n as usize) });
         Ok(Self { parameters, covariance: wanted.clone(), tile: tile.geometry, torus })
     }
 

@@ -47,6 +47,9 @@ const VARIANCE_WEIGHT: f64 = 30.0;
 /// Rounds of the descent; the variances no longer move by then.
 const ROUNDS: usize = 20_000;
 
+/// Least packing.
+const PACKING_MIN: f64 = 0.01;
+
 /// Raw parameters of quasi-wavelets, beside those of their tile.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
@@ -101,6 +104,10 @@ impl QuasiWavelets {
             return Err(ParameterError::new("size_ratio", format!("is {size_ratio}; it must lie in [0.3, 0.9]")));
         }
         ParameterError::positive("packing", packing)?;
+        if packing < PACKING_MIN {
+            let message = format!("is {packing}; below {PACKING_MIN} the heights are a few bumps on a plain");
+            return Err(ParameterError::new("packing", message));
+        }
         if !(0.0..=2.0).contains(&intermittency) {
             return Err(ParameterError::new("intermittency", format!("is {intermittency}; it must lie in [0, 2]")));
         }
