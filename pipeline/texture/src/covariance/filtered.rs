@@ -11,7 +11,7 @@
 //!   averaged over the pairs of each lag bin. It depends on the lag and cannot be had from the average window: at a window
 //!   of two ranges that would leave an error of 0.2 % of the variance at the larger lags, and of 7 % in b. The average is
 //!   taken over pairs and offsets of a fixed low-discrepancy sequence (Kronecker with powers of the generalised golden
-//!   ratio: Roberts, 2018) and kept as weights of C by distance, so that it is made once and applied to any model.
+//!   ratio: Roberts, 2018) and kept as weights of C by lag, so that it is made once and applied to any model.
 
 use super::Covariance;
 use super::bins::lag_m;

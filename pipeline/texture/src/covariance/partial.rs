@@ -46,7 +46,8 @@ pub struct DetrendedCells<'a> {
 }
 
 /// What partial windows add to the covariance of the residual in each bin, as weights of the surface's covariance by lag.
-/// Memory: 4 bytes per cell of a strip of 4 million cells or four reaches, and 8 bytes per bin and lag within the largest lag and two windows, one of two opposite lags.
+/// Memory: 4 bytes per cell of a strip of 4 million cells or six reaches (lag and two half windows), and 8 bytes per bin and
+/// lag within the largest lag and two windows, one of two opposite lags.
 pub struct PartialWindows {
     /// Largest lag with a weight, in cells.
     reach: [isize; 2],

@@ -111,6 +111,12 @@ impl<'a> Estimator<'a> {
         self.expectation.mean(covariance, self.case.survey.trim.threshold_m)
     }
 
+    /// Every form fitted, from the uncorrected exponential of the same data.
+    pub fn candidates(&self, naive: &Estimate) -> Vec<Estimate> {
+        let (sigma_m, range_m) = (1.2 * naive.covariance.sigma_m(), 1.5 * naive.covariance.range_m());
+        self.case.settings.forms.iter().map(|form| self.fit(form, sigma_m, range_m)).collect()
+    }
+
     /// Generalised least squares of a form, from an exponential of the given sigma and b.
     pub fn fit(&self, form: &Form, sigma_m: f64, range_m: f64) -> Estimate {
         let coordinates = self.case.coordinates(form);
@@ -224,14 +230,6 @@ impl Refits<'_> {
         let bounds = coordinates.bounds();
         let near = chord.as_ref().and_then(|chord| chord.minimise(&estimate.at, &bounds, residuals));
         near.unwrap_or_else(|| minimise(&estimate.at, &bounds, residuals))
-    }
-}
-
-impl<'a> Estimator<'a> {
-    /// Every form fitted, from the uncorrected exponential of the same data.
-    pub fn candidates(&self, naive: &Estimate) -> Vec<Estimate> {
-        let (sigma_m, range_m) = (1.2 * naive.covariance.sigma_m(), 1.5 * naive.covariance.range_m());
-        self.case.settings.forms.iter().map(|form| self.fit(form, sigma_m, range_m)).collect()
     }
 }
 

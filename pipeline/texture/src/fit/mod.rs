@@ -17,7 +17,7 @@
 //!
 //! Cost without intervals: dominated by the moving averages of the outlier search and four real transforms of the raster;
 //! a replicate costs a surface of four times as many cells (at most a million of them) and another such fit. Memory: the
-//! strips of `survey.rs`, which do not grow with the raster but for two bits per cell, and 300 bytes per cell of up to a
+//! strips of `survey.rs`, which grow with the raster's width only, two bits per cell, and 300 bytes per cell of up to a
 //! million for each replicate at work. Heights are read in parts, a few times ([`Heights`]).
 
 pub(crate) mod case;

@@ -15,15 +15,19 @@ const SHARES: [f64; 13] = [0.25, 0.35, 0.5, 0.6, 0.7, 0.85, 1.0, 1.2, 1.4, 1.7, 
 /// Halvings of a bracket of a factor of two: the end is good to 1 %.
 const HALVINGS: usize = 6;
 
-/// How the generalised sum of squares rises away from the fitted range.
+/// How the generalised sum of squares rises away from the fitted range, as far as ranges are searched.
 pub fn profile(estimator: &Estimator, estimate: &Estimate) -> Option<Profile> {
     let coordinate = estimate.coordinate(Role::Range(0))?;
-    let rise = |share: f64| {
-        estimator.held(estimate, coordinate, estimate.at[coordinate] + libm::log(share)).map(|held| held.rise)
-    };
-    let rises = SHARES.into_iter().map(rise).collect::<Option<Vec<f64>>>()?;
-    let range_m = SHARES.iter().map(|s| s * estimate.covariance.structures[0].range_m).collect();
-    Some(Profile { range_m, chi2_rise: rises })
+    let coordinates = estimator.case.coordinates(&estimate.form);
+    let (low, high) = coordinates.bounds()[coordinate];
+    let mut places: Vec<f64> =
+        SHARES.iter().map(|share| (estimate.at[coordinate] + libm::log(*share)).clamp(low, high)).collect();
+    places.dedup();
+    let held = places.iter().map(|at| estimator.held(estimate, coordinate, *at)).collect::<Option<Vec<Held>>>()?;
+    Some(Profile {
+        range_m: held.iter().map(|h| coordinates.decode(&h.at).structures[0].range_m).collect(),
+        chi2_rise: held.iter().map(|h| h.rise).collect(),
+    })
 }
 
 /// The fits at both ends of the interval of the range, each `None` where it is open; `None` without a likelihood.

@@ -192,7 +192,8 @@ impl Figures {
     fn rise_at_3b(&self, findings: &Findings) -> Option<f64> {
         let profile = findings.profile.as_ref()?;
         let own = profile.range_m.iter().zip(&profile.chi2_rise).min_by(|a, b| a.1.total_cmp(b.1))?.0;
-        let at = profile.range_m.iter().position(|r| *r > 2.9 * own)?;
+        // Nearer where the search ends before.
+        let at = profile.range_m.iter().position(|r| *r > 2.9 * own).unwrap_or(profile.range_m.len() - 1);
         Some(profile.chi2_rise[at] / self.misfit_ratio.unwrap_or(1.0).max(1.0))
     }
 

@@ -9,11 +9,11 @@
 //! estimate, q the quantiles of the replicates (Davison and Hinkley, 1997, section 5.2), which hold whatever the size of
 //! the bias.
 //!
-//! A range whose profile likelihood (`profile.rs`) is open at an end, or that replicates cannot tell from the end of the search, has its
-//! interval from the profile: replicates of a surface whose range nobody can tell say little.
+//! A range whose profile likelihood (`profile.rs`) is open at an end, or that replicates cannot tell from the end of the
+//! search, has its interval from the profile: replicates of a surface whose range nobody can tell say little.
 //!
-//! Rasters of more than [`CELLS_MAX`] cells are examined on a part of that size (or three windows each way), and the deviations scaled by the square root
-//! of the share of residuals in it.
+//! Rasters of more than [`CELLS_MAX`] cells are examined on a part of that size (or three windows each way), and the
+//! deviations scaled by the square root of the share of residuals in it.
 
 use super::FitError;
 use super::case::Case;

@@ -2,8 +2,9 @@
 //!
 //! Rows are read in strips, three times: to find outliers (each strip judged by its own robust scale, with two windows
 //! around it), to find the threshold, and to add up pairs of residuals. So memory is bounded by the strip and two bits per
-//! cell: 2 million cells, or four windows or four of the largest lags where that is more, at about 100 bytes each.
-//! Background and residual of any part are made again when they are asked for.
+//! cell: half a million cells, or eight windows (four of them around it) or four of the largest lags times the width where
+//! that is more, at about 100 bytes each. It grows with the raster's width, not with its length. Background and residual of
+//! any part are made again when they are asked for.
 
 use super::heights::Heights;
 use super::{FitError, FitSettings, Mode};

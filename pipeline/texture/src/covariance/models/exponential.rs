@@ -28,7 +28,7 @@ impl Model for Exponential {
         Kind {
             family: "covariance",
             kind: "exponential",
-            summary: "sigma^2 exp(-lag / b), isotropic, without nugget",
+            summary: "sigma^2 exp(-lag / b)",
             source: "Vecherin et al. 2022, Eq. 9",
             parameters: schema_of::<ExponentialParameters>(),
         }
