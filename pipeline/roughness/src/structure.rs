@@ -61,7 +61,7 @@ pub struct StructureBin {
     pub pairs: u64,
 }
 
-/// Half of each side in cells, at most [`LAG_CELLS_MAX`].
+/// Half of each side in cells, at most `LAG_CELLS_MAX`.
 pub fn lags_of(dem: &Grid) -> [usize; 2] {
     [dem.rows(), dem.cols()].map(|n| (n / 2).min(LAG_CELLS_MAX))
 }

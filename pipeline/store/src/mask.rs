@@ -1,7 +1,7 @@
 //! Masks: which cells of a DEM take part.
 //!
 //! * GeoJSON (RFC 7946: Polygon, MultiPolygon, Feature, FeatureCollection) with coordinates in the DEM's own x and y: a cell
-//!   is kept when its centre lies inside ([`polygons`]).
+//!   is kept when its centre lies inside.
 //! * A raster of any format that [`dem::read`] knows: a cell is kept when the cell of the mask under its centre holds a
 //!   finite number other than 0; cells beyond the mask are dropped. A raster that says neither place nor cell size (.npy,
 //!   .png, TIFF without georeferencing) must have the DEM's shape, and is taken cell by cell.
