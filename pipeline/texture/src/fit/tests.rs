@@ -401,9 +401,9 @@ fn tally(kinds: &[String]) -> Vec<(String, usize)> {
 }
 
 /// Acceptance 9: what is no exponential is warned of in 95 % of fields, an exponential in at most 5 % (here: at most 10 % of
-/// 50 fields, a threshold that a true 5 % passes with probability 0.96; 50 fields of 95 % give 44 or more with probability
-/// 0.99). Any warning counts, and their kinds are printed: a self-affine surface of H = 0.5 is the limit of exponentials of
-/// endless range, so that its warning is that b cannot be told, and no misfit.
+/// 50 fields, a threshold that a true 5 % passes with probability 0.96). Any warning counts, and their kinds are printed: a
+/// self-affine surface of H = 0.5 is the limit of exponentials of endless range, so that its warning is that b cannot be
+/// told, and no misfit.
 #[test]
 #[ignore = "slow: ./test --full"]
 fn stat_misspecification_is_told() {
@@ -417,7 +417,7 @@ fn stat_misspecification_is_told() {
     for (name, truth) in &truths {
         let (share, kinds) = warned(truth, 50);
         println!("{name}: {:.0} % warned {:?}", 100.0 * share, tally(&kinds));
-        assert!(share >= 0.88, "{name}: {share}");
+        assert!(share >= 0.95, "{name}: {share}");
     }
     let (share, kinds) = warned(&covariance("exponential", &[("sigma_m", 0.1), ("range_m", 0.15)]), 50);
     println!("exponential: {:.0} % warned {:?}", 100.0 * share, tally(&kinds));
