@@ -132,6 +132,9 @@ pub struct Candidate {
     pub chi2: Option<f64>,
     /// Akaike's corrected criterion above the least of all candidates.
     pub aicc_above_best: Option<f64>,
+    /// The model in each bin as the estimator sees it, m2, as `model_m2` of the fit.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub model_m2: Vec<f64>,
 }
 
 /// The generalised sum of squares along the range, everything else fitted anew.

@@ -1,8 +1,7 @@
 //! Table `candidate_curves`.
 
 super::table! {
-    /// One row per candidate model and lag bin of a fit: the model as the estimator sees it (detrended and trimmed, windows
-    /// taken as complete).
+    /// One row per candidate model and lag bin of a fit: the model as the estimator sees it, detrended and trimmed.
     "candidate_curves" CandidateCurveRow {
         keys {
             /// Id of the fit.

@@ -18,7 +18,6 @@ use sastrugi_schemas::tables::{CandidateCurveRow, CandidateRow, CovarianceRow, F
 use sastrugi_store::dem::Dem;
 use sastrugi_store::{atomic, dem, digest};
 use sastrugi_texture::coregister::coregister;
-use sastrugi_texture::covariance::filtered::Measurement;
 use sastrugi_texture::{FitParameters, FitSettings, shown};
 use serde_json::{Value, json};
 
@@ -32,13 +31,7 @@ const MASK: &str = "mask.tif";
 
 /// The one kind of fit.
 pub fn kinds() -> Vec<Kind> {
-    vec![Kind {
-        family: "fit",
-        kind: "covariance",
-        summary: "moving-average background, outliers, exact masked covariance, fitted model",
-        source: "Vecherin et al., 2022, section 2; corrections in docs/papers/vecherin.md",
-        parameters: schema_of::<FitParameters>(),
-    }]
+    sastrugi_texture::kinds().into_iter().filter(|k| k.family == STAGE).collect()
 }
 
 struct FitJob {
@@ -195,8 +188,9 @@ impl Job for FitJob {
         let notes = source.minus.as_ref().map(minus_note);
         let outcome = sastrugi_texture::fit(&read.grid, &self.settings, &self.streams).map_err(JobError::new)?;
         let [background, residual] = outcome.rasters(&read.grid).map_err(JobError::new)?;
+        let mask = shown::uses(&read.grid, &residual, &outcome);
+        let band = shown::covariance_band(&residual, &outcome);
         let fit = FitFile { source: Some(source), ..outcome.fit };
-        let mask = shown::uses(&read.grid, &background, &residual, &fit);
         atomic::write(&work.output(FIT), to_json(&fit)?.as_bytes()).map_err(JobError::new)?;
         let id = &self.id;
         let mut products = vec![Product::released(FIT, format!("fit/{id}.json"), None)];
@@ -206,16 +200,12 @@ impl Job for FitJob {
         }
         dem::write_classes(&work.output(MASK), &mask, &read.info.crs).map_err(JobError::new)?;
         products.push(Product::released(MASK, format!("fit/{id}.{MASK}"), Some(digest::classes(&mask))));
-        let band = shown::covariance_band(&residual, &fit);
-        let FitParameters { inner_scale_m, noise_sigma_m, .. } = self.settings.parameters();
-        let measurement = Measurement { inner_scale_m, noise_sigma_m };
-        let curves = shown::candidate_curves(&fit, &read.grid.geometry, measurement).map_err(JobError::new)?;
         let surface = Surface { id, stage: STAGE, fit_id: Some(id), grid: &residual };
         let rows = Rows {
             fits: vec![fit_row(id, &self.dem_id, &fit)],
             covariance: covariance_rows(id, &fit, &band),
             candidates: candidate_rows(id, &fit),
-            candidate_curves: curve_rows(id, &fit, &curves),
+            candidate_curves: curve_rows(id, &fit),
             likelihood_profile: profile_rows(id, &fit),
             ..describe_residual(&surface, &fit)
         };
@@ -349,8 +339,8 @@ fn candidate_rows(id: &str, fit: &FitFile) -> Vec<CandidateRow> {
     (1..).zip(&fit.candidates).map(row).collect()
 }
 
-fn curve_rows(id: &str, fit: &FitFile, curves: &[Vec<f64>]) -> Vec<CandidateCurveRow> {
-    let of_curve = |(rank, curve): (i64, &Vec<f64>)| {
+fn curve_rows(id: &str, fit: &FitFile) -> Vec<CandidateCurveRow> {
+    let of_curve = |(rank, candidate): (i64, &Candidate)| {
         let row = |(bin, (&lag_m, &model_m2)): (i64, (&f64, &f64))| CandidateCurveRow {
             fit_id: id.to_owned(),
             rank,
@@ -358,9 +348,9 @@ fn curve_rows(id: &str, fit: &FitFile, curves: &[Vec<f64>]) -> Vec<CandidateCurv
             lag_m,
             model_m2,
         };
-        (0..).zip(fit.lags_m.iter().zip(curve)).map(row).collect::<Vec<_>>()
+        (0..).zip(fit.lags_m.iter().zip(&candidate.model_m2)).map(row).collect::<Vec<_>>()
     };
-    (1..).zip(curves).flat_map(of_curve).collect()
+    (1..).zip(&fit.candidates).flat_map(of_curve).collect()
 }
 
 fn profile_rows(id: &str, fit: &FitFile) -> Vec<LikelihoodProfileRow> {

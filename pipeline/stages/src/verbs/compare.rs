@@ -3,7 +3,7 @@
 use super::parameters;
 use super::texture::read_fit;
 use crate::error::Error;
-use crate::verbs::fit::read_metric;
+use crate::verbs::Reading;
 use sastrugi_numeric::{Grid, Streams};
 use sastrugi_schemas::fit::FitFile;
 use sastrugi_schemas::kind::{read_parameters, schema_of};
@@ -120,7 +120,8 @@ fn read(side: &Side<'_>, request: &Request<'_>) -> Result<Read, Error> {
     }
     let is_fit = side.path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
     if !is_fit {
-        let (dem, notes) = read_metric(side.path, side.window, request.cell_m)?;
+        let reading = Reading { window: side.window, cell_m: request.cell_m, ..Reading::default() };
+        let super::Read { dem, notes, .. } = super::read(side.path, &reading)?;
         let notes = notes.into_iter().map(|n| format!("{name}: {n}")).collect();
         return Ok(Read { content: Content::Dem(dem.grid), notes });
     }

@@ -162,19 +162,6 @@ fn subtracted(read: &mut Dem, request: &Request<'_>, path: &Path) -> Result<Minu
     Ok(minus)
 }
 
-/// As [`read`], without masks.
-///
-/// # Errors
-/// As [`read`].
-pub fn read_metric(
-    path: &Path,
-    window: Option<[f64; 4]>,
-    cell_m: Option<[f64; 2]>,
-) -> Result<(Dem, Vec<String>), Error> {
-    let read = read(path, &Reading { window, cell_m, ..Reading::default() })?;
-    Ok((read.dem, read.notes))
-}
-
 /// A parameter out of range is the caller's; anything else lies in the DEM.
 fn refused(error: FitError) -> Error {
     match error {

@@ -15,17 +15,12 @@ use super::verdict::{Finding, Null, decide, overall};
 use super::{CompareError, CompareSettings, Comparison, Measure};
 use crate::covariance::Covariance;
 use crate::covariance::bins::Layout;
-use crate::covariance::filtered::Measurement;
 use crate::fit::case::Case;
 use crate::fit::resampling::{self, CELLS_MAX};
-use crate::fit::simulate::{Shape, Simulator};
-use crate::fit::survey::Detrended;
+use crate::fit::twins::Twins;
 use rayon::prelude::*;
 use sastrugi_numeric::{Grid, Streams, sums};
 use sastrugi_roughness::{Statistic, unfitted_statistics};
-
-/// Range of simulated self-affine surfaces, windows.
-const OUTER_WINDOWS: f64 = 8.0;
 
 /// Compares the textures fitted to one half of a site with its other half.
 ///
@@ -96,14 +91,8 @@ fn cut(site: &Grid) -> (Grid, Grid) {
 /// Statistics of a texture on the grid and mask of a case.
 fn texture_statistics(case: &Case, covariance: &Covariance, streams: &Streams) -> Vec<Statistic> {
     let g = case.geometry;
-    let parameters = case.settings.parameters();
-    let measurement = Measurement { inner_scale_m: parameters.inner_scale_m, noise_sigma_m: parameters.noise_sigma_m };
-    let outer_m = OUTER_WINDOWS * case.window_m();
-    let shape = Shape { rows: g.rows, cols: g.cols, profiles: false };
-    let mut surface = Simulator::new(covariance, measurement, shape, g.cell, outer_m).surface(streams);
     let trusted = case.survey.trusted(0..g.rows, 0..g.cols);
-    surface.iter_mut().zip(trusted).for_each(|(z, trusted)| *z = if trusted { *z } else { f64::NAN });
-    statistics(case, Detrended::of(&surface, g.cols, case.settings, case.window).residual)
+    statistics(case, Twins::new(case, covariance, [g.rows, g.cols], trusted).one(streams).residual)
 }
 
 fn statistics(case: &Case, residual: Vec<f64>) -> Vec<Statistic> {

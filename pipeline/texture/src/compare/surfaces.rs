@@ -4,24 +4,18 @@ use super::heights::HeightCurve;
 use super::verdict::{Finding, Null, decide, overall};
 use super::{CompareError, CompareSettings, Comparison, Measure};
 use crate::covariance::bins::Layout;
-use crate::covariance::filtered::Measurement;
 use crate::covariance::form::{Role, half_turn};
 use crate::covariance::{Covariance, Form, LagBins, masked_covariance};
 use crate::fit::FitError;
 use crate::fit::case::Case;
 use crate::fit::estimator::{Estimate, Estimator, Likelihood, Refits, ordinary};
 use crate::fit::resampling::{self, Part, upper_p};
-use crate::fit::simulate::{Shape, Simulator};
-use crate::fit::survey::{Detrended, Trim};
-use crate::sizes::Sizes;
 use rayon::prelude::*;
 use sastrugi_numeric::{Grid, Streams, sums};
 use std::f64::consts::PI;
 
 /// Block bootstraps of each side, times the four that the fit draws for each.
 const BLOCK_DRAWS: usize = 25;
-/// Range of simulated self-affine surfaces, windows.
-const OUTER_WINDOWS: f64 = 8.0;
 /// Level of the warning that a model does not describe a side.
 const MISFIT_LEVEL: f64 = 0.01;
 
@@ -135,12 +129,8 @@ impl<'a> Side<'a> {
     fn simulated(&self, covariance: &Covariance, count: usize, streams: &Streams) -> Vec<Measured> {
         let case = self.rings.case;
         let part = Part::of(case);
-        let parameters = case.settings.parameters();
-        let measurement =
-            Measurement { inner_scale_m: parameters.inner_scale_m, noise_sigma_m: parameters.noise_sigma_m };
-        let outer_m = OUTER_WINDOWS * case.window_m();
-        let shape = Shape { rows: part.rows, cols: part.cols, profiles: false };
-        let simulator = Simulator::new(covariance, measurement, shape, case.geometry.cell, outer_m);
+        let (cols, scale) = (part.cols, part.scale);
+        let twins = part.twins(case, covariance);
         let [round, long] = [(&self.rings, &self.round), (&self.directions, &self.long)]
             .map(|(estimator, own)| centred(estimator, &own.form, covariance));
         let freedom = (self.rings.bins.len().saturating_sub(round.at.len())).max(1) as f64;
@@ -148,26 +138,21 @@ impl<'a> Side<'a> {
         (0..count)
             .into_par_iter()
             .map(|k| {
-                let mut surface = simulator.surface(&streams.child(&format!("surface-{k}")));
-                surface.iter_mut().zip(&part.mask).for_each(|(z, keep)| *z = if *keep { *z } else { f64::NAN });
-                let residual = Detrended::of(&surface, part.cols, case.settings, case.window).residual;
-                let trim = Trim::of(&Sizes::of(&residual), case.settings);
-                let heights = HeightCurve::of(&residual);
-                let mut trimmed = residual;
-                trim.apply(&mut trimmed);
-                let estimate = masked_covariance(&trimmed, part.cols, case.max_lag);
+                let twin = twins.one(&streams.child(&format!("surface-{k}")));
+                let (trim, heights) = (twin.trim, HeightCurve::of(&twin.residual));
+                let estimate = masked_covariance(&twin.trimmed(), cols, case.max_lag);
                 let refit = |estimator: &Estimator, refits: &Refits| {
-                    refits.to(&means(&estimator.bins.bin_sums(&estimate)), trim.threshold_m)
+                    refits.to(&estimator.bins.means(&estimate), trim.threshold_m)
                 };
                 let (near, far) = (refit(&self.rings, &round_refits), refit(&self.directions, &long_refits));
                 let shrink = |found: &[f64], centre: &[f64]| -> Vec<f64> {
-                    found.iter().zip(centre).map(|(f, c)| c + part.scale * (f - c)).collect()
+                    found.iter().zip(centre).map(|(f, c)| c + scale * (f - c)).collect()
                 };
                 Measured {
                     at: shrink(&near.at, &round.at),
                     elongation: elongation(&shrink(&far.at, &long.at)),
                     heights,
-                    misfit_ratio: near.value * part.scale * part.scale / freedom,
+                    misfit_ratio: near.value * scale * scale / freedom,
                 }
             })
             .collect()
@@ -224,10 +209,6 @@ fn scaled(covariance: &Covariance, factor: f64) -> Covariance {
 /// The last two coordinates of a form with an axis.
 fn elongation(at: &[f64]) -> [f64; 2] {
     [at[at.len() - 2], at[at.len() - 1]]
-}
-
-fn means(sums: &[(f64, u64)]) -> Vec<f64> {
-    sums.iter().map(|(sum, pairs)| sum / (*pairs).max(1) as f64).collect()
 }
 
 /// The covariance between both sides: geometric means of sigma, b and shape, means of nugget and elongation.

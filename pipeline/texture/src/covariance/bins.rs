@@ -93,6 +93,11 @@ impl LagBins {
         sums
     }
 
+    /// Covariance in these bins of another estimate of the same surface, m2; 0 in a bin without pairs.
+    pub fn means(&self, estimate: &MaskedCovariance) -> Vec<f64> {
+        means(&self.bin_sums(estimate))
+    }
+
     /// Number of bins.
     pub fn len(&self) -> usize {
         self.lag_m.len()
@@ -109,6 +114,11 @@ impl LagBins {
         self.members.iter().for_each(|m| binned[m.bin] += m.weight * f(m.lag));
         binned
     }
+}
+
+/// Sums of products over their numbers of pairs.
+pub fn means(sums: &[(f64, u64)]) -> Vec<f64> {
+    sums.iter().map(|(sum, pairs)| sum / (*pairs).max(1) as f64).collect()
 }
 
 struct Lag {

@@ -33,14 +33,15 @@ pub(crate) mod resampling;
 mod search;
 pub(crate) mod simulate;
 pub(crate) mod survey;
+pub(crate) mod twins;
 mod verdicts;
 
 pub use error::FitError;
 pub use heights::{Heights, Profiles};
 pub use params::{FitParameters, FitSettings, Mode};
 
-use crate::covariance::Form;
 use crate::covariance::bins::Layout;
+use crate::covariance::{Form, LagBins};
 use crate::synth::marginal::quantiles_m;
 use case::Case;
 use estimator::{Estimate, Estimator, best, ordinary};
@@ -56,7 +57,9 @@ pub struct FitOutcome {
     /// The fit; its `source` is left to the caller.
     pub fit: FitFile,
     settings: FitSettings,
-    survey: Survey,
+    pub(crate) survey: Survey,
+    /// The rings of the fit file.
+    pub(crate) bins: LagBins,
 }
 
 impl FitOutcome {
@@ -90,7 +93,7 @@ pub fn fit(heights: &dyn Heights, settings: &FitSettings, streams: &Streams) -> 
     // The shape of the heights is that before trimming.
     let residual = case.survey.detrended(heights, settings, rows, cols)?.residual;
     let fit = FitFile { height_quantiles_m: quantiles_m(&residual), ..fit };
-    Ok(FitOutcome { fit, settings: settings.clone(), survey: case.survey })
+    Ok(FitOutcome { fit, settings: settings.clone(), survey: case.survey, bins: case.bins })
 }
 
 fn paper(case: &Case, naive: &Estimate) -> Result<FitFile, FitError> {
@@ -124,13 +127,15 @@ fn corrected(case: &Case, naive: &Estimate, streams: &Streams) -> Result<FitFile
     let resampled = resampling::block_replicates(&estimator, estimate, &blocks, settings.bootstrap(), streams);
     let others = verdicts::other_windows(examined(case)?.as_ref(), settings, estimate);
     let rough = (!case.heights.are_profiles()).then(|| Estimator::rough(case, &by_direction));
+    let rough_rings = directional.then(|| Estimator::rough(case, &case.bins));
+    let on_rings = rough_rings.as_ref().unwrap_or(&estimator);
     let findings = Findings {
         intervals: replicates
             .as_ref()
             .and_then(|r| resampling::intervals(&estimator, estimate, &r.at))
             .map(|i| resampling::with_profile(i, &estimator, estimate)),
         block_intervals: resampling::intervals(&estimator, estimate, &resampled),
-        candidates: verdicts::candidates(&estimates),
+        candidates: verdicts::candidates(&estimates, on_rings),
         profile: profile::profile(&estimator, estimate),
         disagreement: verdicts::window_disagreement(estimate, &others),
         others: others.iter().map(verdicts::window_entry).collect(),
@@ -140,11 +145,7 @@ fn corrected(case: &Case, naive: &Estimate, streams: &Streams) -> Result<FitFile
         normality_p: replicates.as_ref().and_then(|r| verdicts::normality_p(case, r)),
         directions: rough.map_or_else(Vec::new, |rough| report::directions(&rough, estimate)),
     };
-    let rings = match directional {
-        true => Estimator::rough(case, &case.bins).mean(&estimate.covariance),
-        false => estimator.mean(&estimate.covariance),
-    };
-    Ok(report::fit_file(case, naive, estimate, rings, &findings))
+    Ok(report::fit_file(case, naive, estimate, on_rings.mean(&estimate.covariance), &findings))
 }
 
 /// A texture whose leading range lies below the cell cannot be told from noise.

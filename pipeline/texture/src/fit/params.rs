@@ -177,7 +177,7 @@ impl FitSettings {
         self.parameters.bootstrap as usize
     }
 
-    pub(super) fn measurement(&self) -> Measurement {
+    pub(crate) fn measurement(&self) -> Measurement {
         let FitParameters { inner_scale_m, noise_sigma_m, .. } = self.parameters;
         Measurement { inner_scale_m, noise_sigma_m }
     }

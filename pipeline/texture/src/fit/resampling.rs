@@ -19,11 +19,10 @@ use super::FitError;
 use super::case::Case;
 use super::estimator::{Estimate, Estimator};
 use super::profile;
-use super::simulate::{Shape, Simulator};
-use super::survey::{Detrended, Trim};
+use super::twins::Twins;
+use crate::covariance::bins;
 use crate::covariance::form::Role;
 use crate::covariance::{Covariance, LagBins, masked_covariance};
-use crate::sizes::Sizes;
 use rayon::prelude::*;
 use sastrugi_numeric::{Stream, Streams, sums};
 use sastrugi_schemas::fit::Intervals;
@@ -58,23 +57,17 @@ pub struct Replicates {
 pub fn parametric(estimator: &Estimator, estimate: &Estimate, count: usize, streams: &Streams) -> Replicates {
     let case = estimator.case;
     let part = Part::of(case);
-    let shape = Shape { rows: part.rows, cols: part.cols, profiles: case.heights.are_profiles() };
-    let outer_m = 8.0 * case.window_m();
-    let measurement = case.settings.measurement();
-    let simulator = Simulator::new(&estimate.covariance, measurement, shape, case.geometry.cell, outer_m);
+    let (cols, scale) = (part.cols, part.scale);
+    let twins = part.twins(case, &estimate.covariance);
     let freedom = estimator.bins.len().saturating_sub(estimate.at.len()).max(1) as f64;
-    let scale = part.scale;
     let refits = estimator.refits(estimate);
     let results: Vec<(Vec<f64>, f64, f64)> = (0..count)
         .into_par_iter()
         .map(|k| {
-            let mut surface = simulator.surface(&streams.child(&format!("bootstrap-{k}")));
-            surface.iter_mut().zip(&part.mask).for_each(|(z, keep)| *z = if *keep { *z } else { f64::NAN });
-            let mut residual = Detrended::of(&surface, part.cols, case.settings, case.window).residual;
-            let trim = Trim::of(&Sizes::of(&residual), case.settings);
-            trim.apply(&mut residual);
-            let sums = estimator.bins.bin_sums(&masked_covariance(&residual, part.cols, case.max_lag));
-            let end = refits.to(&means(&sums), trim.threshold_m);
+            let twin = twins.one(&streams.child(&format!("bootstrap-{k}")));
+            let trim = twin.trim;
+            let data = estimator.bins.means(&masked_covariance(&twin.trimmed(), cols, case.max_lag));
+            let end = refits.to(&data, trim.threshold_m);
             let at = end.at.iter().zip(&estimate.at).map(|(a, e)| e + scale * (a - e)).collect();
             // A smaller part scatters more: its sum of squares is larger by the square of the scale.
             (at, end.value * scale * scale / freedom, trim.median_size_m / trim.threshold_m)
@@ -85,10 +78,6 @@ pub fn parametric(estimator: &Estimator, estimate: &Estimate, count: usize, stre
         median_over_threshold: results.iter().map(|r| r.2).collect(),
         at: results.into_iter().map(|r| r.0).collect(),
     }
-}
-
-fn means(sums: &[(f64, u64)]) -> Vec<f64> {
-    sums.iter().map(|(sum, pairs)| sum / (*pairs).max(1) as f64).collect()
 }
 
 /// The part of a raster that is simulated.
@@ -102,6 +91,11 @@ pub struct Part {
 }
 
 impl Part {
+    /// Surfaces of a covariance on it.
+    pub fn twins<'a>(self, case: &'a Case<'a>, covariance: &Covariance) -> Twins<'a> {
+        Twins::new(case, covariance, [self.rows, self.cols], self.mask)
+    }
+
     /// The whole, or a window about the middle with as much of it as may be.
     pub fn of(case: &Case) -> Self {
         let (rows, cols) = (case.geometry.rows, case.geometry.cols);
@@ -209,7 +203,7 @@ pub fn block_replicates(
         for &k in chosen {
             total.iter_mut().zip(&blocks[k].sums).for_each(|(t, s)| *t = (t.0 + s.0, t.1 + s.1));
         }
-        means(&total)
+        bins::means(&total)
     };
     // Pairs across blocks are missing: deviations are taken from what all blocks once give.
     let once: Vec<usize> = (0..blocks.len()).collect();

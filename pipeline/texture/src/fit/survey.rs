@@ -181,6 +181,11 @@ impl Survey {
         rows.flat_map(|r| cols.clone().map(move |c| r * self.geometry.cols + c)).map(|k| self.trusted.get(k)).collect()
     }
 
+    /// Whether the cell with this number has a residual, before trimming.
+    pub fn is_used(&self, cell: usize) -> bool {
+        self.used.get(cell)
+    }
+
     /// Number of residuals of a part, before trimming.
     pub fn used_count(&self, rows: Range<usize>, cols: Range<usize>) -> usize {
         rows.flat_map(|r| cols.clone().map(move |c| r * self.geometry.cols + c)).filter(|&k| self.used.get(k)).count()

@@ -131,8 +131,8 @@ pub fn normality_p(case: &Case, replicates: &Replicates) -> Option<f64> {
     })
 }
 
-/// Every model tried, the best first.
-pub fn candidates(estimates: &[Estimate]) -> Vec<Candidate> {
+/// Every model tried, the best first, and as an estimator on rings sees it.
+pub fn candidates(estimates: &[Estimate], rings: &Estimator) -> Vec<Candidate> {
     let least = estimates.iter().filter_map(Estimate::aicc).fold(f64::INFINITY, f64::min);
     let mut all: Vec<Candidate> = estimates
         .iter()
@@ -142,6 +142,7 @@ pub fn candidates(estimates: &[Estimate]) -> Vec<Candidate> {
             free: e.at.len() as u32,
             chi2: e.likelihood.as_ref().map(|l| l.chi2),
             aicc_above_best: e.aicc().map(|a| a - least),
+            model_m2: rings.mean(&e.covariance),
         })
         .collect();
     let order = |c: &Candidate| c.aicc_above_best.unwrap_or(f64::INFINITY);

@@ -1,0 +1,55 @@
+//! Surfaces of a covariance on a case's own grid and mask, measured and detrended as the case was: the null of every test.
+
+use super::case::Case;
+use super::simulate::{Shape, Simulator};
+use super::survey::{Detrended, Trim};
+use crate::covariance::Covariance;
+use crate::sizes::Sizes;
+use sastrugi_numeric::Streams;
+
+/// Range of the surface that stands for a self-affine one, windows.
+const OUTER_WINDOWS: f64 = 8.0;
+
+/// Such surfaces, on the whole or a part of a case.
+pub struct Twins<'a> {
+    case: &'a Case<'a>,
+    cols: usize,
+    /// Cells that enter the moving average.
+    trusted: Vec<bool>,
+    simulator: Simulator,
+}
+
+/// One of them.
+pub struct Twin {
+    /// Residual before trimming, m.
+    pub residual: Vec<f64>,
+    /// Where it is cut off.
+    pub trim: Trim,
+}
+
+impl<'a> Twins<'a> {
+    /// On as many rows and columns as `trusted` has cells, of which the true ones enter the moving average.
+    pub fn new(case: &'a Case<'a>, covariance: &Covariance, [rows, cols]: [usize; 2], trusted: Vec<bool>) -> Self {
+        let shape = Shape { rows, cols, profiles: case.heights.are_profiles() };
+        let outer_m = OUTER_WINDOWS * case.window_m();
+        let simulator = Simulator::new(covariance, case.settings.measurement(), shape, case.geometry.cell, outer_m);
+        Self { case, cols, trusted, simulator }
+    }
+
+    /// The one of these streams.
+    pub fn one(&self, streams: &Streams) -> Twin {
+        let mut surface = self.simulator.surface(streams);
+        surface.iter_mut().zip(&self.trusted).filter(|(_, trusted)| !**trusted).for_each(|(z, _)| *z = f64::NAN);
+        let residual = Detrended::of(&surface, self.cols, self.case.settings, self.case.window).residual;
+        let trim = Trim::of(&Sizes::of(&residual), self.case.settings);
+        Twin { residual, trim }
+    }
+}
+
+impl Twin {
+    /// The residual after trimming.
+    pub fn trimmed(mut self) -> Vec<f64> {
+        self.trim.apply(&mut self.residual);
+        self.residual
+    }
+}
