@@ -6,6 +6,8 @@ const STEPS: usize = 60;
 const TOLERANCE: f64 = 1e-12;
 /// The same where the sum is wanted, not the parameters.
 const ROUGH_TOLERANCE: f64 = 1e-6;
+/// A step that moves no parameter further is none.
+const STILL: f64 = 1e-10;
 /// Step of the difference quotients: parameters are logarithms, so this is relative.
 const DIFFERENCE: f64 = 1e-6;
 
@@ -42,6 +44,9 @@ fn search(start: &[f64], bounds: &[(f64, f64)], tolerance: f64, residuals: impl 
         let mut improved = None;
         while improved.is_none() && damping < 1e12 {
             let trial = damped_step(&at, bounds, &normal, &gradient, damping);
+            if at.iter().zip(&trial).all(|(a, t)| (a - t).abs() < STILL) {
+                return Minimum { value: squares(&current), at, steps };
+            }
             let there = residuals(&trial);
             if squares(&there) < squares(&current) {
                 improved = Some((trial, there));
@@ -156,13 +161,29 @@ impl Chord {
     }
 }
 
+/// The damped step, cut to the bounds: a parameter that would leave them goes to its bound, and the others take the step that is
+/// best with it there.
 fn damped_step(at: &[f64], bounds: &[(f64, f64)], normal: &[f64], gradient: &[f64], damping: f64) -> Vec<f64> {
     let n = at.len();
     let mut damped = normal.to_vec();
     (0..n).for_each(|k| damped[k * n + k] *= 1.0 + damping);
-    let Some(factor) = Cholesky::new(&damped, n) else { return at.to_vec() };
-    let step = factor.solve(gradient);
-    (0..n).map(|k| (at[k] - step[k]).clamp(bounds[k].0, bounds[k].1)).collect()
+    let mut next = at.to_vec();
+    let mut free: Vec<usize> = (0..n).collect();
+    while !free.is_empty() {
+        let held =
+            |k: usize| (0..n).filter(|l| !free.contains(l)).map(|l| damped[k * n + l] * (next[l] - at[l])).sum::<f64>();
+        let right: Vec<f64> = free.iter().map(|&k| gradient[k] + held(k)).collect();
+        let matrix: Vec<f64> =
+            free.iter().flat_map(|&k| free.iter().map(move |&l| (k, l))).map(|(k, l)| damped[k * n + l]).collect();
+        let Some(factor) = Cholesky::new(&matrix, free.len()) else { return at.to_vec() };
+        let step = factor.solve(&right);
+        free.iter().zip(&step).for_each(|(&k, s)| next[k] = at[k] - s);
+        let outside = |k: &usize| !(bounds[*k].0..=bounds[*k].1).contains(&next[*k]);
+        let Some(&first) = free.iter().find(|k| outside(k)) else { break };
+        next[first] = next[first].clamp(bounds[first].0, bounds[first].1);
+        free.retain(|k| *k != first);
+    }
+    next
 }
 
 /// Lower triangular factor L of a symmetric positive definite matrix `L L'`.
@@ -228,6 +249,22 @@ impl Cholesky {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Two parameters that pull together, one of them at its bound: the other ends where it does alone, in a few steps.
+    #[test]
+    fn val_a_bound_does_not_slow_the_search() {
+        let data: Vec<f64> = (0..12).map(|k| 1.0 - 0.2 * f64::from(k) + 0.01 * f64::from(k % 3)).collect();
+        let residuals = |p: &[f64]| -> Vec<f64> {
+            let curve = |x: f64| libm::exp(p[0] + p[1]) * (1.0 - libm::exp(-p[1]) * x);
+            data.iter().enumerate().map(|(k, d)| curve(0.1 * k as f64) - d).collect()
+        };
+        let open = minimise(&[0.0, 0.0], &[(-9.0, 9.0), (-9.0, 9.0)], residuals);
+        assert!(open.at[1] < -0.6, "{open:?}");
+        let found = minimise(&[0.0, 0.0], &[(-9.0, 9.0), (-0.3, 9.0)], residuals);
+        let alone = minimise(&[0.0], &[(-9.0, 9.0)], |p| residuals(&[p[0], -0.3]));
+        assert!(found.at[1] == -0.3 && (found.at[0] - alone.at[0]).abs() < 1e-9, "{found:?} {alone:?}");
+        assert!(found.steps <= 10, "{found:?}");
+    }
 
     /// A curve that its parameters bend, with data off it: both searches end at the same minimum.
     #[test]
