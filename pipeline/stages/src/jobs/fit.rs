@@ -111,6 +111,16 @@ pub fn minus_note(minus: &Minus) -> String {
     )
 }
 
+/// The fit of a DEM with its source, which is warned of where DEMs were laid onto each other badly.
+pub fn with_source(fit: FitFile, source: Source) -> FitFile {
+    let restless = source.minus.as_ref().is_some_and(|m| !m.coregistration.converged);
+    let warning = restless.then(|| {
+        "the DEMs did not come to rest when they were laid onto each other: their difference holds the relief of both".to_owned()
+    });
+    let warnings = warning.into_iter().chain(fit.warnings).collect();
+    FitFile { source: Some(source), warnings, ..fit }
+}
+
 /// Adds the items of `[[fit]]`.
 ///
 /// # Errors
@@ -219,7 +229,7 @@ impl Job for FitJob {
         let mask = shown::uses(&read.grid, &residual, &outcome);
         let band = shown::covariance_band(&residual, &outcome);
         let map = outcome.covariance_map();
-        let fit = FitFile { source: Some(source), ..outcome.fit };
+        let fit = with_source(outcome.fit, source);
         atomic::write(&work.output(FIT), to_json(&fit)?.as_bytes()).map_err(JobError::new)?;
         let id = &self.id;
         let mut products = vec![Product::released(FIT, format!("fit/{id}.json"), None)];

@@ -117,7 +117,7 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
         let methods = methods(&entry, &item, &kinds)?;
         entry.check_keys::<TextureItem>(&params, &joined_schema(&kinds, &methods))?;
         let matched = matched(builder, &entry, &item)?;
-        check_purpose(&entry, &item)?;
+        check_purpose(&entry, &item, &params)?;
         let base = item.onto.as_deref().map(|id| heightfield(builder, &entry, "onto", id)).transpose()?;
         let fill = item.fill.as_deref().map(|id| heightfield(builder, &entry, "fill", id)).transpose()?;
         let modulation = modulation(builder, &entry, &item)?;
@@ -201,13 +201,18 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
 }
 
 /// Refuses keys that do not go together.
-fn check_purpose(entry: &Entry<'_>, item: &TextureItem) -> Result<(), StudyError> {
+fn check_purpose(entry: &Entry<'_>, item: &TextureItem, params: &Value) -> Result<(), StudyError> {
     if item.modulate.is_some() && item.onto.is_none() {
         return Err(entry.error("modulate", "`modulate` needs `onto`, the base whose texture it changes"));
     }
     let alone = item.onto.is_none() && item.methods.is_none() && item.method == fft_ma::kind().kind;
     if item.fill.is_some() && !alone {
         return Err(entry.error("fill", "`fill` goes with neither `onto`, `methods` nor a method other than `fft_ma`"));
+    }
+    if let Some(name) = params.as_object().into_iter().flat_map(|p| p.keys()).find(|_| item.fill.is_some()) {
+        let message =
+            format!("`fill` takes its cells from the DEM and its covariance from the fit; `{name}` has no place");
+        return Err(entry.error(name, message));
     }
     Ok(())
 }

@@ -3,7 +3,9 @@
 use super::{Read, Reading, parameters, read, transects};
 use crate::error::Error;
 use crate::jobs::dem::{input_error, metres_note};
-use crate::jobs::fit::{IN_DEGREES, STAGE, check_noise_reference, minus_note, noise_reference, subtract, to_json};
+use crate::jobs::fit::{
+    IN_DEGREES, STAGE, check_noise_reference, minus_note, noise_reference, subtract, to_json, with_source,
+};
 use sastrugi_numeric::resample::in_metres;
 use sastrugi_numeric::{Geometry, Streams};
 use sastrugi_schemas::coregistration::Minus;
@@ -51,7 +53,7 @@ pub fn fit(request: &Request<'_>) -> Result<(FitFile, Vec<String>), Error> {
         dem::write(path, &outcome.covariance_map(), &Crs::default(), &Default::default())
             .map_err(super::write_error)?;
     }
-    let fit = FitFile { source: Some(source), ..outcome.fit };
+    let fit = with_source(outcome.fit, source);
     atomic::write(request.output, to_json(&fit)?.as_bytes())
         .map_err(|e| Error::failed(format!("{}: {e}", request.output.display())))?;
     Ok((fit, notes))

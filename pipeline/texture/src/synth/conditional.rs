@@ -11,7 +11,8 @@
 //! 16 directions from the one that is filled, the first three with data in each: those farther away are screened.
 //!
 //! Source: Journel and Huijbregts 1978, Mining Geostatistics, section VII.A; Chiles and Delfiner 2012, Geostatistics, sections
-//! 3.4 and 7.3. A self-affine covariance is made as its stationary twin over the DEM's longer side.
+//! 3.4 and 7.3. A self-affine covariance is made as its stationary twin over the DEM's longer side, or over as much of it as a
+//! torus of [`TWIN_CELLS`] cells has room for.
 //!
 //! Cost, for each filled cell: one system of at most 51 equations, and steps along the rays. Memory: a torus that is the DEM
 //! and the reach of the covariance wide, 36 bytes a cell.
@@ -50,6 +51,10 @@ const PER_RAY: usize = 3;
 const SURROUNDED: usize = 13;
 /// Directions that must hold data for a cell to be filled.
 const ENCLOSED: usize = 9;
+/// Most cells of the torus of a self-affine covariance's twin.
+const TWIN_CELLS: f64 = (1u32 << 24) as f64;
+/// Fewest cells of its range.
+const OUTER_CELLS_MIN: f64 = 32.0;
 /// Share of the variance that two cells are taken to differ by at least, so that smooth covariances can be solved.
 const JITTER: f64 = 1e-9;
 
@@ -99,7 +104,7 @@ pub fn fill(dem: &Grid, covariance: &Covariance, streams: &Streams) -> Result<Fi
     if dem.finite_count() == 0 {
         return Err(FillError::NoData);
     }
-    let covariance = covariance.stationary(dem.geometry.size().into_iter().fold(0.0, f64::max));
+    let covariance = stationary(dem, covariance);
     let unconditional = unconditional(dem, &covariance, streams)?;
     let holes: Vec<usize> = (0..dem.values.len()).filter(|k| !dem.values[*k].is_finite()).collect();
     let fill_one = |k: &usize| estimate(dem, &unconditional, &covariance, [k / dem.cols(), k % dem.cols()]);
@@ -108,6 +113,23 @@ pub fn fill(dem: &Grid, covariance: &Covariance, streams: &Streams) -> Result<Fi
     let left = filled.iter().filter(|z| z.is_nan()).count();
     holes.iter().zip(&filled).for_each(|(k, z)| grid.values[*k] = *z);
     Ok(Filled { grid, cells: holes.len() - left, left })
+}
+
+/// The covariance, or its twin with the longest range whose torus is not too large.
+fn stationary(dem: &Grid, covariance: &Covariance) -> Covariance {
+    let [width_m, height_m] = dem.geometry.size();
+    let [dx, dy] = dem.geometry.cell;
+    let has_room = |twin: &Covariance| {
+        let [x_m, y_m] = reach::torus_m(twin);
+        (x_m + width_m) / dx * ((y_m + height_m) / dy) <= TWIN_CELLS
+    };
+    let mut outer_m = width_m.max(height_m);
+    let mut twin = covariance.stationary(outer_m);
+    while !has_room(&twin) && outer_m > OUTER_CELLS_MIN * dx.max(dy) {
+        outer_m *= 0.5;
+        twin = covariance.stationary(outer_m);
+    }
+    twin
 }
 
 /// A normal field with the covariance on the cells of the DEM, from a torus so wide that its edges do not know each other.
@@ -252,6 +274,19 @@ mod tests {
         let tilted = fill(&with_hole(&tilted)).grid;
         let off = (0..1600).map(|k| (tilted.values[k] - plane(k) - filled.grid.values[k]).abs()).fold(0.0, f64::max);
         assert!(off < 1e-6, "{off}");
+    }
+
+    /// A self-affine surface of a size whose own twin would need a torus of 30 sides.
+    #[test]
+    fn val_self_affine_surfaces_are_filled() {
+        let parameters = [("increment_1m_m".to_owned(), 0.1), ("hurst".to_owned(), 0.6)].into();
+        let covariance = crate::covariance::Form::parse("self_affine").unwrap().covariance(&parameters).unwrap();
+        let geometry = Geometry::square(300, 300, 0.1);
+        let twin = stationary(&Grid::filled(geometry, 0.0), &covariance);
+        assert!(twin.is_stationary() && twin.range_m() < 30.0 && twin.range_m() >= 1.6, "{}", twin.range_m());
+        let mut holed = unconditional(&Grid::filled(geometry, 0.0), &twin, &Streams::for_seed(1, "truth")).unwrap();
+        (100..110).flat_map(|r| (90..104).map(move |c| r * 300 + c)).for_each(|k| holed.values[k] = f64::NAN);
+        assert_eq!(fill(&holed, &covariance, &Streams::for_seed(2, "texture")).unwrap().cells, 140);
     }
 
     /// Steps of one cell, inside the hole and across its edge, have the covariance's mean square `2 (C(0) - C(1))`. Null:
