@@ -269,6 +269,13 @@ fn blocks_agree(path: &Path) {
         let expected = whole.grid.window(range.start, 0, range.len(), whole.grid.cols());
         assert!(same(&part, &expected), "{}: rows {range:?}", path.display());
     }
+    let cols = whole.grid.cols();
+    for part in [0..1, cols - 1..cols, cols / 3..cols / 3 + cols.div_ceil(3)] {
+        let expected = whole.grid.window(rows / 3, part.start, rows.div_ceil(3), part.len());
+        let found = reader.read_part(rows / 3..rows / 3 + rows.div_ceil(3), part.clone()).unwrap();
+        assert!(same(&found, &expected), "{}: columns {part:?}", path.display());
+    }
+    assert!(matches!(reader.read_part(0..1, cols..cols + 1), Err(DemError::Unfit { .. })));
     for range in [0..rows + 1, rows..rows + 1, 5..5] {
         assert!(matches!(reader.read_rows(range), Err(DemError::Unfit { .. })));
     }
