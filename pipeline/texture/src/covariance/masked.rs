@@ -8,7 +8,7 @@
 //! twice and taken off once. So memory is bounded by the strip, not by the raster: about 40 bytes per padded strip cell.
 //! Rounding: about 1e-15 of the zero-lag sum; pair counts are exact.
 
-use sastrugi_numeric::fft::{RealFft2, smooth_length};
+use sastrugi_numeric::fft::{Complex64, RealFft2, smooth_length};
 
 /// Rows that a strip adds, unless four times the largest lag is more.
 const STRIP_ROWS: usize = 256;
@@ -53,7 +53,7 @@ impl MaskedCovariance {
 pub fn masked_covariance(values: &[f64], cols: usize, max_lag: [usize; 2]) -> MaskedCovariance {
     let rows = values.len().checked_div(cols).unwrap_or(0);
     let max_lag = [max_lag[0].min(rows.saturating_sub(1)), max_lag[1].min(cols.saturating_sub(1))];
-    let step = STRIP_ROWS.max(4 * max_lag[0]).min(rows.max(1));
+    let step = PairSums::strip_rows(rows, STRIP_ROWS.max(4 * max_lag[0]), max_lag[0]);
     let mut sums = PairSums::new(step, cols, max_lag);
     for first in (0..rows).step_by(step) {
         sums.add(&values[first * cols..(first + step + max_lag[0]).min(rows) * cols]);
@@ -69,6 +69,15 @@ pub struct PairSums {
 }
 
 impl PairSums {
+    /// Rows of strips that are added with the least work: `most` or somewhat fewer, so that `rows` are cut evenly and padded
+    /// little.
+    pub fn strip_rows(rows: usize, most: usize, max_lag: usize) -> usize {
+        let fewest = rows.div_ceil(most.max(1)).max(1);
+        let step = |strips: usize| rows.div_ceil(strips).max(1);
+        let work = |&strips: &usize| strips * (smooth_length(step(strips) + 2 * max_lag) + smooth_length(2 * max_lag));
+        step((fewest..=fewest + fewest / 2).min_by_key(work).unwrap_or(fewest))
+    }
+
     /// Sums for strips of `step` rows of `cols` cells; lags smaller than the raster.
     pub fn new(step: usize, cols: usize, max_lag: [usize; 2]) -> Self {
         let total = StripSums::new(step + max_lag[0], cols, max_lag);
@@ -99,6 +108,8 @@ struct StripSums {
     shape: [usize; 2],
     cols: usize,
     max_lag: [usize; 2],
+    /// The strip at work.
+    padded: Vec<f64>,
     data_power: Vec<f64>,
     mask_power: Vec<f64>,
 }
@@ -108,22 +119,27 @@ impl StripSums {
         let shape = [smooth_length(strip_rows + max_lag[0]), smooth_length(cols + max_lag[1])];
         let half = shape[0] * (shape[1] / 2 + 1);
         let fft = RealFft2::new(shape[0], shape[1]);
-        Self { fft, shape, cols, max_lag, data_power: vec![0.0; half], mask_power: vec![0.0; half] }
+        let padded = vec![0.0; shape[0] * shape[1]];
+        Self { fft, shape, cols, max_lag, padded, data_power: vec![0.0; half], mask_power: vec![0.0; half] }
     }
 
     fn add(&mut self, strip: &[f64]) {
-        let padded = |f: fn(f64) -> f64| {
-            let mut field = vec![0.0; self.shape[0] * self.shape[1]];
-            for (out, row) in field.chunks_exact_mut(self.shape[1]).zip(strip.chunks_exact(self.cols)) {
-                out.iter_mut().zip(row).for_each(|(o, v)| *o = f(*v));
-            }
-            self.fft.forward(&field).values
-        };
-        let data = padded(|v| if v.is_nan() { 0.0 } else { v });
-        self.data_power.iter_mut().zip(&data).for_each(|(p, d)| *p += d.norm_sqr());
-        drop(data);
-        let mask = padded(|v| f64::from(u8::from(!v.is_nan())));
-        self.mask_power.iter_mut().zip(&mask).for_each(|(p, m)| *p += m.norm_sqr());
+        self.pad(strip, |v| if v.is_nan() { 0.0 } else { v });
+        add_power(&mut self.data_power, &self.fft.forward(&self.padded).values);
+        self.pad(strip, |v| if v.is_nan() { 0.0 } else { 1.0 });
+        add_power(&mut self.mask_power, &self.fft.forward(&self.padded).values);
+    }
+
+    /// A figure of each cell of a strip, zeros beyond.
+    fn pad(&mut self, strip: &[f64], figure: impl Fn(f64) -> f64) {
+        let filled = strip.len() / self.cols * self.shape[1];
+        let (rows, beyond) = self.padded.split_at_mut(filled);
+        for (out, row) in rows.chunks_exact_mut(self.shape[1]).zip(strip.chunks_exact(self.cols)) {
+            let (cells, beyond) = out.split_at_mut(self.cols);
+            cells.iter_mut().zip(row).for_each(|(o, v)| *o = figure(*v));
+            beyond.fill(0.0);
+        }
+        beyond.fill(0.0);
     }
 
     /// Sum of products and number of pairs at each stored lag.
@@ -137,4 +153,8 @@ impl StripSums {
             (sums[k], pairs[k].round() as u64)
         })
     }
+}
+
+fn add_power(total: &mut [f64], spectrum: &[Complex64]) {
+    total.iter_mut().zip(spectrum).for_each(|(t, s)| *t += s.norm_sqr());
 }
