@@ -8,6 +8,7 @@
 //! rounding nor the number of threads shows). Memory: 12 bytes per cell of result and two rows per band.
 
 use rayon::prelude::*;
+use std::borrow::Cow;
 
 /// Bands are at least this many rows, and four times the window.
 const BAND_ROWS: usize = 64;
@@ -64,6 +65,26 @@ pub fn box_mean(values: &[f64], cols: usize, window: BoxWindow) -> BoxMean {
         mean.chunks_exact_mut(cols).zip(count.chunks_exact_mut(cols)).for_each(|(m, n)| average.next_row(m, n));
     });
     BoxMean { mean, count }
+}
+
+/// Absolute differences of row-major `values` in rows of `cols` from the moving average over those not marked in `left_out`;
+/// NaN where there is no data, or none in the window.
+pub(crate) fn deviations(values: &[f64], left_out: &[bool], cols: usize, window: BoxWindow) -> Vec<f64> {
+    let averaged = match left_out.contains(&true) {
+        true => Cow::from_iter(values.iter().zip(left_out).map(|(&v, &out)| if out { f64::NAN } else { v })),
+        false => Cow::from(values),
+    };
+    let band = band_rows(window);
+    let mut deviations = vec![0.0; values.len()];
+    deviations.par_chunks_mut((band * cols).max(1)).enumerate().for_each(|(k, lines)| {
+        let mut average = RunningMean::from(&averaged, cols, window, k * band);
+        let (mut mean, mut count) = (vec![0.0; cols], vec![0; cols]);
+        for (line, own) in lines.chunks_exact_mut(cols).zip(values[k * band * cols..].chunks_exact(cols)) {
+            average.next_row(&mut mean, &mut count);
+            line.iter_mut().zip(own).zip(&mean).for_each(|((d, v), m)| *d = (v - m).abs());
+        }
+    });
+    deviations
 }
 
 /// Rows after which sums are started afresh.

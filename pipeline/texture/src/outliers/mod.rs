@@ -11,7 +11,7 @@
 //!
 //! Cost: a moving average and a count per round; rounds end when nothing changes, at most `ROUNDS`.
 
-use crate::detrend::{BoxWindow, box_mean};
+use crate::detrend::{BoxWindow, deviations};
 use crate::sizes::Sizes;
 
 /// Robust standard deviations beyond which a cell is an outlier by itself.
@@ -39,9 +39,7 @@ pub fn find(values: &[f64], cols: usize, window: BoxWindow) -> Vec<bool> {
 
 /// Outliers about the background of the cells not marked in `outlier`.
 fn judge(values: &[f64], outlier: &[bool], cols: usize, window: BoxWindow) -> Vec<bool> {
-    let trusted: Vec<f64> = values.iter().zip(outlier).map(|(&v, &out)| if out { f64::NAN } else { v }).collect();
-    let background = box_mean(&trusted, cols, window).mean;
-    let deviation: Vec<f64> = values.iter().zip(&background).map(|(v, b)| (v - b).abs()).collect();
+    let deviation = deviations(values, outlier, cols, window);
     let scale = NORMAL_CONSISTENCY * Sizes::of(&deviation).exceeded_by(0.5);
     let seeds = deviation.iter().map(|d| *d > SEED_SCALES * scale).collect();
     let grown = grow(seeds, cols, |k| deviation[k] > GROWTH_SCALES * scale);
