@@ -5,7 +5,7 @@
 //! georeferencing. Both stand behind [`parse`], and behind [`Raster`] for rows at a time.
 
 use super::crs::{Crs, GeoKey};
-use super::{Dem, DemError, DemInfo, Format, MAX_CELLS, ReadOptions, Refusal, cell_count};
+use super::{Claimed, Dem, DemError, DemInfo, Format, MAX_CELLS, ReadOptions, Refusal, cell_count};
 use geotiff_reader::geokeys::{GeoKeyDirectory, GeoKeyValue};
 use geotiff_reader::{GeoTiffFile, GeoTiffOpenOptions};
 use sastrugi_numeric::{Geometry, Grid};
@@ -40,6 +40,13 @@ pub(super) fn looks_like(bytes: &[u8]) -> bool {
 /// Reads a TIFF from its file, strip by strip or tile by tile.
 pub(super) fn read(path: &Path, options: &ReadOptions) -> Result<Dem, DemError> {
     Raster::open(path, options, 0)?.whole().map_err(|refusal| refusal.about(path))
+}
+
+/// What the header says.
+pub(super) fn claimed(path: &Path, options: &ReadOptions) -> Option<Claimed> {
+    let Raster { geometry, info, .. } = Raster::open(path, options, 0).ok()?;
+    let cell_m = (!info.crs.geographic).then(|| geometry.cell[0].min(geometry.cell[1]));
+    Some(Claimed { cells: geometry.len() as u64, points: 0, cell_m })
 }
 
 /// Reads a TIFF that is in memory.

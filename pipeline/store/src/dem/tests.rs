@@ -313,6 +313,25 @@ fn val_rows_of_written_rasters() {
     }
 }
 
+/// The claims of a header are those of the raster, without decoding.
+#[test]
+fn val_claims() {
+    let folder = tempfile::tempdir().unwrap();
+    let grid = hilly(60, 27);
+    let claim = |name: &str, options: &ReadOptions| {
+        let path = folder.path().join(name);
+        write(&path, &grid, &Crs::default(), &Default::default()).unwrap();
+        claimed(&path, options)
+    };
+    let cell_m = Some(grid.geometry.cell[0].min(grid.geometry.cell[1]));
+    assert_eq!(claim("a.tif", &ReadOptions::default()), Some(Claimed { cells: 60 * 27, points: 0, cell_m }));
+    assert_eq!(claim("a.npy", &ReadOptions::default()), None);
+    assert_eq!(claimed(&folder.path().join("none.tif"), &ReadOptions::default()), None);
+    if let Some(cloud) = data("akl_lidar.laz") {
+        assert!(claimed(&cloud, &ReadOptions::default()).is_some_and(|c| c.points > 0 && c.cells > 0));
+    }
+}
+
 /// Files of strips without georeferencing, of every type of heights, compressions and predictors.
 #[test]
 fn val_rows_of_plain_tiffs() {

@@ -26,6 +26,7 @@ pub(crate) mod estimator;
 mod expectation;
 mod heights;
 pub(crate) mod least_squares;
+mod memory;
 mod params;
 mod profile;
 pub(crate) mod report;

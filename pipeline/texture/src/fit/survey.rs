@@ -22,7 +22,7 @@ use std::iter::repeat;
 use std::ops::Range;
 
 /// Cells of a strip.
-const STRIP_CELLS: usize = 1 << 21;
+pub const STRIP_CELLS: usize = 1 << 21;
 
 /// A DEM detrended, trimmed and correlated.
 #[derive(Clone, Debug)]
