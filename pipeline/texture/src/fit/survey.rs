@@ -11,6 +11,7 @@ use super::resampling::block_places;
 use super::residual::{Part, Windows};
 use super::{FitError, FitSettings, Mode};
 use crate::bitmap::Bitmap;
+use crate::covariance::masked::even_step;
 use crate::covariance::partial::DetrendedCells;
 use crate::covariance::{MaskedCovariance, PairSums};
 use crate::detrend::{BoxWindow, box_mean};
@@ -134,7 +135,7 @@ impl Survey {
         let geometry = heights.geometry();
         let most = (STRIP_CELLS / geometry.cols).max(4 * window.cells()[0].max(max_lag[0]));
         // Transects do not know each other.
-        let step = if heights.are_profiles() { 1 } else { PairSums::strip_rows(geometry.rows, most, max_lag[0]) };
+        let step = if heights.are_profiles() { 1 } else { even_step(geometry.rows, most, max_lag[0]) };
         let reading = Reading { heights, settings, geometry, window, step };
         let (trusted, measured, lowest_m) = reading.trusted()?;
         let (used, partial, trim) = reading.threshold(&trusted, lowest_m)?;
