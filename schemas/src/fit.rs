@@ -87,6 +87,9 @@ pub struct Source {
     /// Share of the window's cells with data that the masks dropped.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub masked_share: Option<f64>,
+    /// The smooth part of the DEM that its noise was found from, when one was given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub noise_reference: Option<NoiseReference>,
     /// The DEM that was subtracted, when one was, and how it was laid onto this one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub minus: Option<Minus>,
@@ -101,6 +104,19 @@ pub struct MaskSource {
     pub sha256: String,
     /// True when what it marks was dropped, false when the rest was.
     pub excludes: bool,
+}
+
+/// A smooth part of a DEM, and the white noise found there.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct NoiseReference {
+    /// File name without its folder.
+    pub file: String,
+    /// SHA-256 of the file.
+    pub sha256: String,
+    /// Standard deviation of the noise of a cell, m.
+    pub sigma_m: f64,
+    /// Second differences it was found from.
+    pub differences: u64,
 }
 
 /// Intervals of a fit's parameters.

@@ -127,6 +127,10 @@ pub struct FitItem {
     /// As `mask`, for cells that take no part.
     #[serde(default)]
     pub exclude: Files,
+    /// File, as `mask`, of a part of the DEM that is smooth in reality: the DEM's white noise is found there (and
+    /// `noise_sigma_m` not stated).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub noise_reference: Option<String>,
     /// Id of a DEM that is laid onto the first and subtracted (snow depth), both in one metric coordinate system.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub minus: Option<String>,

@@ -120,6 +120,113 @@ fn val_masks_go_into_the_release() {
     assert_eq!(stale.len(), 2, "{plan}");
 }
 
+/// A texture of 4 cm, and beside it a road (x below 4 m); 8 mm of white noise on both.
+fn with_road(folder: &Path) {
+    write(folder, "truth.json", r#"{"model": "exponential", "parameters": {"sigma_m": 0.04, "range_m": 0.3}}"#);
+    json_of(folder, &["texture", "truth.json", "--size", "20x16", "--cell", "0.1", "-o", "snow.asc"]);
+    let text = std::fs::read_to_string(folder.join("snow.asc")).unwrap();
+    let mut lines = text.lines();
+    let mut noisy: Vec<String> = lines.by_ref().take_while(|l| !l.starts_with("NODATA")).map(str::to_owned).collect();
+    noisy.push("NODATA_value -9999".to_owned());
+    let mut state = 1u64;
+    // The sum of twelve uniform draws, less six, is normal enough.
+    let mut normal = || {
+        let mut draw = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1u64 << 53) as f64
+        };
+        (0..12).map(|_| draw()).sum::<f64>() - 6.0
+    };
+    for (row, line) in lines.enumerate() {
+        let heights = line.split_whitespace().enumerate().map(|(col, z)| {
+            let ground: f64 = if col < 40 { 0.01 * row as f64 } else { z.parse().unwrap() };
+            (ground + 0.008 * normal()).to_string()
+        });
+        noisy.push(heights.collect::<Vec<_>>().join(" "));
+    }
+    write(folder, "snow.asc", &(noisy.join("\n") + "\n"));
+    json_of(folder, &["convert", "snow.asc", "snow.tif"]);
+    let of = |west: f64, east: f64| {
+        format!(
+            r#"{{"type": "Polygon", "coordinates": [[[{west}, -1], [{east}, -1], [{east}, 99], [{west}, 99], [{west}, -1]]]}}"#
+        )
+    };
+    write(folder, "road.geojson", &of(-1.0, 3.95));
+    write(folder, "field.geojson", &of(4.05, 99.0));
+}
+
+/// The noise of the road (7700 runs of cells: good to 2 %) is that of the field, which the fit of the field takes off; the map of the
+/// covariance lies about lag zero. As a verb and in a study.
+#[test]
+fn val_noise_of_a_reference() {
+    let folder = area();
+    let path = folder.path();
+    with_road(path);
+    let reference = ["--noise-reference", "road.geojson", "--mask", "field.geojson"];
+    let plain = ["--outer-scale", "2", "--bootstrap", "0", "-o", "fit.json", "--map", "map.tif"];
+    let (ours, source) = parted(json_of(path, &[&["fit", "snow.tif"], &reference[..], &plain].concat()));
+    let found = source["noise_reference"]["sigma_m"].as_f64().unwrap();
+    assert!((found / 0.008 - 1.0).abs() < 0.06, "{found}");
+    assert_eq!(source["noise_reference"]["file"], "road.geojson");
+    assert_eq!(ours["settings"]["noise_sigma_m"], json!(found));
+    let sigma = ours["parameters"]["sigma_m"].as_f64().unwrap();
+    assert!((sigma / 0.04 - 1.0).abs() < 0.15, "{sigma}");
+
+    let info = json_of(path, &["info", "map.tif"]);
+    assert_eq!((info["rows"].as_i64(), info["cols"].as_i64()), (Some(21), Some(21)), "{info}");
+
+    let study = "[study]\nname = \"noisy\"\nseed = 7\ndate = \"2026-01-01\"\n\n[[dem]]\nid = \"site\"\nfile = \"snow.tif\"\n\n\
+         [[fit]]\nid = \"fit\"\ndem = \"site\"\nouter_scale_m = 2.0\nbootstrap = 0\nmask = \"field.geojson\"\n\
+         noise_reference = \"road.geojson\"\n";
+    write(path, "study.toml", study);
+    json_of(path, &["run", "study.toml", "-o", "release"]);
+    let release = path.join("release");
+    let text = std::fs::read_to_string(release.join("fit/fit.json")).unwrap();
+    let (released, source) = parted(serde_json::from_str(&text).unwrap());
+    assert!(released == ours, "{:?} {:?}", released["parameters"], ours["parameters"]);
+    assert_eq!(source["noise_reference"]["file"], "fit-noise.geojson");
+    assert!(release.join("mask/fit-noise.geojson").exists());
+    let read = |path: std::path::PathBuf| std::fs::read(path).unwrap();
+    assert_eq!(read(release.join("fit/fit.covariance.tif")), read(path.join("map.tif")));
+    assert_eq!(json_of(path, &["verify", "release", "--recompute", "all"])["differences"], json!([]));
+}
+
+/// One sentence each: a reference where the noise is stated, in a mode without noise, with a DEM to subtract, outside the DEM.
+#[test]
+fn val_bad_noise_references() {
+    let folder = area();
+    let path = folder.path();
+    with_road(path);
+    let study = |more: &str| {
+        write(
+            path,
+            "study.toml",
+            &format!(
+                "[study]\nname = \"n\"\nseed = 7\ndate = \"2026-01-01\"\n\n[[dem]]\nid = \"site\"\nfile = \"snow.tif\"\n\n\
+                 [[fit]]\nid = \"fit\"\ndem = \"site\"\nouter_scale_m = 2.0\nnoise_reference = \"road.geojson\"\n{more}\n"
+            ),
+        );
+        sastrugi_in(path, &["plan", "study.toml", "-o", "release"])
+    };
+    for (more, word) in [
+        ("noise_sigma_m = 0.01", "one of the two"),
+        ("mode = \"paper\"\nbootstrap = 0", "neither an inner scale nor noise"),
+        ("minus = \"site\"", "the noise of a difference"),
+    ] {
+        let call = study(more);
+        assert_eq!(call.code, 2, "{more}: {}", call.stderr);
+        assert!(call.stderr.contains(word), "{more}: {}", call.stderr);
+    }
+    write(
+        path,
+        "tiny.geojson",
+        r#"{"type": "Polygon", "coordinates": [[[0, 0], [0.5, 0], [0.5, 0.5], [0, 0.5], [0, 0]]]}"#,
+    );
+    let call = sastrugi_in(path, &["fit", "snow.tif", "--noise-reference", "tiny.geojson", "-o", "fit.json"]);
+    assert!(call.code == 65 && call.stderr.contains("30 runs of three"), "{} {}", call.code, call.stderr);
+    assert!(!path.join("fit.json").exists());
+}
+
 /// A generated terrain has its own place.
 #[test]
 fn val_a_terrain_is_masked_in_its_own_metres() {

@@ -273,6 +273,9 @@ pub struct Fit {
     /// Standard deviation of the DEM's white noise, m.
     #[arg(long, value_name = "M", allow_negative_numbers = true)]
     pub noise_sigma: Option<f64>,
+    /// Part of the DEM that is smooth in reality (GeoJSON polygons or raster): its white noise is found there.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["noise_sigma", "minus"])]
+    pub noise_reference: Option<PathBuf>,
     /// Standard deviation of the point spread that blurred the DEM, m.
     #[arg(long, value_name = "M", allow_negative_numbers = true)]
     pub inner_scale: Option<f64>,
@@ -291,6 +294,9 @@ pub struct Fit {
     /// DEM that is laid onto the first (shift, raise, tilt) and subtracted, as for snow depth.
     #[arg(long, value_name = "DEM")]
     pub minus: Option<PathBuf>,
+    /// Covariance at every lag as a GeoTIFF, whose coordinates are the lag in m.
+    #[arg(long, value_name = "MAP.tif")]
+    pub map: Option<PathBuf>,
     /// Any other parameter of the fit (see `kinds fit`), `name=value`.
     #[arg(long = "set", value_name = "K=V")]
     pub set: Vec<String>,

@@ -17,6 +17,7 @@ pub mod coregister;
 pub mod covariance;
 pub mod detrend;
 pub mod fit;
+pub mod noise;
 mod onto;
 pub mod outliers;
 pub mod registry;

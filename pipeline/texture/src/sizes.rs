@@ -4,6 +4,8 @@
 //! is 1/4096 of its lower end wide or less. Within a class values are taken to lie evenly; a quantile of many values is
 //! then good to a few 1e-6 of itself. Values below 2^-40 share the first class, values above 2^40 the last.
 
+use sastrugi_numeric::sums;
+
 /// Bits of the mantissa that are kept.
 const MANTISSA_BITS: u32 = 12;
 const SHIFT: u32 = 52 - MANTISSA_BITS;
@@ -11,6 +13,9 @@ const SHIFT: u32 = 52 - MANTISSA_BITS;
 const EXPONENT_MAX: i32 = 40;
 const FIRST: u64 = ((1023 - EXPONENT_MAX) as u64) << MANTISSA_BITS;
 const CLASSES: usize = (2 * EXPONENT_MAX as usize) << MANTISSA_BITS;
+
+/// Standard deviation of a normal variable over its median absolute value (Hampel, 1974).
+pub(crate) const NORMAL_CONSISTENCY: f64 = 1.482_602_218_505_602;
 
 /// Absolute values, counted.
 pub(crate) struct Sizes {
@@ -40,6 +45,18 @@ impl Sizes {
         }
     }
 
+    /// Root mean square of the values; NaN without any. Good to 1e-4 of itself.
+    pub fn root_mean_square(&self) -> f64 {
+        let counted = self.counts.iter().enumerate().filter(|(_, count)| **count > 0);
+        let squares: Vec<f64> = counted
+            .map(|(class, &count)| {
+                let [low, high] = ends(class);
+                count as f64 * (low * low + low * high + high * high) / 3.0
+            })
+            .collect();
+        (sums::sum(&squares) / self.total as f64).sqrt()
+    }
+
     /// The absolute value that a share `level` of the values exceeds; NaN without values.
     pub fn exceeded_by(&self, level: f64) -> f64 {
         let rank = (1.0 - level) * self.total as f64;
@@ -47,14 +64,19 @@ impl Sizes {
         for (class, &count) in self.counts.iter().enumerate().filter(|(_, count)| **count > 0) {
             let here = count as f64;
             if below + here >= rank {
-                let end = |class: usize| f64::from_bits((FIRST + class as u64) << SHIFT);
-                let low = if class == 0 { 0.0 } else { end(class) };
-                return low + (end(class + 1) - low) * ((rank - below) / here);
+                let [low, high] = ends(class);
+                return low + (high - low) * ((rank - below) / here);
             }
             below += here;
         }
         f64::NAN
     }
+}
+
+/// Values between which a class lies.
+fn ends(class: usize) -> [f64; 2] {
+    let end = |class: usize| f64::from_bits((FIRST + class as u64) << SHIFT);
+    [if class == 0 { 0.0 } else { end(class) }, end(class + 1)]
 }
 
 #[cfg(test)]
@@ -74,6 +96,9 @@ mod tests {
             let expected = sorted[((1.0 - level) * sorted.len() as f64) as usize];
             assert!((sizes.exceeded_by(level) / expected - 1.0).abs() < 3e-4, "{level}");
         }
+        let squares = sums::mean(&sorted.iter().map(|v| v * v).collect::<Vec<_>>());
+        assert!((sizes.root_mean_square() / squares.sqrt() - 1.0).abs() < 1e-4);
+        assert!(Sizes::new().root_mean_square().is_nan());
         assert!(Sizes::new().exceeded_by(0.5).is_nan());
         assert!(Sizes::of(&[0.0; 5]).exceeded_by(0.5) < 1e-12);
         assert!(Sizes::of(&[1e300, -1e300, f64::INFINITY]).exceeded_by(0.1) > 1e11);

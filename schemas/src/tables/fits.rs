@@ -89,6 +89,18 @@ super::table! {
         naive_sigma_m: f64 ["m"],
         /// Range of that fit.
         naive_range_m: f64 ["m"],
+        /// Root mean square of the residual before trimming: heights below the window.
+        band_rms_m: f64 ["m"],
+        /// Standard deviation of increments over 1 m of the self-affine surface of the same covariance; where fits at other
+        /// windows disagree.
+        increment_1m_m: f64 ["m"],
+        /// Its Hurst exponent.
+        hurst: f64 ["1"],
+        /// Standard deviation of the DEM's white noise that the fit reckons with.
+        noise_sigma_m: f64 ["m"],
+        /// Shortest lag at which the texture's increments exceed those of the noise; no shorter than the cell and the point
+        /// spread.
+        effective_resolution_m: f64 ["m"],
         /// Warnings, joined by `; `.
         warnings: String [""],
     }

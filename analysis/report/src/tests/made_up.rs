@@ -329,6 +329,11 @@ fn measured(data: &mut Data, shelf: &mut Shelf) {
             window_disagreement_z: if mode == "paper" { f64::NAN } else { 1.2 },
             naive_sigma_m: 14.0,
             naive_range_m: 320.0,
+            band_rms_m: 15.0,
+            increment_1m_m: f64::NAN,
+            hurst: f64::NAN,
+            noise_sigma_m: 0.0,
+            effective_resolution_m: 90.0,
             warnings: String::new(),
         });
         if mode == "corrected" {

@@ -93,7 +93,8 @@ pub fn fit(args: &Fit, common: &Common) -> Verdict {
     put("noise_sigma_m", args.noise_sigma.map(|v| json!(v)));
     put("inner_scale_m", args.inner_scale.map(|v| json!(v)));
     let window = args.window.as_deref().map(|w| numbers::<4>("--window", w)).transpose()?;
-    let reading = Reading { window, masks: args.masks.all(), ..reading(&args.reading)? };
+    let noise_reference = args.noise_reference.clone();
+    let reading = Reading { window, masks: args.masks.all(), noise_reference, ..reading(&args.reading)? };
     let request = verbs::fit::Request {
         dem: &args.dem,
         output: &args.output,
@@ -101,6 +102,7 @@ pub fn fit(args: &Fit, common: &Common) -> Verdict {
         seed: args.seed,
         reading,
         minus: args.minus.as_deref(),
+        map: args.map.as_deref(),
     };
     let (fit, read_notes) = verbs::fit::fit(&request)?;
     let interval = |name: &str| {

@@ -9,15 +9,16 @@ use crate::revision::Room;
 use crate::runner::graph::Node;
 use crate::study::Entry;
 use sastrugi_numeric::{Grid, Streams};
-use sastrugi_schemas::Kind;
 use sastrugi_schemas::coregistration::Minus;
-use sastrugi_schemas::fit::{Candidate, DirectionBin, FitFile, Intervals, Source};
+use sastrugi_schemas::fit::{Candidate, DirectionBin, FitFile, Intervals, MaskSource, NoiseReference, Source};
 use sastrugi_schemas::kind::{read_parameters, schema_of};
 use sastrugi_schemas::study::FitItem;
 use sastrugi_schemas::tables::{CandidateCurveRow, CandidateRow, CovarianceRow, FitRow, LikelihoodProfileRow};
-use sastrugi_store::dem::Dem;
+use sastrugi_schemas::{Kind, ParameterError};
+use sastrugi_store::dem::{Crs, Dem};
 use sastrugi_store::{atomic, dem, digest};
 use sastrugi_texture::coregister::coregister;
+use sastrugi_texture::noise::Noise;
 use sastrugi_texture::{FitParameters, FitSettings, shown};
 use serde_json::{Value, json};
 
@@ -28,6 +29,8 @@ pub const FIT: &str = "fit.json";
 const BACKGROUND: &str = "background.tif";
 const RESIDUAL: &str = "residual.tif";
 const MASK: &str = "mask.tif";
+/// Covariance at every lag; the raster's coordinates are the lag.
+const MAP: &str = "covariance.tif";
 
 /// The one kind of fit.
 pub fn kinds() -> Vec<Kind> {
@@ -40,6 +43,7 @@ struct FitJob {
     dem: ItemRef,
     masks: Vec<Mask>,
     source: Source,
+    noise_reference: Option<Mask>,
     minus: Option<Subtrahend>,
     settings: FitSettings,
     streams: Streams,
@@ -119,22 +123,29 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
         let Some(field) = builder.heightfields.get(&item.dem).cloned() else {
             return Err(unknown_id(&entry, "dem", &item.dem, builder.heightfields.keys()).into());
         };
+        check_noise_reference(item.noise_reference.is_some(), item.minus.is_some()).map_err(|e| entry.refuse(e))?;
         let masks = mask::add(builder, &entry, &item)?;
+        let noise_reference = mask::add_noise_reference(builder, &entry, &item)?;
         let mask_sources = masks.iter().map(|m| m.source.clone()).collect();
         let source = Source { masks: mask_sources, ..builder.source_of(&item.dem, &field) };
         let minus = item.minus.as_ref().map(|id| Subtrahend::of(builder, &entry, id)).transpose()?;
-        let others = masks.iter().map(|m| &m.item).chain(minus.iter().map(|m| &m.dem));
+        let others = masks.iter().chain(&noise_reference).map(|m| &m.item).chain(minus.iter().map(|m| &m.dem));
         let parents: Vec<ItemRef> = [&field.item].into_iter().chain(others).cloned().collect();
         for one in entry.expand(&item.id, None, &item.sweep, &params)? {
             builder.claim(&entry, STAGE, &one.id)?;
             let raw: FitParameters = read_parameters(&one.params).map_err(|e| entry.refuse(e))?;
             let settings = FitSettings::try_from(raw).map_err(|e| entry.refuse(e))?;
+            if noise_reference.is_some() {
+                // What the reference holds is known when it is read; whether the fit takes it, now.
+                settings.with_noise(f64::MIN_POSITIVE).map_err(|e| entry.refuse(e))?;
+            }
             let job = FitJob {
                 id: one.id.clone(),
                 dem_id: item.dem.clone(),
                 dem: field.item.clone(),
                 masks: masks.clone(),
                 source: source.clone(),
+                noise_reference: noise_reference.clone(),
                 minus: minus.clone(),
                 settings,
                 streams: builder.streams(STAGE, &one.id, item.seed, 0),
@@ -158,7 +169,14 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
 impl Job for FitJob {
     fn recipe(&self) -> Value {
         let minus = self.minus.as_ref().map(|m| json!({ "dem": m.id, "source": m.source }));
-        json!({ "dem": self.dem_id, "source": self.source, "minus": minus, "fit": self.settings.parameters() })
+        let noise_reference = self.noise_reference.as_ref().map(|n| &n.source);
+        json!({
+            "dem": self.dem_id,
+            "source": self.source,
+            "noise_reference": noise_reference,
+            "minus": minus,
+            "fit": self.settings.parameters(),
+        })
     }
 
     fn rooms(&self) -> &'static [Room] {
@@ -180,18 +198,29 @@ impl Job for FitJob {
 
     fn run(&self, work: &Work<'_>) -> Result<Outcome, JobError> {
         let mut read = dem::read(&work.parent(&self.dem, HEIGHTS)?).map_err(|e| input_error(&e))?;
-        let masked_share = mask::of_item(&mut read.grid, &self.dem, &self.masks, work)?;
-        let mut source = Source { masked_share, ..self.source.clone() };
+        let mut settings = self.settings.clone();
+        let mut notes = Vec::new();
+        let mut source = self.source.clone();
+        if let Some(reference) = &self.noise_reference {
+            let noise = mask::noise_of_item(&read.grid, &self.dem, reference, work)?;
+            settings = settings.with_noise(noise.sigma_m).map_err(JobError::input)?;
+            notes.push(mask::noise_note(&noise));
+            let MaskSource { file, sha256, .. } = &reference.source;
+            source.noise_reference = Some(noise_reference(file, sha256, &noise));
+        }
+        source.masked_share = mask::of_item(&mut read.grid, &self.dem, &self.masks, work)?;
+        notes.extend(source.masked_share.map(mask::share_note));
         if let Some(subtrahend) = &self.minus {
             let (difference, minus) = subtrahend.subtract(&self.dem, &read, work)?;
             read.grid = difference;
+            notes.push(minus_note(&minus));
             source.minus = Some(minus);
         }
-        let notes = source.minus.as_ref().map(minus_note);
-        let outcome = sastrugi_texture::fit(&read.grid, &self.settings, &self.streams).map_err(JobError::new)?;
+        let outcome = sastrugi_texture::fit(&read.grid, &settings, &self.streams).map_err(JobError::new)?;
         let [background, residual] = outcome.rasters(&read.grid).map_err(JobError::new)?;
         let mask = shown::uses(&read.grid, &residual, &outcome);
         let band = shown::covariance_band(&residual, &outcome);
+        let map = outcome.covariance_map();
         let fit = FitFile { source: Some(source), ..outcome.fit };
         atomic::write(&work.output(FIT), to_json(&fit)?.as_bytes()).map_err(JobError::new)?;
         let id = &self.id;
@@ -200,6 +229,8 @@ impl Job for FitJob {
             dem::write(&work.output(file), grid, &read.info.crs, &Default::default()).map_err(JobError::new)?;
             products.push(Product::released(file, format!("fit/{id}.{file}"), Some(digest::heights(grid))));
         }
+        dem::write(&work.output(MAP), &map, &Crs::default(), &Default::default()).map_err(JobError::new)?;
+        products.push(Product::released(MAP, format!("fit/{id}.{MAP}"), Some(digest::heights(&map))));
         dem::write_classes(&work.output(MASK), &mask, &read.info.crs).map_err(JobError::new)?;
         products.push(Product::released(MASK, format!("fit/{id}.{MASK}"), Some(digest::classes(&mask))));
         let surface = Surface { id, stage: STAGE, fit_id: Some(id), grid: &residual };
@@ -213,6 +244,21 @@ impl Job for FitJob {
         };
         Ok(Outcome { products, rows, notes: notes.into_iter().chain(fit.warnings).collect() })
     }
+}
+
+/// A noise reference as the fit file names it.
+pub fn noise_reference(file: &str, sha256: &str, noise: &Noise) -> NoiseReference {
+    let differences = noise.differences as u64;
+    NoiseReference { file: file.to_owned(), sha256: sha256.to_owned(), sigma_m: noise.sigma_m, differences }
+}
+
+/// A reference holds the noise of one DEM; that of a difference is not to be had from it.
+///
+/// # Errors
+/// When both are given.
+pub fn check_noise_reference(reference: bool, minus: bool) -> Result<(), ParameterError> {
+    let message = "is given with `minus`: the noise of a difference is not that of one DEM; state noise_sigma_m";
+    if reference && minus { Err(ParameterError::new("noise_reference", message)) } else { Ok(()) }
 }
 
 /// A fit file's text.
@@ -283,6 +329,11 @@ fn fit_row(id: &str, dem_id: &str, fit: &FitFile) -> FitRow {
         window_disagreement_z: finding("window_disagreement_z"),
         naive_sigma_m: finding("naive_sigma_m"),
         naive_range_m: finding("naive_range_m"),
+        band_rms_m: finding("band_rms_m"),
+        increment_1m_m: finding("increment_1m_m"),
+        hurst: finding("hurst"),
+        noise_sigma_m: fit.settings["noise_sigma_m"].as_f64().unwrap_or(f64::NAN),
+        effective_resolution_m: finding("effective_resolution_m"),
         warnings: fit.warnings.join("; "),
     }
 }

@@ -9,6 +9,7 @@ use sastrugi_numeric::Grid;
 use sastrugi_schemas::fit::MaskSource;
 use sastrugi_schemas::study::{Files, FitItem};
 use sastrugi_store::mask::{self, MaskError, MaskOptions};
+use sastrugi_texture::noise::{self, Noise};
 use std::path::{Path, PathBuf};
 
 /// Name of the stage.
@@ -39,18 +40,86 @@ pub fn add(builder: &mut Builder<'_>, entry: &Entry<'_>, item: &FitItem) -> Resu
         files.numbered().into_iter().map(one).collect::<Vec<_>>()
     };
     let files = named(&item.mask, "mask", false).into_iter().chain(named(&item.exclude, "exclude", true));
-    let mut masks = Vec::new();
-    for (number, (path, file, excludes)) in files.enumerate() {
-        let id = format!("{}-{}", item.id, number + 1);
+    let copy = |(number, (key, file, excludes))| {
+        Mask::copied(builder, entry, &format!("{}-{}", item.id, number + 1), key, (file, excludes))
+    };
+    (0usize..).zip(files).map(copy).collect()
+}
+
+/// Adds the copy of a fit's noise reference, where it has one.
+///
+/// # Errors
+/// A file that is missing or cannot be read.
+pub fn add_noise_reference(
+    builder: &mut Builder<'_>,
+    entry: &Entry<'_>,
+    item: &FitItem,
+) -> Result<Option<Mask>, BuildError> {
+    let Some(file) = item.noise_reference.clone() else { return Ok(None) };
+    let key = entry.path_of("noise_reference");
+    Mask::copied(builder, entry, &format!("{}-noise", item.id), key, (file, false)).map(Some)
+}
+
+impl Mask {
+    fn copied(
+        builder: &mut Builder<'_>,
+        entry: &Entry<'_>,
+        id: &str,
+        key: Vec<String>,
+        (file, excludes): (String, bool),
+    ) -> Result<Self, BuildError> {
         let copy = Original::of(&format!("mask/{id}"), &builder.study.folder, &file)?;
         let (release_path, sha256) = (copy.release_path().to_owned(), copy.sha256().to_owned());
-        let node = copy.node(STAGE, &id);
+        let node = copy.node(STAGE, id);
         let source = MaskSource { file: super::original::name(&release_path).to_owned(), sha256, excludes };
-        masks.push(Mask { item: node.item.clone(), release_path: release_path.clone(), source });
-        builder.inputs.push(InputPlace { key: path, release_path });
+        let mask = Self { item: node.item.clone(), release_path: release_path.clone(), source };
+        builder.inputs.push(InputPlace { key, release_path });
         builder.node(entry, node)?;
+        Ok(mask)
     }
-    Ok(masks)
+
+    /// Leaves the heights that the mask keeps.
+    fn apply(&self, heights: &mut Grid, place: &Place, work: &Work<'_>) -> Result<(), JobError> {
+        let path = work.parent(&self.item, super::original::name(&self.release_path))?;
+        // Messages are part of the release: they name the file as it is called there.
+        let name_it =
+            |e: JobError| JobError { message: e.message.replace(&path.display().to_string(), &self.release_path), ..e };
+        apply(heights, place, &path, self.source.excludes).map_err(name_it)
+    }
+}
+
+/// The noise of an item's DEM in its reference.
+///
+/// # Errors
+/// A reference that cannot be used for the DEM, or that tells no noise.
+pub fn noise_of_item(heights: &Grid, dem: &ItemRef, reference: &Mask, work: &Work<'_>) -> Result<Noise, JobError> {
+    let place = Place::read(&work.parent(dem, PLACE)?, &heights.geometry)?;
+    let mut part = heights.clone();
+    reference.apply(&mut part, &place, work)?;
+    noise::of_reference(&part).map_err(|e| JobError::input(format!("{}: {e}", reference.release_path)))
+}
+
+/// The noise of heights whose place is known in the part that a file marks.
+///
+/// # Errors
+/// As [`noise_of_item`].
+pub fn noise_of_file(heights: &Grid, place: &Place, path: &Path) -> Result<Noise, JobError> {
+    let mut part = heights.clone();
+    apply(&mut part, place, path, false)?;
+    noise::of_reference(&part).map_err(|e| JobError::input(format!("{}: {e}", path.display())))
+}
+
+/// What masks dropped, for people.
+pub fn share_note(share: f64) -> String {
+    format!("masks dropped {:.2} % of the cells with data", 100.0 * share)
+}
+
+/// What was found in a noise reference, for people.
+pub fn noise_note(noise: &Noise) -> String {
+    format!(
+        "white noise of {:.2e} m per cell, from {} second differences of the reference",
+        noise.sigma_m, noise.differences
+    )
 }
 
 /// Applies the masks of an item to its DEM's heights. Returns the share of the cells with data that they dropped.
@@ -64,11 +133,7 @@ pub fn of_item(heights: &mut Grid, dem: &ItemRef, masks: &[Mask], work: &Work<'_
     let place = Place::read(&work.parent(dem, PLACE)?, &heights.geometry)?;
     let before = heights.finite_count();
     for one in masks {
-        let path = work.parent(&one.item, super::original::name(&one.release_path))?;
-        // Messages are part of the release: they name the file as it is called there.
-        let name_it =
-            |e: JobError| JobError { message: e.message.replace(&path.display().to_string(), &one.release_path), ..e };
-        apply(heights, &place, &path, one.source.excludes).map_err(name_it)?;
+        one.apply(heights, &place, work)?;
     }
     dropped_share(before, heights).map(Some)
 }

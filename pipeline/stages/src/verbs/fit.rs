@@ -3,14 +3,15 @@
 use super::{Read, Reading, parameters, read, transects};
 use crate::error::Error;
 use crate::jobs::dem::{input_error, metres_note};
-use crate::jobs::fit::{IN_DEGREES, STAGE, minus_note, subtract, to_json};
+use crate::jobs::fit::{IN_DEGREES, STAGE, check_noise_reference, minus_note, noise_reference, subtract, to_json};
 use sastrugi_numeric::resample::in_metres;
 use sastrugi_numeric::{Geometry, Streams};
 use sastrugi_schemas::coregistration::Minus;
 use sastrugi_schemas::fit::{FitFile, MaskSource, Source};
 use sastrugi_schemas::kind::{read_parameters, schema_of};
-use sastrugi_store::dem::{self, BlockReader, Dem, Format, ReadOptions};
+use sastrugi_store::dem::{self, BlockReader, Crs, Dem, Format, ReadOptions};
 use sastrugi_store::{atomic, digest};
+use sastrugi_texture::noise::Noise;
 use sastrugi_texture::{FitError, FitOutcome, FitParameters, FitSettings, Heights, Profiles};
 use serde_json::Value;
 use std::ops::Range;
@@ -31,6 +32,8 @@ pub struct Request<'a> {
     pub reading: Reading,
     /// DEM that is laid onto the first and subtracted.
     pub minus: Option<&'a Path>,
+    /// GeoTIFF to write with the covariance at every lag.
+    pub map: Option<&'a Path>,
 }
 
 /// Fits a DEM and writes the fit file. Returns it with sentences on how the DEM was read.
@@ -41,8 +44,13 @@ pub fn fit(request: &Request<'_>) -> Result<(FitFile, Vec<String>), Error> {
     parameters::check_schema(&request.parameters, &schema_of::<FitParameters>(), "fit")?;
     let raw: FitParameters = read_parameters(&request.parameters)?;
     let settings = FitSettings::try_from(raw)?;
-    let Fitted { outcome, notes, masked_share, minus } = fitted(request, &settings)?;
-    let source = Source { masked_share, minus, ..source_of(request)? };
+    check_noise_reference(request.reading.noise_reference.is_some(), request.minus.is_some())?;
+    let Fitted { outcome, notes, masked_share, noise, minus } = fitted(request, &settings)?;
+    let source = Source { masked_share, minus, ..source_of(request, noise.as_ref())? };
+    if let Some(path) = request.map {
+        dem::write(path, &outcome.covariance_map(), &Crs::default(), &Default::default())
+            .map_err(super::write_error)?;
+    }
     let fit = FitFile { source: Some(source), ..outcome.fit };
     atomic::write(request.output, to_json(&fit)?.as_bytes())
         .map_err(|e| Error::failed(format!("{}: {e}", request.output.display())))?;
@@ -53,34 +61,40 @@ struct Fitted {
     outcome: FitOutcome,
     notes: Vec<String>,
     masked_share: Option<f64>,
+    noise: Option<Noise>,
     minus: Option<Minus>,
 }
 
 /// The fit of transects, of a raster that is read in parts, or of a DEM in memory.
 fn fitted(request: &Request<'_>, settings: &FitSettings) -> Result<Fitted, Error> {
     let streams = Streams::for_seed(request.seed, STAGE);
-    let whole = |heights: &dyn Heights, notes: Vec<String>| {
+    let whole = |heights: &dyn Heights, settings: &FitSettings, notes: Vec<String>| {
         let outcome = sastrugi_texture::fit(heights, settings, &streams).map_err(refused)?;
-        Ok(Fitted { outcome, notes, masked_share: None, minus: None })
+        Ok(Fitted { outcome, notes, masked_share: None, noise: None, minus: None })
     };
     if let Some(path) = request.minus {
-        let Read { mut dem, mut notes, masked_share } = read(request.dem, &request.reading)?;
+        let Read { mut dem, mut notes, masked_share, .. } = read(request.dem, &request.reading)?;
         let minus = subtracted(&mut dem, request, path)?;
         notes.push(minus_note(&minus));
-        return Ok(Fitted { masked_share, minus: Some(minus), ..whole(&dem.grid, notes)? });
+        return Ok(Fitted { masked_share, minus: Some(minus), ..whole(&dem.grid, settings, notes)? });
     }
     if let Some(found) = transects(request.dem, &request.reading)? {
         let profiles = Profiles::new(found.spacing_m, &found.profiles).map_err(refused)?;
         return whole(
             &profiles,
+            settings,
             vec![format!("{} transects, a height every {} m", found.names.len(), found.spacing_m)],
         );
     }
     if let Some((parts, notes)) = Parts::of_large(request.dem, &request.reading)? {
-        return whole(&parts, notes);
+        return whole(&parts, settings, notes);
     }
-    let Read { dem, notes, masked_share } = read(request.dem, &request.reading)?;
-    Ok(Fitted { masked_share, ..whole(&dem.grid, notes)? })
+    let Read { dem, notes, masked_share, noise } = read(request.dem, &request.reading)?;
+    let settings = match &noise {
+        Some(noise) => settings.with_noise(noise.sigma_m)?,
+        None => settings.clone(),
+    };
+    Ok(Fitted { masked_share, noise, ..whole(&dem.grid, &settings, notes)? })
 }
 
 /// Cells above which a GeoTIFF is read in parts: half a gigabyte of heights.
@@ -95,7 +109,8 @@ struct Parts {
 impl Parts {
     /// A GeoTIFF that is better not held in memory, with sentences on how it is read.
     fn of_large(path: &Path, reading: &Reading) -> Result<Option<(Self, Vec<String>)>, Error> {
-        if Format::of_name(path) != Some(Format::GeoTiff) || reading.window.is_some() || !reading.masks.is_empty() {
+        let whole = Reading { cell_m: reading.cell_m, gridding: reading.gridding, ..Reading::default() };
+        if Format::of_name(path) != Some(Format::GeoTiff) || *reading != whole {
             return Ok(None);
         }
         let options = ReadOptions { cell_m: reading.cell_m };
@@ -127,7 +142,7 @@ impl Heights for Parts {
 }
 
 /// What the fit file says of the files it was made from.
-fn source_of(request: &Request<'_>) -> Result<Source, Error> {
+fn source_of(request: &Request<'_>, noise: Option<&Noise>) -> Result<Source, Error> {
     let hashed = |path: &Path| {
         let (_, sha256) = digest::of_file(path).map_err(|e| Error::Input(format!("{}: {e}", path.display())))?;
         Ok::<_, Error>((path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned()), sha256))
@@ -136,8 +151,10 @@ fn source_of(request: &Request<'_>) -> Result<Source, Error> {
         hashed(path).map(|(file, sha256)| MaskSource { file, sha256, excludes: *excludes })
     };
     let (file, sha256) = hashed(request.dem)?;
+    let reference = request.reading.noise_reference.as_deref().map(hashed).transpose()?;
+    let noise_reference = reference.zip(noise).map(|((file, sha256), noise)| noise_reference(&file, &sha256, noise));
     let masks = request.reading.masks.iter().map(mask).collect::<Result<_, _>>()?;
-    Ok(Source { file, sha256, window: request.reading.window, masks, ..Source::default() })
+    Ok(Source { file, sha256, window: request.reading.window, masks, noise_reference, ..Source::default() })
 }
 
 /// Replaces a DEM by its difference from another.

@@ -6,6 +6,7 @@ use crate::jobs::mask;
 use sastrugi_store::dem::{self, Dem, DemError, ReadOptions};
 use sastrugi_store::points::GridSettings;
 use sastrugi_store::transect::{self, TransectOptions, Transects};
+use sastrugi_texture::noise::Noise;
 use std::path::{Path, PathBuf};
 
 /// What of a DEM is taken, and how it is read.
@@ -19,6 +20,8 @@ pub struct Reading {
     pub gridding: GridSettings,
     /// Files of the cells that take part, and those (`true`) of cells that do not.
     pub masks: Vec<(PathBuf, bool)>,
+    /// File that marks a part which is smooth in reality, for the noise.
+    pub noise_reference: Option<PathBuf>,
 }
 
 /// A DEM that was read.
@@ -29,6 +32,8 @@ pub struct Read {
     pub notes: Vec<String>,
     /// Share of the window's cells with data that masks dropped, where there are masks.
     pub masked_share: Option<f64>,
+    /// White noise found in the reference, where there is one.
+    pub noise: Option<Noise>,
 }
 
 /// A DEM as the kernels want it: window cut, masks applied, metres.
@@ -36,10 +41,9 @@ pub struct Read {
 /// # Errors
 /// A DEM or a mask that cannot be read, settings that it does not take, a window or masks that leave no data.
 pub fn read(path: &Path, reading: &Reading) -> Result<Read, Error> {
-    let Read { dem, mut notes, masked_share } = read_as_it_is(path, reading)?;
-    let (dem, converted) = to_metres(dem);
-    notes.extend(converted);
-    Ok(Read { dem, notes, masked_share })
+    let read = read_as_it_is(path, reading)?;
+    let (dem, converted) = to_metres(read.dem);
+    Ok(Read { dem, notes: read.notes.into_iter().chain(converted).collect(), ..read })
 }
 
 /// As [`read`], in the DEM's own coordinates: a geographic raster stays in degrees.
@@ -55,10 +59,11 @@ pub fn read_as_it_is(path: &Path, reading: &Reading) -> Result<Read, Error> {
         None => grid,
     };
     let place = Place::of(&whole, &grid.geometry);
+    let noise = reading.noise_reference.as_ref().map(|path| mask::noise_of_file(&grid, &place, path)).transpose()?;
     let masked_share = mask::of_files(&mut grid, &place, &reading.masks)?;
-    let masked = masked_share.map(|share| format!("masks dropped {:.2} % of the cells with data", 100.0 * share));
-    let notes = info.notes.iter().cloned().chain(masked).collect();
-    Ok(Read { dem: Dem { grid, info }, notes, masked_share })
+    let said = [noise.as_ref().map(mask::noise_note), masked_share.map(mask::share_note)];
+    let notes = info.notes.iter().cloned().chain(said.into_iter().flatten()).collect();
+    Ok(Read { dem: Dem { grid, info }, notes, masked_share, noise })
 }
 
 /// Transects, where the file holds some (see [`transect::looks_like`]).
@@ -77,7 +82,7 @@ pub fn transects(path: &Path, reading: &Reading) -> Result<Option<Transects>, Er
         cell => cell.map(|[x, _]| x),
     };
     if *reading != plain {
-        let message = "is a table of transects, which take no window, mask or setting of point clouds";
+        let message = "is a table of transects, which take no window, mask, noise reference or setting of point clouds";
         return Err(Error::Usage(format!("{}: {message}", path.display())));
     }
     let options = TransectOptions { spacing_m, ..TransectOptions::default() };

@@ -26,6 +26,7 @@
 
 mod rounds;
 
+use crate::sizes::NORMAL_CONSISTENCY;
 use rounds::{Overlay, Terms};
 use sastrugi_numeric::{Grid, sums};
 use sastrugi_schemas::coregistration::Coregistration;
@@ -36,8 +37,6 @@ const CELLS_MIN: usize = 100;
 const ROUNDS: u32 = 50;
 /// A round that moves B by less than this share of a cell is the last.
 const CONVERGED_CELLS: f64 = 0.005;
-/// Standard deviation of a normal variable over its median absolute deviation.
-const NORMAL_CONSISTENCY: f64 = 1.482_602_218_505_602;
 
 /// A difference of DEMs.
 #[derive(Clone, Debug)]

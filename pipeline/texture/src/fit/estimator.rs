@@ -55,10 +55,11 @@ impl Estimate {
         Some(likelihood.chi2 / (likelihood.bins.saturating_sub(self.at.len())).max(1) as f64)
     }
 
-    /// Standard error of a coordinate by the curvature of the likelihood.
-    pub fn standard_error(&self, coordinate: usize) -> Option<f64> {
+    /// Variance of a sum of weighted coordinates by the curvature of the likelihood.
+    pub fn variance_of(&self, weights: &[(usize, f64)]) -> Option<f64> {
         let scatter = self.likelihood.as_ref()?.scatter.as_ref()?;
-        Some(scatter[coordinate * (self.at.len() + 1)].sqrt())
+        let of = |(k, w): &(usize, f64), (l, v): &(usize, f64)| w * v * scatter[k * self.at.len() + l];
+        Some(weights.iter().flat_map(|a| weights.iter().map(move |b| of(a, b))).sum())
     }
 
     /// Position of the coordinate with a role.

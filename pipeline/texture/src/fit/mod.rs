@@ -62,9 +62,22 @@ pub struct FitOutcome {
     pub(crate) survey: Survey,
     /// The rings of the fit file.
     pub(crate) bins: LagBins,
+    cell_m: [f64; 2],
 }
 
 impl FitOutcome {
+    /// The covariance of the residual at every lag, m2: a raster about lag zero, whose coordinates are the lag (x east, y north, m).
+    /// NaN where no pair lies that far apart.
+    pub fn covariance_map(&self) -> Grid {
+        let Self { survey, cell_m, .. } = self;
+        let [max_row, max_col] = survey.covariance.max_lag.map(|l| l as isize);
+        let origin = [-(max_col as f64 + 0.5) * cell_m[0], -(max_row as f64 + 0.5) * cell_m[1]];
+        let geometry =
+            Geometry { rows: 2 * max_row as usize + 1, cols: 2 * max_col as usize + 1, cell: *cell_m, origin };
+        let lags = (-max_row..=max_row).flat_map(|r| (-max_col..=max_col).map(move |c| (r, c)));
+        Grid::new(geometry, lags.map(|(r, c)| survey.covariance.covariance(r, c).unwrap_or(f64::NAN)).collect())
+    }
+
     /// Background (moving average, m; NaN where the window has no data) and residual (height less background, m, on the
     /// cells that entered the covariance; NaN elsewhere) of the heights that were fitted.
     ///
@@ -95,7 +108,7 @@ pub fn fit(heights: &dyn Heights, settings: &FitSettings, streams: &Streams) -> 
     // The shape of the heights is that before trimming.
     let residual = case.survey.residual(heights, settings, rows, cols)?;
     let fit = FitFile { height_quantiles_m: quantiles_m(&residual), ..fit };
-    Ok(FitOutcome { fit, settings: settings.clone(), survey: case.survey, bins: case.bins })
+    Ok(FitOutcome { fit, settings: settings.clone(), survey: case.survey, bins: case.bins, cell_m: case.geometry.cell })
 }
 
 fn paper(case: &Case, naive: &Estimate) -> Result<FitFile, FitError> {
@@ -131,7 +144,10 @@ fn corrected(case: &Case, naive: &Estimate, streams: &Streams) -> Result<FitFile
     let rough = (!case.heights.are_profiles()).then(|| Estimator::rough(case, &by_direction));
     let rough_rings = directional.then(|| Estimator::rough(case, &case.bins));
     let on_rings = rough_rings.as_ref().unwrap_or(&estimator);
+    let disagreement = verdicts::window_disagreement(case, estimate, &others);
     let findings = Findings {
+        scale_explicit: verdicts::no_scale_separation(disagreement)
+            .then(|| verdicts::scale_explicit(on_rings, &estimates, &others)),
         intervals: replicates
             .as_ref()
             .and_then(|r| resampling::intervals(&estimator, estimate, &r.at))
@@ -139,7 +155,7 @@ fn corrected(case: &Case, naive: &Estimate, streams: &Streams) -> Result<FitFile
         block_intervals: resampling::intervals(&estimator, estimate, &resampled),
         candidates: verdicts::candidates(&estimates, on_rings),
         profile: profile::profile(&estimator, estimate),
-        disagreement: verdicts::window_disagreement(estimate, &others),
+        disagreement,
         others: others.iter().map(verdicts::window_entry).collect(),
         isotropy: rough.as_ref().and_then(|rough| verdicts::isotropy(rough, estimate)),
         stationarity: verdicts::stationarity(&estimator, estimate, &blocks),

@@ -54,14 +54,14 @@ pub struct FitParameters {
     /// Cells count when more than this share of their window has data. Default 0.5; 0.9 in `paper` mode.
     pub min_valid_share: Option<f64>,
     /// Whether objects (trees, rocks, structures) are found and left out before the moving average. Default true. Of a bare
-    /// site whose heights are not normal (gullies, dunes) it takes the steepest parts away: set it to false there. `paper`
-    /// mode looks for none.
+    /// site with steep steps (gullies, cliffs) it takes up to a tenth away: set it to false there. `paper` mode looks for none.
     pub find_outliers: bool,
     /// Replicates of the parametric bootstrap that gives intervals; 0 for none. Default 99. `paper` mode has none.
     pub bootstrap: u32,
     /// Standard deviation of the Gaussian point spread that blurred the DEM (photogrammetry's smoothing), m. Default 0.
     pub inner_scale_m: f64,
-    /// Standard deviation of the DEM's white noise per cell, m. Default 0: where it is not known, a `+nugget` model finds it.
+    /// Standard deviation of the DEM's white noise per cell, m. Default 0: where it is not known, a smooth part of the DEM tells
+    /// it (`noise_reference` of a study's fit, `--noise-reference`), or a `+nugget` model finds it.
     pub noise_sigma_m: f64,
 }
 
@@ -180,6 +180,19 @@ impl FitSettings {
     pub(crate) fn measurement(&self) -> Measurement {
         let FitParameters { inner_scale_m, noise_sigma_m, .. } = self.parameters;
         Measurement { inner_scale_m, noise_sigma_m }
+    }
+
+    /// The same fit of a DEM whose noise was found to be `sigma_m`, m.
+    ///
+    /// # Errors
+    /// A fit whose parameters state a noise already, or whose mode knows none.
+    pub fn with_noise(&self, sigma_m: f64) -> Result<Self, ParameterError> {
+        if self.parameters.noise_sigma_m > 0.0 {
+            let stated_m = self.parameters.noise_sigma_m;
+            let message = format!("is {stated_m} m, and a noise reference is given as well: one of the two");
+            return Err(ParameterError::new("noise_sigma_m", message));
+        }
+        FitParameters { noise_sigma_m: sigma_m, ..self.parameters.clone() }.try_into()
     }
 
     /// The same fit at another outer scale.

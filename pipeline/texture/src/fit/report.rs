@@ -5,9 +5,9 @@ use super::case::Case;
 use super::estimator::{Estimate, Estimator, difference, on_surface};
 use super::profile::LIKELIHOOD_RISE;
 use super::resampling::{SILL_OVER_RANGE, sill_over_range};
-use super::verdicts::{Isotropy, Stationarity, no_scale_separation};
+use super::verdicts::{Isotropy, ScaleExplicit, Stationarity, is_range_told};
 use crate::covariance::form::Role;
-use crate::covariance::{Covariance, Form};
+use crate::covariance::{Covariance, Form, Structure};
 use sastrugi_schemas::fit::{Candidate, DirectionBin, FitFile, GsTools, Intervals, Profile, Trim};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -36,6 +36,8 @@ pub struct Findings {
     /// Largest disagreement of fits at other windows, in standard errors.
     pub disagreement: Option<f64>,
     pub others: Vec<Value>,
+    /// Where they disagree.
+    pub scale_explicit: Option<ScaleExplicit>,
     pub isotropy: Option<Isotropy>,
     pub stationarity: Option<Stationarity>,
     pub misfit_p: Option<f64>,
@@ -154,6 +156,7 @@ impl Figures {
         findings: &Findings,
     ) -> BTreeMap<String, Value> {
         let survey = &case.survey;
+        let self_affine = findings.scale_explicit.as_ref().and_then(ScaleExplicit::structure);
         let mut entries = vec![
             ("naive_sigma_m", json!(naive.covariance.sigma_m())),
             ("naive_range_m", json!(naive.covariance.range_m())),
@@ -180,6 +183,10 @@ impl Figures {
             ("stationarity_p", findings.stationarity.as_ref().map(|s| s.p)),
             ("block_sigma_max_over_min", findings.stationarity.as_ref().map(|s| s.sigma_max_over_min)),
             ("chi2_rise_at_3b", self.rise_at_3b(findings)),
+            ("band_rms_m", Some(survey.trim.rms_m)),
+            ("effective_resolution_m", resolution_m(case, &estimate.covariance)),
+            ("increment_1m_m", self_affine.map(|s| s.sigma_m)),
+            ("hurst", self_affine.map(|s| s.shape)),
         ];
         entries.extend(known.into_iter().filter_map(|(k, v)| Some((k, json!(v?)))));
         if !findings.others.is_empty() {
@@ -205,10 +212,11 @@ impl Figures {
         });
         let all = [
             paper,
+            separation_warning(estimate, findings),
             self.range_warning(case, naive, estimate),
             self.flat_warning(case, estimate, findings),
             self.misfit_warning(case, estimate, findings),
-            separation_warning(findings),
+            resolution_warning(case, estimate),
             isotropy_warning(estimate, findings),
             stationarity_warning(findings),
             normality_warning(findings),
@@ -233,9 +241,8 @@ impl Figures {
 
     fn flat_warning(&self, case: &Case, estimate: &Estimate, findings: &Findings) -> Option<String> {
         let b = estimate.covariance.structures[0].range_m;
-        let coordinate = estimate.coordinate(Role::Range(0))?;
-        let (_, end) = case.coordinates(&estimate.form).bounds()[coordinate];
-        if estimate.at[coordinate] > end - 1e-3 {
+        estimate.coordinate(Role::Range(0))?;
+        if !is_range_told(case, estimate) {
             return Some(format!(
                 "b = {} m is where the search ends: all that the data tells is that b is long",
                 figure(b)
@@ -248,7 +255,7 @@ impl Figures {
     fn misfit_warning(&self, case: &Case, estimate: &Estimate, findings: &Findings) -> Option<String> {
         let misfit = self.misfit_m2 / case.bins.covariance_m2[0];
         let rejected = findings.misfit_p.is_some_and(|p| p <= TEST_LEVEL);
-        let how = findings.misfit_p.map_or_else(String::new, |p| format!(", p = {p:.3}"));
+        let how = findings.misfit_p.map_or_else(String::new, |p| format!(", {}", p_value(p)));
         (misfit > MISFIT_MAX || rejected).then(|| {
             format!(
                 "the {} model does not describe the residual: its root mean square misfit is {:.1} % of the variance{how}",
@@ -270,27 +277,87 @@ impl Figures {
     }
 }
 
+/// `p = 0.003`, or `p < 0.001`.
+fn p_value(p: f64) -> String {
+    if p < 1e-3 { "p < 0.001".to_owned() } else { format!("p = {p:.3}") }
+}
+
 /// A positive figure to four digits.
 fn figure(value: f64) -> String {
     let decimals = 3.0 - libm::floor(libm::log10(value));
     format!("{value:.*}", decimals.clamp(0.0, 12.0) as usize)
 }
 
-fn separation_warning(findings: &Findings) -> Option<String> {
-    let z = findings.disagreement.filter(|_| no_scale_separation(findings.disagreement))?;
+impl ScaleExplicit {
+    /// The self-affine term: increments over 1 m, m, and Hurst exponent.
+    fn structure(&self) -> Option<Structure> {
+        self.self_affine.as_ref()?.covariance.structures.first().copied()
+    }
+
+    fn words(&self, estimate: &Estimate) -> String {
+        let band = |[below_m, rms_m]: &[f64; 2]| format!("{} m below {below_m} m", figure(*rms_m));
+        let bands = self.bands.iter().map(band).collect::<Vec<_>>().join(", ");
+        let growth = self.structure().map(|s| {
+            // The search ends just below 1.
+            let more = s.model.shape().is_some_and(|shape| s.shape > 0.999 * shape.bounds.1);
+            let more = if more { ", or more" } else { "" };
+            format!("; increments grow as {} m (lag / 1 m)^{:.2} (Hurst exponent{more})", figure(s.sigma_m), s.shape)
+        });
+        let told = sill_over_range(&estimate.covariance).map(|told| format!("; sigma^2 / b = {} m", figure(told)));
+        format!("root mean square heights of {bands}{}{}", growth.unwrap_or_default(), told.unwrap_or_default())
+    }
+}
+
+/// Where there is no one scale, what is true at each comes first.
+fn separation_warning(estimate: &Estimate, findings: &Findings) -> Option<String> {
+    let (z, explicit) = (findings.disagreement?, findings.scale_explicit.as_ref()?);
     Some(format!(
-        "no scale separation: fits at half and twice the outer scale disagree by {z:.1} standard errors; sigma and b belong \
-         to this window, not to the surface (see other_windows, and the structure function)"
+        "no scale separation: {}; fits at half and twice the outer scale disagree by {z:.1} standard errors, so that the \
+         parameters of the {} model belong to this window, not to the surface",
+        explicit.words(estimate),
+        estimate.form.name()
     ))
+}
+
+/// Shortest lag at which the DEM tells more of the texture than of itself, m: increments of the texture (along its long axis)
+/// exceed those of the noise (stated, or fitted as a nugget), and the lag is no shorter than the cell and the full width of
+/// the point spread at half its height. `None` where the noise is larger up to the largest lag of the fit.
+fn resolution_m(case: &Case, covariance: &Covariance) -> Option<f64> {
+    /// Full width at half maximum over standard deviation of a Gaussian.
+    const FULL_WIDTH: f64 = 2.354_820_045_030_949;
+    let measurement = case.settings.measurement();
+    let [x, y] = case.geometry.cell;
+    let least_m = x.max(y).max(FULL_WIDTH * measurement.inner_scale_m);
+    let noise_m2 = measurement.noise_sigma_m * measurement.noise_sigma_m + covariance.nugget_m2;
+    let origin_m2 = covariance.at_distance(0.0) - covariance.nugget_m2;
+    let told = |lag_m: f64| origin_m2 - covariance.at_distance(lag_m) >= noise_m2;
+    if told(least_m) || least_m >= case.max_lag_m {
+        return Some(least_m);
+    }
+    let (mut low, mut high) = (least_m, case.max_lag_m);
+    for _ in 0..40 {
+        let middle = 0.5 * (low + high);
+        if told(middle) { high = middle } else { low = middle }
+    }
+    told(high).then_some(high)
+}
+
+fn resolution_warning(case: &Case, estimate: &Estimate) -> Option<String> {
+    resolution_m(case, &estimate.covariance).is_none().then(|| {
+        format!(
+            "noise is larger than the texture's increments up to the largest lag of {} m: what is fitted is mostly noise",
+            figure(case.max_lag_m)
+        )
+    })
 }
 
 fn isotropy_warning(estimate: &Estimate, findings: &Findings) -> Option<String> {
     let found = findings.isotropy.as_ref().filter(|_| !estimate.form.is_anisotropic())?;
     (found.p <= TEST_LEVEL && found.ratio < RATIO_WORTH_A_WARNING).then(|| {
         format!(
-            "the texture is not isotropic (p = {:.1e}): it is longer by {:.2} along azimuth {:.0} degrees; try \
+            "the texture is not isotropic ({}): it is longer by {:.2} along azimuth {:.0} degrees; try \
              anisotropic:{}",
-            found.p,
+            p_value(found.p),
             1.0 / found.ratio,
             found.azimuth_deg,
             estimate.form.name()
@@ -302,9 +369,10 @@ fn stationarity_warning(findings: &Findings) -> Option<String> {
     let found = findings.stationarity.as_ref()?;
     (found.p <= TEST_LEVEL && found.sigma_max_over_min > SIGMAS_WORTH_A_WARNING).then(|| {
         format!(
-            "the site is not stationary (p = {:.1e}): sigma differs by a factor of {:.2} between its blocks; the parametric \
+            "the site is not stationary ({}): sigma differs by a factor of {:.2} between its blocks; the parametric \
              intervals are too narrow",
-            found.p, found.sigma_max_over_min
+            p_value(found.p),
+            found.sigma_max_over_min
         )
     })
 }
@@ -312,6 +380,7 @@ fn stationarity_warning(findings: &Findings) -> Option<String> {
 fn normality_warning(findings: &Findings) -> Option<String> {
     let p = findings.normality_p.filter(|p| *p <= 2.0 * TEST_LEVEL)?;
     Some(format!(
-        "the residual is not normal (p = {p:.3}): trimming took another share of its variance than the fit assumes"
+        "the residual is not normal ({}): trimming took another share of its variance than the fit assumes",
+        p_value(p)
     ))
 }

@@ -86,6 +86,8 @@ pub struct Trim {
     pub threshold_m: f64,
     /// Median absolute residual before trimming, m.
     pub median_size_m: f64,
+    /// Root mean square residual before trimming, m.
+    pub rms_m: f64,
     /// Mean of what is kept, taken off in `paper` mode.
     offset_m: f64,
 }
@@ -94,7 +96,8 @@ impl Trim {
     /// The symmetric threshold that a share of the residuals exceeds.
     pub fn of(sizes: &Sizes, settings: &FitSettings) -> Self {
         let threshold_m = sizes.exceeded_by(settings.trim());
-        Self { centre_m: 0.0, threshold_m, median_size_m: sizes.exceeded_by(0.5), offset_m: 0.0 }
+        let (median_size_m, rms_m) = (sizes.exceeded_by(0.5), sizes.root_mean_square());
+        Self { centre_m: 0.0, threshold_m, median_size_m, rms_m, offset_m: 0.0 }
     }
 
     /// Sets what is cut off to NaN.

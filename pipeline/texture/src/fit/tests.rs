@@ -477,3 +477,59 @@ fn val_a_full_fit_has_intervals_and_verdicts() {
         assert!(fit.diagnostics.contains_key(key), "{key}");
     }
 }
+
+/// The map has lag zero in its middle, the same bins as the rings, and east to the east.
+#[test]
+fn val_covariance_map() {
+    let truth = covariance(
+        "anisotropic:exponential",
+        &[("sigma_m", 0.1), ("range_m", 0.4), ("ratio", 0.4), ("azimuth_deg", 60.0)],
+    );
+    let outcome = fit(&field_of(&truth, 400, 2), &with_bootstrap("exponential", 0), &streams()).unwrap();
+    let map = outcome.covariance_map();
+    let g = map.geometry;
+    let middle = [g.rows / 2, g.cols / 2];
+    assert!(g.rows % 2 == 1 && g.x(middle[1]).abs() < 1e-12 && g.y(middle[0]).abs() < 1e-12);
+    assert_eq!(map.at(middle[0], middle[1]), outcome.fit.covariance_m2[0]);
+    let at = |east: isize, north: isize| map.at(middle[0].strict_add_signed(-north), middle[1].strict_add_signed(east));
+    assert_eq!(at(3, 5), at(-3, -5));
+    // Along azimuth 60 degrees (east-north-east) and across.
+    assert!(at(5, 3) > 1.5 * at(-3, 5), "{} {}", at(5, 3), at(-3, 5));
+    assert!(at(5, 3) > 1.2 * at(5, -3), "{} {}", at(5, 3), at(5, -3));
+}
+
+/// Noise that is stated is taken off, and bounds what the DEM tells: the texture's increments over the effective resolution
+/// h are those of the noise, `sigma^2 (1 - exp(-h / b)) = n^2`.
+#[test]
+fn val_effective_resolution() {
+    let mut s = Streams::for_seed(1, "noise").stream("cells");
+    let noise_m = 0.06;
+    let dem = field_of(&covariance("exponential", &[("sigma_m", 0.1), ("range_m", 0.28)]), 400, 5);
+    let mut noisy = dem.clone();
+    noisy.values.iter_mut().for_each(|z| *z += noise_m * s.normal());
+    let settings = with_bootstrap("exponential", 0).with_noise(noise_m).unwrap();
+    assert_eq!(settings.parameters().noise_sigma_m, noise_m);
+    assert_eq!(settings.with_noise(0.01).err().unwrap().key, "noise_sigma_m");
+    let paper = FitParameters { mode: Mode::Paper, bootstrap: 0, ..FitParameters::default() };
+    assert_eq!(FitSettings::try_from(paper).unwrap().with_noise(0.01).err().unwrap().key, "mode");
+    let found = fit(&noisy, &settings, &streams()).unwrap().fit;
+    let (sigma, b) = (found.parameters["sigma_m"], found.parameters["range_m"]);
+    assert!((sigma / 0.1 - 1.0).abs() < 0.04 && (b / 0.28 - 1.0).abs() < 0.09, "{sigma} {b}");
+    let expected = -b * libm::log(1.0 - noise_m * noise_m / (sigma * sigma));
+    assert!((found.diagnostics["effective_resolution_m"].as_f64().unwrap() / expected - 1.0).abs() < 1e-6);
+    let sharp = fit(&dem, &with_bootstrap("exponential", 0), &streams()).unwrap().fit;
+    assert_eq!(sharp.diagnostics["effective_resolution_m"], CELL_M);
+}
+
+/// A surface without a scale: what leads is what holds at its scale.
+#[test]
+fn val_no_scale_leads_with_scale_explicit_figures() {
+    let truth = covariance("self_affine", &[("increment_1m_m", 0.1), ("hurst", 0.8)]);
+    let found = fit(&field_of(&truth, 400, 3), &with_bootstrap("exponential", 0), &streams()).unwrap().fit;
+    assert!(found.warnings[0].starts_with("no scale separation: root mean square heights of"), "{:?}", found.warnings);
+    let figure = |name: &str| found.diagnostics[name].as_f64().unwrap();
+    assert!((figure("hurst") - 0.8).abs() < 0.04 && (figure("increment_1m_m") / 0.1 - 1.0).abs() < 0.1, "{found:?}");
+    // Below twice the window there is 2^H times the height.
+    let twice = found.diagnostics["other_windows"][1]["band_rms_m"].as_f64().unwrap();
+    assert!((twice / figure("band_rms_m") / libm::exp2(0.8) - 1.0).abs() < 0.1);
+}

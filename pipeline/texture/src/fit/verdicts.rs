@@ -5,6 +5,7 @@ use super::estimator::{Estimate, Estimator};
 use super::heights::Heights;
 use super::params::FitSettings;
 use super::resampling::{Block, Replicates, two_sided_p, upper_p};
+use crate::covariance::Form;
 use crate::covariance::bins::Layout;
 use crate::covariance::form::Role;
 use sastrugi_numeric::sums;
@@ -18,10 +19,17 @@ const REPLICATES_MIN: usize = 99;
 /// this test takes it to.
 const WINDOWS_Z: f64 = 2.58;
 
+/// The form of surfaces without a scale.
+const SELF_AFFINE: &str = "self_affine";
+
 /// The fit at another outer scale.
 pub struct AtWindow {
     pub outer_scale_m: f64,
     pub estimate: Estimate,
+    /// Whether the search for b ended within its bounds.
+    is_range_told: bool,
+    /// Root mean square of what is below that scale, m.
+    pub rms_m: f64,
 }
 
 /// Fits of the same form at half and at twice the outer scale, where the DEM allows them.
@@ -37,20 +45,67 @@ fn at_window(dem: &dyn Heights, settings: &FitSettings, estimate: &Estimate, out
     let bins = case.bins_of(layout);
     let (sigma_m, range_m) = (estimate.covariance.sigma_m(), estimate.covariance.range_m());
     let estimate = Estimator::rough(&case, &bins).fit(&estimate.form, sigma_m, range_m);
-    Some(AtWindow { outer_scale_m, estimate })
+    let is_range_told = is_range_told(&case, &estimate);
+    Some(AtWindow { outer_scale_m, estimate, is_range_told, rms_m: case.survey.trim.rms_m })
 }
 
-/// How far apart fits at neighbouring windows are, in standard errors; the largest over sigma and b (or the shape).
-pub fn window_disagreement(estimate: &Estimate, others: &[AtWindow]) -> Option<f64> {
-    let compared = [Role::Sigma(0), Role::Range(0), Role::Shape(0)];
-    let z = |other: &Estimate, role: Role| {
-        let k = estimate.coordinate(role)?;
-        let inflated = |e: &Estimate| Some(e.standard_error(k)? * e.misfit_ratio()?.max(1.0).sqrt());
-        let (own, its) = (inflated(estimate)?, inflated(other)?);
-        Some((estimate.at[k] - other.at[k]).abs() / (own * own + its * its).sqrt())
+/// Figures that are true at their scale where the surface has none of its own.
+pub struct ScaleExplicit {
+    /// Outer scales, m, ascending, and the root mean square height of what is below each, m.
+    pub bands: Vec<[f64; 2]>,
+    /// The self-affine surface with the same covariance: structure function and Hurst exponent.
+    pub self_affine: Option<Estimate>,
+}
+
+/// What is to be said of a surface whose fits at several windows disagree; `estimates` are the fits of this window.
+pub fn scale_explicit(estimator: &Estimator, estimates: &[Estimate], others: &[AtWindow]) -> ScaleExplicit {
+    let case = estimator.case;
+    let own = [case.settings.outer_scale_m(), case.survey.trim.rms_m];
+    let mut bands: Vec<[f64; 2]> = others.iter().map(|o| [o.outer_scale_m, o.rms_m]).chain([own]).collect();
+    bands.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    let known = estimates.iter().find(|e| e.form.name() == SELF_AFFINE).cloned();
+    let fitted = || {
+        let form = Form::parse(SELF_AFFINE).ok()?;
+        let from = &estimates.first()?.covariance;
+        Some(estimator.fit(&form, from.sigma_m(), from.range_m()))
     };
-    let all = others.iter().flat_map(|o| compared.iter().filter_map(move |&role| z(&o.estimate, role)));
-    all.fold(None, |largest, v| Some(largest.map_or(v, |l: f64| l.max(v))))
+    ScaleExplicit { bands, self_affine: known.or_else(fitted) }
+}
+
+/// How far apart fits at neighbouring windows are, in standard errors: the largest over sigma and b (or the shape), and over
+/// sigma^2 / b, which the data tells where it does not tell the two (they are left out where a search for b ended at its
+/// bound). The errors are those of a model that is right: of a wrong one parameters move with the window, and that is what
+/// is to be told.
+pub fn window_disagreement(case: &Case, estimate: &Estimate, others: &[AtWindow]) -> Option<f64> {
+    let b_told = is_range_told(case, estimate);
+    let pairs = others.iter().flat_map(|other| {
+        compared(estimate, b_told && other.is_range_told).into_iter().map(|weights| (&other.estimate, weights))
+    });
+    let z = |(other, weights): (&Estimate, Vec<(usize, f64)>)| {
+        let apart: f64 = weights.iter().map(|(k, w)| w * (estimate.at[*k] - other.at[*k])).sum();
+        let variance = estimate.variance_of(&weights)? + other.variance_of(&weights)?;
+        Some(apart.abs() / variance.sqrt())
+    };
+    pairs.filter_map(z).fold(None, |largest, v| Some(largest.map_or(v, |l: f64| l.max(v))))
+}
+
+/// Sums of weighted coordinates (logarithms of the parameters) that are compared.
+fn compared(estimate: &Estimate, b_told: bool) -> Vec<Vec<(usize, f64)>> {
+    let [sigma, range, shape] = [Role::Sigma(0), Role::Range(0), Role::Shape(0)].map(|role| estimate.coordinate(role));
+    let told = range.is_none() || b_told;
+    let alone = [sigma.filter(|_| told), range.filter(|_| told), shape];
+    let mut all: Vec<Vec<(usize, f64)>> = alone.into_iter().flatten().map(|k| vec![(k, 1.0)]).collect();
+    if estimate.covariance.structures.len() == 1 {
+        all.extend(sigma.zip(range).map(|(sigma, range)| vec![(sigma, 2.0), (range, -1.0)]));
+    }
+    all
+}
+
+/// False when the search for b ended at its bound.
+pub fn is_range_told(case: &Case, estimate: &Estimate) -> bool {
+    let Some(k) = estimate.coordinate(Role::Range(0)) else { return true };
+    let (_, end) = case.coordinates(&estimate.form).bounds()[k];
+    estimate.at[k] <= end - 1e-3
 }
 
 /// True when windows disagree beyond what scatter explains.
@@ -156,5 +211,6 @@ pub fn window_entry(at: &AtWindow) -> Value {
         "outer_scale_m": at.outer_scale_m,
         "parameters": at.estimate.covariance.parameters(&at.estimate.form),
         "misfit_chi2_per_freedom": at.estimate.misfit_ratio(),
+        "band_rms_m": at.rms_m,
     })
 }

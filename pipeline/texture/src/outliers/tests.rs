@@ -40,3 +40,33 @@ fn val_no_data_and_constant_rasters() {
     assert_eq!(find(&[f64::NAN; 9], 3, window), vec![false; 9]);
     assert_eq!(find(&[4.0; 9], 3, window), vec![false; 9]);
 }
+
+/// Slopes whose texture is ten times that of the flats about them (a third of the raster) hold no objects; a cone that stands
+/// out from its own surroundings is found on flats and slopes alike.
+#[test]
+fn val_rough_places_are_no_objects() {
+    let rough = |k: usize| if k % COLS < COLS / 3 { 10.0 } else { 1.0 };
+    let mut values: Vec<f64> = noise().iter().enumerate().map(|(k, v)| rough(k) * v).collect();
+    let window = BoxWindow { half: [8, 8] };
+    assert_eq!(find(&values, COLS, window).iter().filter(|&&o| o).count(), 0);
+    let tops = [100 * COLS + 30, 60 * COLS + 140];
+    for top in tops {
+        for (k, v) in values.iter_mut().enumerate() {
+            let (y, x) = ((k / COLS).abs_diff(top / COLS) as f64, (k % COLS).abs_diff(top % COLS) as f64);
+            *v += (20.0 * rough(top) * (1.0 - (x * x + y * y).sqrt() / 6.0)).max(0.0);
+        }
+    }
+    let outlier = find(&values, COLS, window);
+    assert!(tops.iter().all(|&top| outlier[top]));
+    assert!(outlier.iter().filter(|&&o| o).count() < 2 * 250);
+}
+
+/// One line of cells: nine blocks along it.
+#[test]
+fn val_transects() {
+    let mut values = noise()[..400].to_vec();
+    values[200..206].iter_mut().for_each(|v| *v += 30.0);
+    let outlier = find(&values, 400, BoxWindow { half: [0, 15] });
+    assert!(outlier[200..206].iter().all(|o| *o));
+    assert!(outlier.iter().filter(|&&o| o).count() < 12);
+}

@@ -1,6 +1,7 @@
 //! How well each fit describes its measured DEM: what can be believed, the covariance with its models, the parameters of all
 //! fits side by side, the DEM and what was fitted of it.
 
+mod map;
 mod mask;
 mod models;
 mod verdict;
@@ -31,7 +32,7 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     for dem in dems.iter().take(DEMS_MAX) {
         let fits: Vec<&FitRow> = data.fits.iter().filter(|f| f.dem_id == *dem).collect();
         blocks.push(Block::Heading(format!("DEM {dem}")));
-        blocks.extend(fits.iter().map(|fit| Block::Text(verdict::paragraph(fit))));
+        blocks.extend(fits.iter().map(|fit| Block::Text(verdict::paragraph(fit, &models::of_fit(data, fit)))));
         blocks.extend(warnings(data, &fits)?.into_iter().map(Block::Warning));
         blocks.push(Block::Figures(covariances(data, &fits)));
         blocks.push(Block::Table(verdict::intervals(dem, &fits)));
@@ -190,7 +191,7 @@ fn figure(id: String, fit: &FitRow, bins: &[&CovarianceRow], plot: Plot, banded:
 /// A parameter of every fit: name, unit, figure.
 type Parameter = (&'static str, &'static str, fn(&FitRow) -> f64);
 
-const PARAMETERS: [Parameter; 11] = [
+const PARAMETERS: [Parameter; 14] = [
     ("standard deviation σ", "m", |f| f.sigma_m),
     ("range b", "m", |f| f.range_m),
     ("nugget", "m2", |f| f.nugget_m2),
@@ -202,6 +203,9 @@ const PARAMETERS: [Parameter; 11] = [
     ("trim threshold", "m", |f| f.trim_threshold_m),
     ("share of cells used", "1", |f| f.used_share),
     ("rms misfit of the bins", "m2", |f| f.misfit_m2),
+    ("rms height below the window", "m", |f| f.band_rms_m),
+    ("noise of a cell", "m", |f| f.noise_sigma_m),
+    ("effective resolution", "m", |f| f.effective_resolution_m),
 ];
 
 fn parameters(dem: &str, fits: &[&FitRow]) -> TableBlock {
@@ -235,6 +239,7 @@ fn maps(data: &Data, dem: &str, fits: &[&FitRow]) -> Result<Vec<Figure>, ReportE
         figures.extend(background(data, fit, style)?);
         figures.extend(residual(data, fit)?);
         figures.extend(mask::figure(data, fit)?);
+        figures.extend(map::figure(data, fit)?);
     }
     Ok(figures)
 }

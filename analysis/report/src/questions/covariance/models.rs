@@ -182,11 +182,21 @@ fn directions(data: &Data, fit: &FitRow) -> Option<Figure> {
     })
 }
 
+/// Every parameter of a fit's model with its unit; empty where the release does not say.
+pub fn of_fit(data: &Data, fit: &FitRow) -> Vec<(String, &'static str, f64)> {
+    let first = data.candidates_of(&fit.fit_id).iter().find(|c| c.rank == 1);
+    let all = first.map(|c| parameters(&c.parameters)).unwrap_or_default();
+    all.into_iter().map(|(name, value)| (name.clone(), unit_of(&name), value)).collect()
+}
+
+fn parameters(json: &str) -> BTreeMap<String, f64> {
+    serde_json::from_str(json).unwrap_or_default()
+}
+
 /// The candidates of all fits of a DEM, one parameter a column; without rows where no fit had a choice.
 pub fn table(data: &Data, dem: &str, fits: &[&FitRow]) -> TableBlock {
     let of_fit = |f: &&FitRow| data.candidates_of(&f.fit_id);
     let rows: Vec<_> = fits.iter().map(of_fit).filter(|all| all.len() > 1).flatten().collect();
-    let parameters = |json: &str| serde_json::from_str::<BTreeMap<String, f64>>(json).unwrap_or_default();
     let names: BTreeSet<String> = rows.iter().flat_map(|c| parameters(&c.parameters).into_keys()).collect();
     let mut columns =
         vec![("fit", ""), ("rank", ""), ("model", ""), ("AICc above best", "1"), ("χ²", "1"), ("free", "")];

@@ -8,6 +8,10 @@ use sastrugi_schemas::tables::FitRow;
 const LEVEL: f64 = 0.01;
 /// Standard errors by which fits at other windows may differ.
 const WINDOWS_Z: f64 = 2.58;
+/// Ratio of ranges above which a direction is slight, whatever its p-value.
+const SLIGHT_RATIO: f64 = 0.9;
+/// Spread of block sigmas below which it is slight, whatever its p-value.
+const SLIGHT_SPREAD: f64 = 1.2;
 /// Width of an interval, high over low, beyond which a parameter is called poorly known.
 const WIDE: f64 = 2.0;
 
@@ -44,15 +48,43 @@ fn interval_words([low, high]: [f64; 2], unit: &str) -> Option<String> {
     }
 }
 
-/// The paragraph of one fit.
-pub fn paragraph(fit: &FitRow) -> String {
-    let sentences =
-        [Some(estimate(fit)), poorly_known(fit), model(fit), window(fit), direction(fit), site(fit), distribution(fit)];
+/// The paragraph of one fit; `all` are the parameters of its model.
+pub fn paragraph(fit: &FitRow, all: &[(String, &str, f64)]) -> String {
+    let sentences = [
+        no_scale(fit),
+        Some(estimate(fit, all)),
+        poorly_known(fit),
+        model(fit),
+        window(fit),
+        direction(fit),
+        site(fit),
+        distribution(fit),
+    ];
     let all: Vec<String> = sentences.into_iter().flatten().collect();
     format!("{} ({} mode, {}): {}", fit.fit_id, fit.mode, fit.model, all.join(" "))
 }
 
-fn estimate(fit: &FitRow) -> String {
+/// Figures that hold whatever the window, where σ and b do not.
+fn no_scale(fit: &FitRow) -> Option<String> {
+    let disagree = fit.window_disagreement_z > WINDOWS_Z;
+    disagree.then(|| {
+        let below = format!(
+            "There is no one scale: the root mean square height below {} is {}",
+            set::with_unit(fit.window_x_m, 3, "m"),
+            set::with_unit(fit.band_rms_m, 3, "m")
+        );
+        match fit.hurst.is_finite() {
+            true => format!(
+                "{below}, and increments grow as {} × (lag / 1 m)^{} (Hurst exponent).",
+                set::with_unit(fit.increment_1m_m, 3, "m"),
+                set::fixed(fit.hurst, 2)
+            ),
+            false => format!("{below}."),
+        }
+    })
+}
+
+fn estimate(fit: &FitRow, all: &[(String, &str, f64)]) -> String {
     let one = |(name, unit, value, interval, _): Parameter| {
         let value = format!("{name} = {}", set::with_unit(value, 3, unit));
         match interval_words(interval, unit) {
@@ -60,7 +92,16 @@ fn estimate(fit: &FitRow) -> String {
             None => value,
         }
     };
-    let values = parameters(fit).into_iter().filter(|p| p.2.is_finite()).map(one).collect::<Vec<_>>().join(", ");
+    let mut values: Vec<String> = parameters(fit).into_iter().filter(|p| p.2.is_finite()).map(one).collect();
+    if values.is_empty() {
+        // A sum or a self-affine surface, which has no one σ and b: its parameters are in the file of the fit with their intervals.
+        values.extend(all.iter().map(|(name, unit, value)| match *unit {
+            "1" => format!("{name} = {}", set::significant(*value, 3)),
+            unit => format!("{name} = {}", set::with_unit(*value, 3, &set::unit(unit))),
+        }));
+        return format!("{}.", values.join(", "));
+    }
+    let values = values.join(", ");
     match fit.replicates {
         0 => format!("{values}, without intervals."),
         n => format!(
@@ -97,7 +138,9 @@ fn window(fit: &FitRow) -> Option<String> {
     let z = Some(fit.window_disagreement_z).filter(|z| z.is_finite())?;
     let apart = format!("{} standard errors", set::significant(z, 2));
     Some(match z > WINDOWS_Z {
-        true => format!("Fits at other windows disagree ({apart}): σ and b belong to this window, not to the surface."),
+        true => format!(
+            "Fits at other windows disagree ({apart}): the parameters belong to this window, not to the surface."
+        ),
         false => format!("Fits at other windows agree within their errors ({apart})."),
     })
 }
@@ -105,13 +148,17 @@ fn window(fit: &FitRow) -> Option<String> {
 /// What the test of direction found.
 pub fn direction(fit: &FitRow) -> Option<String> {
     let p = Some(fit.isotropy_p).filter(|p| p.is_finite())?;
-    Some(match p <= LEVEL {
-        true => format!(
-            "The texture has a direction ({}): it is {} times as long along {}° from north as across.",
+    let longer = || {
+        format!(
+            "({}): it is {} times as long along {}° from north as across",
             p_value(p),
             set::significant(1.0 / fit.isotropy_ratio, 3),
             set::fixed(fit.isotropy_azimuth_deg, 0)
-        ),
+        )
+    };
+    Some(match p <= LEVEL {
+        true if fit.isotropy_ratio < SLIGHT_RATIO => format!("The texture has a direction {}.", longer()),
+        true => format!("The texture has a direction {}, which is slight.", longer()),
         false => format!("No direction stands out ({}).", p_value(p)),
     })
 }
@@ -120,6 +167,10 @@ fn site(fit: &FitRow) -> Option<String> {
     let p = Some(fit.stationarity_p).filter(|p| p.is_finite())?;
     let apart = set::significant(fit.block_sigma_max_over_min, 3);
     Some(match p <= LEVEL {
+        true if fit.block_sigma_max_over_min <= SLIGHT_SPREAD => format!(
+            "Blocks of the site differ slightly: σ by a factor of {apart}, more than chance makes it ({}).",
+            p_value(p)
+        ),
         true => {
             format!("The site is not of one piece: σ of its blocks differs by a factor of {apart} ({}).", p_value(p))
         }
@@ -188,7 +239,7 @@ mod tests {
     #[test]
     fn val_sentences_say_what_the_row_says() {
         let data = made_up::full(1, 24);
-        let corrected = paragraph(&data.fits[0]);
+        let corrected = paragraph(&data.fits[0], &[]);
         for part in [
             "σ = 21.0 m (19.2 to 24.1 m)",
             "95 % intervals from 99 surfaces",
@@ -201,8 +252,27 @@ mod tests {
             assert!(corrected.contains(part), "{part} in {corrected}");
         }
         assert!(!corrected.contains("to a factor of"));
-        let paper = paragraph(&data.fits[1]);
+        let paper = paragraph(&data.fits[1], &[]);
         assert!(paper.ends_with("σ²/b = 0.613 m, without intervals."), "{paper}");
+        let lost = FitRow {
+            window_disagreement_z: 9.0,
+            hurst: 0.6,
+            increment_1m_m: 0.5,
+            isotropy_ratio: 0.95,
+            sigma_m: f64::NAN,
+            range_m: f64::NAN,
+            sigma2_over_range_m: f64::NAN,
+            ..data.fits[0].clone()
+        };
+        let lost = paragraph(&lost, &[("hurst".into(), "1", 0.61)]);
+        for part in [
+            "There is no one scale: the root mean square height below 3034 m is 15.0 m, and increments grow as 0.500 m × \
+             (lag / 1 m)^0.60",
+            "hurst = 0.610.",
+            "which is slight",
+        ] {
+            assert!(lost.contains(part), "{part} in {lost}");
+        }
         let fits: Vec<&FitRow> = data.fits.iter().collect();
         let table = intervals("jacksboro", &fits).numbers;
         let names: Vec<&str> = table.columns.iter().map(|c| c.name.as_str()).collect();
