@@ -4,7 +4,7 @@ use super::FitSettings;
 use super::resampling::CELLS_MAX;
 use super::survey::STRIP_CELLS;
 
-/// A strip at work: heights, what is made of them, and the transforms of their pairs.
+/// A strip at work: heights, what is made of them, and, of narrow rasters, the transforms of their pairs.
 const STRIP_CELL_BYTES: u64 = 100;
 /// A replicate at work: a surface on a torus of four times as many cells, its transforms, its residual.
 const REPLICATE_CELL_BYTES: u64 = 300;

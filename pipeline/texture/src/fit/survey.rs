@@ -2,9 +2,9 @@
 //!
 //! Rows are read in strips, three times: to find outliers (each strip judged by its own robust scale, with two windows
 //! around it), to find the threshold, and to add up pairs of residuals. So memory is bounded by the strip and two bits per
-//! cell: half a million cells, or eight windows (four of them around it) or four of the largest lags times the width where
-//! that is more, at about 100 bytes each. It grows with the raster's width, not with its length. Background and residual of
-//! any part are made again when they are asked for.
+//! cell: two million cells, or eight windows (four of them around it) or four of the largest lags times the width where
+//! that is more, at about 40 bytes each. It grows with the raster's width, not with its length. Heights and residuals of a
+//! strip lie where those of the one before did. Residuals of any part are made again when they are asked for.
 
 use super::heights::Heights;
 use super::resampling::block_places;
