@@ -8,7 +8,7 @@
 //! afresh, so that a cell pulled down by a tree nearby is taken back once the tree is out.
 //!
 //! An object stands out from its own surroundings. The scale is that of the whole raster or, where it is larger, of the
-//! place: the median over nine blocks of a window each ([`Scales`]). Against the raster's scale alone the steep fifth of a bare
+//! place: the median over nine blocks of a window each (`Scales`). Against the raster's scale alone the steep fifth of a bare
 //! site would be taken for objects, because the texture of slopes is larger than that of flats. An object of up to about two
 //! windows that stands alone fills less than half of the blocks and does not hide itself; a thicket does, and is better
 //! masked by hand.
