@@ -142,8 +142,10 @@ pub struct Heightfield {
     pub stream: Option<String>,
     /// Its path in the release.
     pub release_path: String,
-    /// Number of cells; for a measured DEM, which is not read before the run, as many as its file may hold.
+    /// Number of cells; for a measured DEM whose file does not state it, as many as it may hold.
     pub cells: u64,
+    /// Smaller side of a cell, m, where it is known before the run.
+    pub cell_m: Option<f64>,
 }
 
 /// A graph under construction, with what later sections refer to.

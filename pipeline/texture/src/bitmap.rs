@@ -1,5 +1,7 @@
 //! One bit for each cell of a raster.
 
+use std::ops::Range;
+
 /// Bits in the order in which they were pushed.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Bitmap {
@@ -23,6 +25,19 @@ impl Bitmap {
             *word |= u64::from(bit) << (self.len % 64);
         }
         self.len += 1;
+    }
+
+    /// Adds bits.
+    pub fn extend(&mut self, bits: impl Iterator<Item = bool>) {
+        bits.for_each(|bit| self.push(bit));
+    }
+
+    /// Positions within `range` of the bits that are not set.
+    pub fn unset(&self, range: Range<usize>) -> impl Iterator<Item = usize> {
+        let words = range.start / 64..range.end.div_ceil(64);
+        let missing = words.flat_map(|w| set(!self.words.get(w).copied().unwrap_or(0)).map(move |bit| 64 * w + bit));
+        let (from, to) = (range.start, range.end);
+        missing.skip_while(move |&k| k < from).take_while(move |&k| k < to)
     }
 
     /// Bit `k`; false beyond the last one.
@@ -57,6 +72,12 @@ fn nth_set(mut word: u64, n: usize) -> usize {
     word.trailing_zeros() as usize
 }
 
+/// Positions of the set bits of a word.
+fn set(word: u64) -> impl Iterator<Item = usize> {
+    let rest = |word: &u64| Some(word & (word - 1)).filter(|w| *w != 0);
+    std::iter::successors(Some(word).filter(|w| *w != 0), rest).map(|w| w.trailing_zeros() as usize)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -69,6 +90,10 @@ mod tests {
         let places: Vec<usize> = (0..1000).filter(|&k| set(k)).collect();
         assert!((0..1100).all(|k| bits.get(k) == (k < 1000 && set(k))));
         assert_eq!(bits.count(), places.len());
+        for range in [0..1000, 3..700, 64..128, 100..101, 5..5, 990..1100] {
+            let missing: Vec<usize> = range.clone().filter(|&k| k >= 1000 || !set(k)).collect();
+            assert_eq!(bits.unset(range).collect::<Vec<_>>(), missing);
+        }
         let ranks: Vec<usize> = (0..places.len()).step_by(3).chain([places.len() - 1, places.len() - 1]).collect();
         assert_eq!(bits.select(&ranks), ranks.iter().map(|&r| places[r]).collect::<Vec<_>>());
     }

@@ -3,7 +3,8 @@
 
 use crate::covariance::masked_covariance;
 use crate::detrend::BoxWindow;
-use crate::fit::survey::{Detrended, Trim};
+use crate::fit::residual::residual;
+use crate::fit::survey::Trim;
 use crate::fit::{FitOutcome, FitParameters, FitSettings};
 use crate::sizes::Sizes;
 use rayon::prelude::*;
@@ -82,7 +83,7 @@ pub fn alike(texture: &Grid, fit: &FitFile) -> Option<Grid> {
     }
     let window = BoxWindow::nearest(0.5 * (window_x + window_y), texture.geometry.cell);
     let settings = settings_of(fit)?;
-    let mut residual = Detrended::of(&texture.values, texture.cols(), &settings, window).residual;
+    let mut residual = residual(&texture.values, texture.cols(), &settings, window);
     Trim::of(&Sizes::of(&residual), &settings).apply(&mut residual);
     Some(Grid::new(texture.geometry, residual))
 }

@@ -7,7 +7,7 @@ use crate::revision::Room;
 use crate::runner::graph::Node;
 use sastrugi_numeric::{Geometry, Grid, resample};
 use sastrugi_schemas::study::DemItem;
-use sastrugi_store::dem::{self, Crs, Dem, ReadOptions};
+use sastrugi_store::dem::{self, Claimed, Crs, Dem, ReadOptions};
 use sastrugi_store::points::GridSettings;
 use sastrugi_store::{atomic, digest};
 use serde::{Deserialize, Serialize};
@@ -85,6 +85,7 @@ struct DemJob {
     /// Path of the original in the release.
     release_path: String,
     bytes: u64,
+    claimed: Claimed,
 }
 
 /// Adds the items of `[[dem]]`.
@@ -99,6 +100,9 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
         check(&item).map_err(|(key, message)| entry.error(key, format!("`{key}` {message}")))?;
         let id = item.id.clone();
         let original = Original::of(&format!("dem/{id}"), &builder.study.folder, &item.file)?;
+        let claimed = dem::claimed(&builder.study.folder.join(&item.file), &ReadOptions { cell_m: item.cell_m });
+        // Other formats have two bytes or more for a cell.
+        let claimed = claimed.unwrap_or(Claimed { cells: original.bytes(), points: 0, cell_m: None });
         let key = entry.path_of("file");
         builder.inputs.push(InputPlace { key, release_path: original.release_path().to_owned() });
         let field = Heightfield {
@@ -108,11 +112,12 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
             parameters: recipe(&item),
             stream: None,
             release_path: format!("dem/{id}.metric.tif"),
-            cells: original.bytes(),
+            cells: claimed.cells,
+            cell_m: claimed.cell_m,
         };
         let (bytes, release_path, inputs) = (original.bytes(), original.release_path().to_owned(), original.inputs());
         let original = original.node(original::STAGE, &id);
-        let job = DemJob { item, original: original.item.clone(), release_path, bytes };
+        let job = DemJob { item, original: original.item.clone(), release_path, bytes, claimed };
         let parents = vec![original.item.clone()];
         let node = Node { item: field.item.clone(), parents, inputs, stream: None, job: Box::new(job) };
         builder.node(&entry, original)?;
@@ -171,8 +176,10 @@ impl Job for DemJob {
     }
 
     fn memory_bytes(&self) -> u64 {
-        // Compressed integers may grow to eight times as many bytes, held twice while they are cut and converted.
-        self.bytes.saturating_mul(24)
+        // Heights are held twice while they are cut or converted, beside the file or its tiles; cells of a cloud take 40
+        // bytes, its points 8 for a median, and the search for a cell size 64 MiB.
+        let Claimed { cells, points, .. } = self.claimed;
+        (128 << 20) + 2 * self.bytes + 40 * cells + 8 * points
     }
 
     fn estimate(&self) -> Estimate {

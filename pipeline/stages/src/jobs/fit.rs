@@ -48,6 +48,7 @@ struct FitJob {
     settings: FitSettings,
     streams: Streams,
     cells: u64,
+    cell_m: Option<f64>,
 }
 
 /// A DEM that is laid onto the fitted one and subtracted.
@@ -159,6 +160,7 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
                 settings,
                 streams: builder.streams(STAGE, &one.id, item.seed, 0),
                 cells: field.cells,
+                cell_m: field.cell_m,
             };
             let node = Node {
                 item: ItemRef::new(STAGE, &one.id),
@@ -192,9 +194,9 @@ impl Job for FitJob {
     }
 
     fn memory_bytes(&self) -> u64 {
-        // Background, residual, mask and what describes the residual (81 bytes a cell; the fit itself takes 51); the bins of
-        // the estimator beside them.
-        (256 << 20) + 100 * self.cells
+        // Background, residual, mask and what describes the residual take 81 bytes a cell, after the fit.
+        let fit = self.settings.memory_bytes(self.cells, self.cell_m, rayon::current_num_threads() as u64);
+        8 * self.cells + fit.max((256 << 20) + 81 * self.cells)
     }
 
     fn estimate(&self) -> Estimate {

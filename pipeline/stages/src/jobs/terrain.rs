@@ -47,6 +47,7 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
                 stream: Some(streams.label()),
                 release_path: format!("terrain/{}.tif", one.id),
                 cells: generator.geometry().len() as u64,
+                cell_m: Some(generator.geometry().cell.into_iter().fold(f64::INFINITY, f64::min)),
             };
             let job = TerrainJob { id: one.id.clone(), generator, streams, png16: item.png16 };
             let node = Node {

@@ -101,8 +101,6 @@ fn fitted(request: &Request<'_>, settings: &FitSettings) -> Result<Fitted, Error
 
 /// Cells above which a GeoTIFF is read in parts: half a gigabyte of heights.
 const PARTS_CELLS: usize = 1 << 26;
-/// Rows that are decoded at once, whatever part of them is wanted.
-const PARTS_ROWS: usize = 64;
 
 /// A raster of which parts are read as they are needed.
 struct Parts {
@@ -138,14 +136,10 @@ impl Heights for Parts {
         self.geometry
     }
 
-    fn part(&self, rows: Range<usize>, cols: Range<usize>) -> Result<Vec<f64>, String> {
+    fn read(&self, rows: Range<usize>, cols: Range<usize>, part: &mut Vec<f64>) -> Result<(), String> {
         let mut reader = self.reader.lock().map_err(|_| "reading of the raster was given up".to_owned())?;
-        let mut part = Vec::with_capacity(rows.len() * cols.len());
-        for first in rows.clone().step_by(PARTS_ROWS) {
-            let some = reader.read_rows(first..(first + PARTS_ROWS).min(rows.end)).map_err(|e| e.to_string())?;
-            (0..some.rows()).for_each(|r| part.extend_from_slice(&some.row(r)[cols.clone()]));
-        }
-        Ok(part)
+        *part = reader.read_part(rows, cols).map_err(|e| e.to_string())?.values;
+        Ok(())
     }
 }
 

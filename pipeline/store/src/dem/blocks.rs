@@ -1,9 +1,9 @@
 //! Rows of a raster at a time, for rasters larger than memory.
 //!
 //! A GeoTIFF (strips or tiles, of every type and compression that [`super::read`] reads) is decoded as its rows are asked
-//! for: memory holds the rows asked for, 8 bytes a cell, and the strips or the row of tiles around them, at most 64 MiB of
-//! which are kept for the next call. Each call decodes whole strips and tiles, so that rows in multiples of
-//! [`BlockReader::block_rows`] are decoded once. Other formats are read whole when they are opened.
+//! for: memory holds the cells asked for, 8 bytes each and once as they are stored, and two rows of strips or tiles (at most
+//! 256 MiB), which are kept for the next call: whoever reads downwards, overlapping or not, has each decoded once. Other
+//! formats are read whole when they are opened.
 //!
 //! Infinite values are no data, as in [`super::read`], which counts them; a raster without any data is found out by its reader.
 
@@ -14,6 +14,9 @@ use std::fs::File;
 use std::io::{BufReader, Read};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+
+/// Rows of strips or tiles that are kept: a part may end in one and the next begin there.
+const ROWS_OF_BLOCKS: usize = 2;
 
 /// A raster of which rows can be read.
 pub struct BlockReader {
@@ -36,7 +39,7 @@ pub fn open(path: &Path, options: &ReadOptions) -> Result<BlockReader, DemError>
     File::open(path).map_err(reading)?.take(SNIFFED_BYTES).read_to_end(&mut first).map_err(reading)?;
     let rows = match Format::of_file(path, &first) {
         Some(Format::GeoTiff) => {
-            let raster = Raster::open(path, options)?;
+            let raster = Raster::open(path, options, ROWS_OF_BLOCKS)?;
             check_place(&raster.geometry).map_err(|refusal| refusal.about(path))?;
             Rows::File(raster)
         }
@@ -76,22 +79,31 @@ impl BlockReader {
     /// Heights of some rows, counted from the north, m; `NaN` without data.
     ///
     /// # Errors
-    /// Rows that the raster does not have or that are too many at once, and strips or tiles that cannot be decoded.
+    /// As [`Self::read_part`].
     pub fn read_rows(&mut self, rows: Range<usize>) -> Result<Grid, DemError> {
+        let cols = 0..self.geometry().cols;
+        self.read_part(rows, cols)
+    }
+
+    /// Heights of some rows, counted from the north, and columns, m; `NaN` without data.
+    ///
+    /// # Errors
+    /// Rows or columns that the raster does not have or that are too many at once, and strips or tiles that cannot be decoded.
+    pub fn read_part(&mut self, rows: Range<usize>, cols: Range<usize>) -> Result<Grid, DemError> {
         let g = self.geometry();
-        let count = rows.len();
-        let fits = count > 0 && rows.end <= g.rows && (count as u64).saturating_mul(g.cols as u64) <= MAX_CELLS;
-        if !fits {
-            let reason = format!("rows {rows:?} of {} cannot be read at once", g.rows);
+        let cells = (rows.len() as u64).saturating_mul(cols.len() as u64);
+        if cells == 0 || rows.end > g.rows || cols.end > g.cols || cells > MAX_CELLS {
+            let reason =
+                format!("rows {rows:?} and columns {cols:?} of {} x {} cannot be read at once", g.rows, g.cols);
             return Err(DemError::Unfit { path: self.path.clone(), reason });
         }
         match &mut self.rows {
-            Rows::Held(grid, _) => Ok(grid.window(rows.start, 0, count, g.cols)),
+            Rows::Held(grid, _) => Ok(grid.window(rows.start, cols.start, rows.len(), cols.len())),
             Rows::File(raster) => {
-                let mut values =
-                    raster.rows(rows.start, count).map_err(|refusal: Refusal| refusal.about(&self.path))?;
+                let place = g.window(rows.start, cols.start, rows.len(), cols.len());
+                let mut values = raster.window(rows, cols).map_err(|refusal: Refusal| refusal.about(&self.path))?;
                 values.iter_mut().filter(|z| z.is_infinite()).for_each(|z| *z = f64::NAN);
-                Ok(Grid::new(g.window(rows.start, 0, count, g.cols), values))
+                Ok(Grid::new(place, values))
             }
         }
     }

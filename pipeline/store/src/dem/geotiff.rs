@@ -5,12 +5,13 @@
 //! georeferencing. Both stand behind [`parse`], and behind [`Raster`] for rows at a time.
 
 use super::crs::{Crs, GeoKey};
-use super::{Dem, DemError, DemInfo, Format, MAX_CELLS, ReadOptions, Refusal, cell_count};
+use super::{Claimed, Dem, DemError, DemInfo, Format, MAX_CELLS, ReadOptions, Refusal, cell_count};
 use geotiff_reader::geokeys::{GeoKeyDirectory, GeoKeyValue};
 use geotiff_reader::{GeoTiffFile, GeoTiffOpenOptions};
 use sastrugi_numeric::{Geometry, Grid};
 use std::fs::File;
 use std::io::{BufReader, Cursor, Read, Seek};
+use std::ops::Range;
 use std::path::Path;
 use tiff::decoder::{Decoder, DecodingResult, Limits};
 use tiff::tags::Tag;
@@ -19,6 +20,12 @@ use tiff::tags::Tag;
 const MAX_EXPANSION: u64 = 1 << 15;
 /// Raster bytes allowed for any file.
 const FREE_BYTES: u64 = 1 << 26;
+/// Most bytes of decoded strips and tiles that are kept for the next reading.
+const KEPT_BYTES_MAX: u64 = 1 << 28;
+/// Most strips and tiles that are kept.
+const KEPT_BLOCKS_MAX: usize = 1 << 14;
+/// Cells that are decoded together when all are read.
+const TOGETHER_CELLS: usize = 1 << 20;
 const RASTER_PIXEL_IS_POINT: u16 = 2;
 /// Note on a raster that says neither where it lies nor how large its cells are.
 pub(super) const NO_CELL_SIZE: &str = "the file states no cell size; 1 m is assumed";
@@ -32,7 +39,14 @@ pub(super) fn looks_like(bytes: &[u8]) -> bool {
 
 /// Reads a TIFF from its file, strip by strip or tile by tile.
 pub(super) fn read(path: &Path, options: &ReadOptions) -> Result<Dem, DemError> {
-    Raster::open(path, options)?.whole().map_err(|refusal| refusal.about(path))
+    Raster::open(path, options, 0)?.whole().map_err(|refusal| refusal.about(path))
+}
+
+/// What the header says.
+pub(super) fn claimed(path: &Path, options: &ReadOptions) -> Option<Claimed> {
+    let Raster { geometry, info, .. } = Raster::open(path, options, 0).ok()?;
+    let cell_m = (!info.crs.geographic).then(|| geometry.cell[0].min(geometry.cell[1]));
+    Some(Claimed { cells: geometry.len() as u64, points: 0, cell_m })
 }
 
 /// Reads a TIFF that is in memory.
@@ -41,14 +55,31 @@ pub(super) fn parse(bytes: Vec<u8>, options: &ReadOptions) -> Result<Dem, Refusa
     let raster = if unreferenced(Cursor::new(&bytes[..])).is_some() {
         Raster::plain(unreferenced(Cursor::new(bytes)), size, options)?
     } else {
-        let file = GeoTiffFile::from_bytes_with_options(bytes, limits()).map_err(|e| refused(&e))?;
+        let file = GeoTiffFile::from_bytes_with_options(bytes, limits([0, 0])).map_err(|e| refused(&e))?;
         Raster::referenced(file, size, options)?
     };
     raster.whole()
 }
 
-fn limits() -> GeoTiffOpenOptions {
-    GeoTiffOpenOptions { decode_output_bytes: MAX_CELLS as usize * 8, ..GeoTiffOpenOptions::default() }
+/// Options of a decoder that keeps so many decoded strips or tiles, and so many bytes of them.
+fn limits([block_cache_slots, block_cache_bytes]: [usize; 2]) -> GeoTiffOpenOptions {
+    let decode_output_bytes = MAX_CELLS as usize * 8;
+    GeoTiffOpenOptions { decode_output_bytes, block_cache_slots, block_cache_bytes, ..GeoTiffOpenOptions::default() }
+}
+
+/// Number and bytes of the strips or tiles in some rows of them, at most [`KEPT_BYTES_MAX`].
+fn kept(file: &GeoTiffFile, rows_of_blocks: usize) -> Result<[usize; 2], Refusal> {
+    let ifd = file.tiff().ifd(file.base_ifd_index()).map_err(|e| refused(&e))?;
+    let bits = ifd.raster_layout().map_err(|e| refused(&e))?.bits_per_sample;
+    let (wide, high) = match (ifd.tile_width(), ifd.tile_height()) {
+        (Some(wide), Some(high)) if ifd.is_tiled() => (wide, high),
+        _ => (file.width(), ifd.rows_per_strip()),
+    };
+    let blocks = rows_of_blocks.saturating_mul(file.width().div_ceil(wide.max(1)) as usize);
+    let cells = u64::from(wide).saturating_mul(u64::from(high.min(file.height())));
+    let bytes = cells.saturating_mul(u64::from(bits).div_ceil(8)).saturating_mul(blocks as u64);
+    // Every slot takes memory by itself.
+    Ok([blocks.min(KEPT_BLOCKS_MAX), bytes.min(KEPT_BYTES_MAX) as usize])
 }
 
 /// A decoder of a TIFF that has no georeferencing.
@@ -87,8 +118,9 @@ enum Pixels<R: Read + Seek> {
 }
 
 impl Raster<BufReader<File>> {
-    /// Opens a TIFF whose rows are to be read as they are needed.
-    pub fn open(path: &Path, options: &ReadOptions) -> Result<Self, DemError> {
+    /// Opens a TIFF whose rows are to be read as they are needed. Decoded strips or tiles are kept for the next reading, so
+    /// many rows of them.
+    pub fn open(path: &Path, options: &ReadOptions, rows_of_blocks: usize) -> Result<Self, DemError> {
         let reading = |e| DemError::reading(path, e);
         let file = File::open(path).map_err(reading)?;
         let size = file.metadata().map_err(reading)?.len();
@@ -96,7 +128,11 @@ impl Raster<BufReader<File>> {
         let raster = if plain.is_some() {
             Self::plain(plain, size, options)
         } else {
-            let file = GeoTiffFile::open_with_options(path, limits()).map_err(|e| refused(&e));
+            let keeping = |blocks| GeoTiffFile::open_with_options(path, limits(blocks)).map_err(|e| refused(&e));
+            let file = keeping([0, 0]).and_then(|file| match rows_of_blocks {
+                0 => Ok(file),
+                _ => kept(&file, rows_of_blocks).and_then(keeping),
+            });
             file.and_then(|file| Self::referenced(file, size, options))
         };
         raster.map_err(|refusal| refusal.about(path))
@@ -162,29 +198,41 @@ impl<R: Read + Seek> Raster<R> {
 
     fn whole(mut self) -> Result<Dem, Refusal> {
         let Geometry { rows, cols, .. } = self.geometry;
-        cell_count(rows as u64, cols as u64)?;
-        let values = self.rows(0, rows)?;
+        let mut values = Vec::with_capacity(cell_count(rows as u64, cols as u64)?);
+        let step = (TOGETHER_CELLS / cols).max(1).next_multiple_of(self.block_rows);
+        for first in (0..rows).step_by(step) {
+            self.add_window(first..(first + step).min(rows), 0..cols, &mut values)?;
+        }
         Ok(Dem { grid: Grid::new(self.geometry, values), info: self.info })
     }
 
-    /// Heights of rows that exist, counted from the north; `NaN` without data.
-    pub fn rows(&mut self, first: usize, count: usize) -> Result<Vec<f64>, Refusal> {
-        let (g, nodata) = (&self.geometry, self.info.nodata);
-        let values = match &mut self.pixels {
-            Pixels::Plain(decoder) => plain_rows(decoder, g, nodata, first, count)?,
+    /// Heights of rows (from the north) and columns that exist; `NaN` without data.
+    pub fn window(&mut self, rows: Range<usize>, cols: Range<usize>) -> Result<Vec<f64>, Refusal> {
+        let mut values = Vec::with_capacity(rows.len() * cols.len());
+        self.add_window(rows, cols, &mut values)?;
+        Ok(values)
+    }
+
+    /// Adds what [`Self::window`] reads.
+    fn add_window(&mut self, rows: Range<usize>, cols: Range<usize>, values: &mut Vec<f64>) -> Result<(), Refusal> {
+        let (g, nodata, before) = (&self.geometry, self.info.nodata, values.len());
+        match &mut self.pixels {
+            Pixels::Plain(decoder) => values.extend(plain_window(decoder, g, nodata, &rows, &cols)?),
             Pixels::Referenced { file, stored, south_first: false } => {
-                stored_rows(file, *stored, nodata, first, count)?
+                stored_window(file, *stored, nodata, &rows, &cols, values)?;
             }
             Pixels::Referenced { file, stored, south_first: true } => {
-                let values = stored_rows(file, *stored, nodata, g.rows - first - count, count)?;
-                values.chunks_exact(g.cols).rev().flatten().copied().collect()
+                let from_south = g.rows - rows.end..g.rows - rows.start;
+                let mut turned = Vec::with_capacity(rows.len() * cols.len());
+                stored_window(file, *stored, nodata, &from_south, &cols, &mut turned)?;
+                values.extend(turned.chunks_exact(cols.len()).rev().flatten());
             }
-        };
-        if values.len() != count * g.cols {
-            let found = values.len();
-            return Err(Refusal::new(format!("holds {found} values for {count} x {} cells", g.cols)));
         }
-        Ok(values)
+        let (found, count, wide) = (values.len() - before, rows.len(), cols.len());
+        if found != count * wide {
+            return Err(Refusal::new(format!("holds {found} values for {count} x {wide} cells")));
+        }
+        Ok(())
     }
 }
 
@@ -225,19 +273,25 @@ fn dtype(format: u16, bits: u16) -> Result<&'static str, Refusal> {
     }
 }
 
-/// Rows of a georeferenced file in its own order.
-fn stored_rows(
+/// Adds rows and columns of a georeferenced file in its own order to `values`.
+fn stored_window(
     file: &GeoTiffFile,
     stored: (u16, u16),
     nodata: Option<f64>,
-    first: usize,
-    count: usize,
-) -> Result<Vec<f64>, Refusal> {
-    let cols = file.width() as usize;
+    rows: &Range<usize>,
+    cols: &Range<usize>,
+    values: &mut Vec<f64>,
+) -> Result<(), Refusal> {
     macro_rules! read {
         ($t:ty, $nodata:expr) => {{
-            let band = file.read_band_window::<$t>(0, first, 0, count, cols).map_err(|e| refused(&e))?;
-            Ok(band.iter().map(|&v| without(f64::from(v), $nodata)).collect())
+            let band = file.read_band_window::<$t>(0, rows.start, cols.start, rows.len(), cols.len());
+            let band = band.map_err(|e| refused(&e))?;
+            let nodata = $nodata;
+            match band.as_slice() {
+                Some(band) => values.extend(band.iter().map(|&v| without(f64::from(v), nodata))),
+                None => values.extend(band.iter().map(|&v| without(f64::from(v), nodata))),
+            }
+            Ok(())
         }};
     }
     match stored {
@@ -249,7 +303,7 @@ fn stored_rows(
         (2, 16) => read!(i16, nodata),
         (1, 32) => read!(u32, nodata),
         (2, 32) => read!(i32, nodata),
-        (format, bits) => dtype(format, bits).map(|_| Vec::new()),
+        (format, bits) => dtype(format, bits).map(drop),
     }
 }
 
@@ -299,28 +353,27 @@ pub(super) fn unplaced(rows: usize, cols: usize, options: &ReadOptions, notes: &
     Geometry { rows, cols, cell, origin: [0.0; 2] }
 }
 
-/// Rows of a file without georeferencing: the strips or tiles that hold them, cut.
-fn plain_rows<R: Read + Seek>(
+/// Rows and columns of a file without georeferencing: the strips or tiles that hold them, cut.
+fn plain_window<R: Read + Seek>(
     decoder: &mut Decoder<R>,
     g: &Geometry,
     nodata: Option<f64>,
-    first: usize,
-    count: usize,
+    rows: &Range<usize>,
+    cols: &Range<usize>,
 ) -> Result<Vec<f64>, Refusal> {
     let (wide, high) = decoder.chunk_dimensions();
     let (wide, high) = ((wide as usize).min(g.cols), (high as usize).min(g.rows));
     let across = g.cols.div_ceil(wide);
-    let mut values = vec![f64::NAN; count * g.cols];
-    for band in first / high..(first + count).div_ceil(high) {
-        for k in 0..across {
+    let mut values = vec![f64::NAN; rows.len() * cols.len()];
+    for band in rows.start / high..rows.end.div_ceil(high) {
+        for k in cols.start / wide..cols.end.div_ceil(wide) {
             let index = u32::try_from(band * across + k).map_err(|e| refused(&e))?;
             let part = widened(decoder.read_chunk(index).map_err(|e| refused(&e))?, nodata)?;
             let (col, part_cols) = (k * wide, wide.min(g.cols - k * wide));
-            for (line, row) in part.chunks_exact(part_cols).zip(band * high..) {
-                if row >= first && row < first + count {
-                    let at = (row - first) * g.cols + col;
-                    values[at..at + part_cols].copy_from_slice(line);
-                }
+            let (from, to) = (cols.start.max(col), cols.end.min(col + part_cols));
+            for (line, row) in part.chunks_exact(part_cols).zip(band * high..).filter(|(_, row)| rows.contains(row)) {
+                let at = (row - rows.start) * cols.len() + from - cols.start;
+                values[at..at + to - from].copy_from_slice(&line[from - col..to - col]);
             }
         }
     }

@@ -247,6 +247,29 @@ pub fn read_gridded(path: &Path, options: &ReadOptions, settings: &GridSettings)
     parse(path, bytes, options).and_then(checked).map_err(|refusal| refusal.about(path))
 }
 
+/// What the header of a raster or a point cloud says of its size, nothing decoded.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Claimed {
+    /// Number of cells.
+    pub cells: u64,
+    /// Number of points; 0 for a raster.
+    pub points: u64,
+    /// Smaller side of a cell, m, where the header or the caller says.
+    pub cell_m: Option<f64>,
+}
+
+/// The claims of a GeoTIFF, LAS or LAZ file; `None` for other formats, whose files have two bytes or more for a cell, and
+/// for files that cannot be read.
+pub fn claimed(path: &Path, options: &ReadOptions) -> Option<Claimed> {
+    let mut file = File::open(path).ok()?;
+    let mut first = Vec::new();
+    file.by_ref().take(SNIFFED_BYTES).read_to_end(&mut first).ok()?;
+    if points::looks_like(&first) {
+        return points::claimed(file, options.cell_m.map(|[x, y]| x.min(y)));
+    }
+    geotiff::looks_like(&first).then(|| geotiff::claimed(path, options)).flatten()
+}
+
 fn square_cell(path: &Path, options: &ReadOptions) -> Result<Option<f64>, DemError> {
     match options.cell_m {
         Some([x, y]) if x != y => {

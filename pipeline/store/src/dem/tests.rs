@@ -269,6 +269,13 @@ fn blocks_agree(path: &Path) {
         let expected = whole.grid.window(range.start, 0, range.len(), whole.grid.cols());
         assert!(same(&part, &expected), "{}: rows {range:?}", path.display());
     }
+    let cols = whole.grid.cols();
+    for part in [0..1, cols - 1..cols, cols / 3..cols / 3 + cols.div_ceil(3)] {
+        let expected = whole.grid.window(rows / 3, part.start, rows.div_ceil(3), part.len());
+        let found = reader.read_part(rows / 3..rows / 3 + rows.div_ceil(3), part.clone()).unwrap();
+        assert!(same(&found, &expected), "{}: columns {part:?}", path.display());
+    }
+    assert!(matches!(reader.read_part(0..1, cols..cols + 1), Err(DemError::Unfit { .. })));
     for range in [0..rows + 1, rows..rows + 1, 5..5] {
         assert!(matches!(reader.read_rows(range), Err(DemError::Unfit { .. })));
     }
@@ -303,6 +310,25 @@ fn val_rows_of_written_rasters() {
         write(&path, &grid, &Crs::wgs84(), &WriteOptions { compression }).unwrap();
         blocks_agree(&path);
         assert_eq!(open(&path, &ReadOptions::default()).unwrap().block_rows(), 256);
+    }
+}
+
+/// The claims of a header are those of the raster, without decoding.
+#[test]
+fn val_claims() {
+    let folder = tempfile::tempdir().unwrap();
+    let grid = hilly(60, 27);
+    let claim = |name: &str, options: &ReadOptions| {
+        let path = folder.path().join(name);
+        write(&path, &grid, &Crs::default(), &Default::default()).unwrap();
+        claimed(&path, options)
+    };
+    let cell_m = Some(grid.geometry.cell[0].min(grid.geometry.cell[1]));
+    assert_eq!(claim("a.tif", &ReadOptions::default()), Some(Claimed { cells: 60 * 27, points: 0, cell_m }));
+    assert_eq!(claim("a.npy", &ReadOptions::default()), None);
+    assert_eq!(claimed(&folder.path().join("none.tif"), &ReadOptions::default()), None);
+    if let Some(cloud) = data("akl_lidar.laz") {
+        assert!(claimed(&cloud, &ReadOptions::default()).is_some_and(|c| c.points > 0 && c.cells > 0));
     }
 }
 

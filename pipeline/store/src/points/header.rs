@@ -44,6 +44,8 @@ pub(super) struct Claims {
     pub scale: [f64; 3],
     /// Coordinates of the stored zero, by axis.
     pub offset: [f64; 3],
+    /// Extent east-west and north-south that the header states, not checked.
+    pub extent: [f64; 2],
     /// True when the reference system is well-known text.
     pub well_known_text: bool,
     /// Where the points start.
@@ -134,6 +136,7 @@ impl Claims {
             compressed,
             scale: [header.f64(131), header.f64(139), header.f64(147)],
             offset: [header.f64(155), header.f64(163), header.f64(171)],
+            extent: [header.f64(179) - header.f64(187), header.f64(195) - header.f64(203)],
             well_known_text: minor == 4 && header.u16(6) & 16 != 0,
             data_start,
             file_bytes,

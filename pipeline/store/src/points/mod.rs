@@ -28,9 +28,10 @@ mod lattice;
 #[cfg(test)]
 mod tests;
 
-use crate::dem::{self, Dem, DemError, DemInfo, Format, MAX_CELLS, Refusal};
+use crate::dem::{self, Claimed, Dem, DemError, DemInfo, Format, MAX_CELLS, Refusal};
 use cloud::{Cloud, Point};
 use grid::Cells;
+use header::Claims;
 use lattice::Lattice;
 use sastrugi_numeric::Grid;
 use std::fs::File;
@@ -126,6 +127,18 @@ pub fn read(path: &Path, settings: &GridSettings) -> Result<Gridded, DemError> {
 pub(crate) fn read_open(path: &Path, file: File, settings: &GridSettings) -> Result<Gridded, DemError> {
     check(settings).map_err(|reason| DemError::Unfit { path: path.to_owned(), reason })?;
     Cloud::open(path, file).and_then(|cloud| gridded(&cloud, settings)).map_err(|refusal| refusal.about(path))
+}
+
+/// What the header of a cloud says it will be gridded to, with cells of a given size.
+pub(crate) fn claimed(mut file: File, cell_m: Option<f64>) -> Option<Claimed> {
+    let Claims { points, extent, .. } = Claims::read(&mut file).ok()?;
+    let cells = match cell_m {
+        Some(cell) => (extent[0] / cell + 1.0) * (extent[1] / cell + 1.0),
+        // Without a size, three quarters of the cells hold a point.
+        None => points as f64 / 0.75,
+    };
+    // An extent that is no number is found out when the cloud is read.
+    Some(Claimed { cells: (cells as u64).min(MAX_CELLS), points, cell_m })
 }
 
 /// True for the first bytes of a point cloud.

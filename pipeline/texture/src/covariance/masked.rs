@@ -4,14 +4,17 @@
 //! data. S and N are autocorrelations of the data (0 where there is none) and of the mask, hence two Fourier transforms
 //! (Marcotte, 1996, Computers & Geosciences 22, 1175). No mean is taken off: a caller who wants that does it before.
 //!
-//! The raster is cut into strips of rows that overlap by the largest lag; what two neighbouring strips share is counted
-//! twice and taken off once. So memory is bounded by the strip, not by the raster: about 40 bytes per padded strip cell.
-//! Rounding: about 1e-15 of the zero-lag sum; pair counts are exact.
+//! The raster is cut into strips of rows, and these into tiles, which overlap by the largest lag; what two neighbours share is
+//! counted twice and taken off once. So memory is bounded by the tile, not by the raster: about 50 bytes per padded cell of one,
+//! 65 MB for strips of 1024 rows and lags of 32 cells. Rounding: about 1e-15 of the zero-lag sum; pair counts are exact.
 
-use sastrugi_numeric::fft::{RealFft2, smooth_length};
+use sastrugi_numeric::fft::{Complex64, RealFft2, smooth_length};
+use std::ops::Range;
 
 /// Rows that a strip adds, unless four times the largest lag is more.
-const STRIP_ROWS: usize = 256;
+const STRIP_ROWS: usize = 1024;
+/// Columns that a tile adds, unless four times the largest lag is more.
+const TILE_COLS: usize = 1024;
 
 /// Pair sums of a raster for lags `(drow, dcol)` with `|drow| <= max_lag[0]`, `|dcol| <= max_lag[1]`.
 #[derive(Clone, Debug)]
@@ -53,7 +56,7 @@ impl MaskedCovariance {
 pub fn masked_covariance(values: &[f64], cols: usize, max_lag: [usize; 2]) -> MaskedCovariance {
     let rows = values.len().checked_div(cols).unwrap_or(0);
     let max_lag = [max_lag[0].min(rows.saturating_sub(1)), max_lag[1].min(cols.saturating_sub(1))];
-    let step = STRIP_ROWS.max(4 * max_lag[0]).min(rows.max(1));
+    let step = even_step(rows, STRIP_ROWS.max(4 * max_lag[0]), max_lag[0]);
     let mut sums = PairSums::new(step, cols, max_lag);
     for first in (0..rows).step_by(step) {
         sums.add(&values[first * cols..(first + step + max_lag[0]).min(rows) * cols]);
@@ -61,69 +64,110 @@ pub fn masked_covariance(values: &[f64], cols: usize, max_lag: [usize; 2]) -> Ma
     sums.finish()
 }
 
+/// Length of the parts, `most` or somewhat fewer, by which `len` rows or columns are transformed with the least work: cut
+/// evenly and padded little.
+pub(crate) fn even_step(len: usize, most: usize, max_lag: usize) -> usize {
+    let fewest = len.div_ceil(most.max(1)).max(1);
+    let step = |parts: usize| len.div_ceil(parts).max(1);
+    let work = |&parts: &usize| parts * (smooth_length(step(parts) + 2 * max_lag) + smooth_length(2 * max_lag));
+    step((fewest..=fewest + fewest / 2).min_by_key(work).unwrap_or(fewest))
+}
+
 /// Pair sums of a raster that comes in strips.
 pub struct PairSums {
-    step: usize,
-    total: StripSums,
-    shared: StripSums,
+    cols: usize,
+    /// Rows and columns that a tile adds; at least the largest lag, so that no pair lies in more than two tiles each way.
+    step: [usize; 2],
+    /// Sums over tiles, over what they share with those below, with those to the east, and with both.
+    tiles: TileSums,
+    below: TileSums,
+    east: TileSums,
+    corner: TileSums,
 }
 
 impl PairSums {
-    /// Sums for strips of `step` rows of `cols` cells; lags smaller than the raster.
+    /// Sums for strips of `step` rows of `cols` cells; lags smaller than the raster and no larger than a strip.
     pub fn new(step: usize, cols: usize, max_lag: [usize; 2]) -> Self {
-        let total = StripSums::new(step + max_lag[0], cols, max_lag);
-        let shared = StripSums::new(max_lag[0], cols, max_lag);
-        Self { step, total, shared }
+        let step = [step, even_step(cols, TILE_COLS.max(4 * max_lag[1]), max_lag[1])];
+        let sums = |rows: usize, cols: usize| TileSums::new([rows, cols], max_lag);
+        let [rows, wide] = [0, 1].map(|k| step[k] + max_lag[k]);
+        let (tiles, below) = (sums(rows, wide), sums(max_lag[0], wide));
+        let (east, corner) = (sums(rows, max_lag[1]), sums(max_lag[0], max_lag[1]));
+        Self { cols, step, tiles, below, east, corner }
     }
 
     /// Adds the next strip: its rows, and as many of those below as the largest lag, where there are any.
     pub fn add(&mut self, strip: &[f64]) {
-        self.total.add(strip);
-        if let Some(below) = strip.get(self.step * self.total.cols..).filter(|below| !below.is_empty()) {
-            self.shared.add(below);
+        let (cols, [down, across]) = (self.cols, self.step);
+        let below = strip.get(down * cols..).filter(|below| !below.is_empty());
+        for first in (0..cols).step_by(across) {
+            let wide = first..(first + across + self.tiles.max_lag[1]).min(cols);
+            let shared = (first + across).min(cols)..wide.end;
+            self.tiles.add(strip, cols, wide.clone());
+            self.east.add(strip, cols, shared.clone());
+            if let Some(below) = below {
+                self.below.add(below, cols, wide);
+                self.corner.add(below, cols, shared);
+            }
         }
     }
 
     /// The sums of all strips.
     pub fn finish(self) -> MaskedCovariance {
-        let max_lag = self.total.max_lag;
-        let once = self.total.finish().zip(self.shared.finish());
-        let (sums, pairs) = once.map(|((s, n), (s2, n2))| (s - s2, n - n2)).unzip();
+        let max_lag = self.tiles.max_lag;
+        let twice = self.below.finish().zip(self.east.finish());
+        let once = self.tiles.finish().zip(self.corner.finish()).zip(twice);
+        let one = |(((s, n), (s4, n4)), ((s2, n2), (s3, n3))): Four| (s + s4 - s2 - s3, n + n4 - n2 - n3);
+        let (sums, pairs) = once.map(one).unzip();
         MaskedCovariance { max_lag, sums, pairs }
     }
 }
 
-/// Power spectra of data and mask, added up over strips of one padded shape.
-struct StripSums {
+/// Sum of products and number of pairs, of two by two kinds of tiles.
+type Four = (((f64, u64), (f64, u64)), ((f64, u64), (f64, u64)));
+
+/// Power spectra of data and mask, added up over tiles of one padded shape.
+struct TileSums {
     fft: RealFft2,
     shape: [usize; 2],
-    cols: usize,
     max_lag: [usize; 2],
+    /// The tile at work.
+    padded: Vec<f64>,
     data_power: Vec<f64>,
     mask_power: Vec<f64>,
 }
 
-impl StripSums {
-    fn new(strip_rows: usize, cols: usize, max_lag: [usize; 2]) -> Self {
-        let shape = [smooth_length(strip_rows + max_lag[0]), smooth_length(cols + max_lag[1])];
+impl TileSums {
+    /// Sums over tiles of `tile` rows and columns or less.
+    fn new(tile: [usize; 2], max_lag: [usize; 2]) -> Self {
+        let shape = [0, 1].map(|k| smooth_length(tile[k] + max_lag[k]));
         let half = shape[0] * (shape[1] / 2 + 1);
         let fft = RealFft2::new(shape[0], shape[1]);
-        Self { fft, shape, cols, max_lag, data_power: vec![0.0; half], mask_power: vec![0.0; half] }
+        let padded = vec![0.0; shape[0] * shape[1]];
+        Self { fft, shape, max_lag, padded, data_power: vec![0.0; half], mask_power: vec![0.0; half] }
     }
 
-    fn add(&mut self, strip: &[f64]) {
-        let padded = |f: fn(f64) -> f64| {
-            let mut field = vec![0.0; self.shape[0] * self.shape[1]];
-            for (out, row) in field.chunks_exact_mut(self.shape[1]).zip(strip.chunks_exact(self.cols)) {
-                out.iter_mut().zip(row).for_each(|(o, v)| *o = f(*v));
-            }
-            self.fft.forward(&field).values
-        };
-        let data = padded(|v| if v.is_nan() { 0.0 } else { v });
-        self.data_power.iter_mut().zip(&data).for_each(|(p, d)| *p += d.norm_sqr());
-        drop(data);
-        let mask = padded(|v| f64::from(u8::from(!v.is_nan())));
-        self.mask_power.iter_mut().zip(&mask).for_each(|(p, m)| *p += m.norm_sqr());
+    /// Adds some columns of a strip with rows of `cols`.
+    fn add(&mut self, strip: &[f64], cols: usize, part: Range<usize>) {
+        if part.is_empty() {
+            return;
+        }
+        self.pad(strip, cols, part.clone(), |v| if v.is_nan() { 0.0 } else { v });
+        add_power(&mut self.data_power, &self.fft.forward(&self.padded).values);
+        self.pad(strip, cols, part, |v| if v.is_nan() { 0.0 } else { 1.0 });
+        add_power(&mut self.mask_power, &self.fft.forward(&self.padded).values);
+    }
+
+    /// A figure of each cell of a tile, zeros beyond.
+    fn pad(&mut self, strip: &[f64], cols: usize, part: Range<usize>, figure: impl Fn(f64) -> f64) {
+        let filled = strip.len() / cols * self.shape[1];
+        let (rows, beyond) = self.padded.split_at_mut(filled);
+        for (out, row) in rows.chunks_exact_mut(self.shape[1]).zip(strip.chunks_exact(cols)) {
+            let (cells, beyond) = out.split_at_mut(part.len());
+            cells.iter_mut().zip(&row[part.clone()]).for_each(|(o, v)| *o = figure(*v));
+            beyond.fill(0.0);
+        }
+        beyond.fill(0.0);
     }
 
     /// Sum of products and number of pairs at each stored lag.
@@ -137,4 +181,8 @@ impl StripSums {
             (sums[k], pairs[k].round() as u64)
         })
     }
+}
+
+fn add_power(total: &mut [f64], spectrum: &[Complex64]) {
+    total.iter_mut().zip(spectrum).for_each(|(t, s)| *t += s.norm_sqr());
 }

@@ -74,7 +74,8 @@ impl PartialWindows {
                 continue;
             }
             let around = top.saturating_sub(reach[0] as usize)..(top + step + reach[0] as usize).min(cells.rows);
-            let sampler = Sampler { cells, window, data: DataCount::new(cells, around) };
+            let data = DataCount::new(cells, around);
+            let sampler = Sampler { cells, window, complete: CompleteTiles::new(&data, window), data };
             sums.par_iter_mut().zip(&members).enumerate().for_each(|(bin, (line, members))| {
                 for s in samples.clone() {
                     let draw = Draw { index: s * bins.len() + bin };
@@ -205,6 +206,7 @@ struct Sampler<'a> {
     cells: &'a DetrendedCells<'a>,
     window: BoxWindow,
     data: DataCount,
+    complete: CompleteTiles,
 }
 
 impl Sampler<'_> {
@@ -215,18 +217,23 @@ impl Sampler<'_> {
         if !self.index(partner).is_some_and(|k| self.cells.used.get(k)) {
             return false;
         }
+        if self.complete.at(at) && self.complete.at(partner) {
+            return true;
+        }
         let counts = [at, partner].map(|[r, c]| self.data.within([self.span(0, r), self.span(1, c)]));
-        if counts.iter().any(|&n| (n as usize) < self.window.area()) {
+        let partial = counts.map(|n| (n as usize) < self.window.area());
+        if partial.contains(&true) {
             let shifts = [[draw.unit(1), draw.unit(2)], [draw.unit(3), draw.unit(4)]];
-            let back = lag.map(|l| -l);
-            let windows = |blocks| {
-                [
-                    self.parts(at, counts[0], lag, blocks, shifts[0]),
-                    self.parts(partner, counts[1], back, blocks, shifts[1]),
-                ]
-            };
-            self.add_cell_window(lag, &windows(FINE_BLOCKS), line);
-            self.add_window_window(lag, &windows(COARSE_BLOCKS), line);
+            let near = |blocks| self.parts(at, counts[0], lag, blocks, shifts[0]);
+            let far = |blocks| self.parts(partner, counts[1], lag.map(|l| -l), blocks, shifts[1]);
+            // A complete window changes nothing by itself.
+            if partial[0] {
+                add_cell_window(lag, -1, &near(FINE_BLOCKS), line);
+            }
+            if partial[1] {
+                add_cell_window(lag, 1, &far(FINE_BLOCKS), line);
+            }
+            self.add_window_window(lag, [&near(COARSE_BLOCKS), &far(COARSE_BLOCKS)], line);
         }
         true
     }
@@ -237,19 +244,8 @@ impl Sampler<'_> {
         [centre - half, centre + half + 1]
     }
 
-    /// `- D_i(j) C(h - j) - D_(i+h)(k) C(h + k)`, less the same of complete windows.
-    fn add_cell_window(&self, lag: [isize; 2], [near, far]: &[Vec<Part>; 2], line: &mut LagWeights) {
-        for (parts, sign) in [(near, -1), (far, 1)] {
-            for p in parts {
-                let moved = |o: [isize; 2]| [lag[0] + sign * o[0], lag[1] + sign * o[1]];
-                line.add(moved(p.offset), -p.share);
-                line.add(moved(p.complete_offset), p.complete_share);
-            }
-        }
-    }
-
     /// `D_i(j) D_(i+h)(k) C(h + k - j)`, less the same of complete windows.
-    fn add_window_window(&self, lag: [isize; 2], [near, far]: &[Vec<Part>; 2], line: &mut LagWeights) {
+    fn add_window_window(&self, lag: [isize; 2], [near, far]: [&[Part]; 2], line: &mut LagWeights) {
         let half = self.window.half.map(|h| h as isize);
         let apart = |n: [isize; 2], f: [isize; 2]| [lag[0] + f[0] - n[0], lag[1] + f[1] - n[1]];
         for n in near {
@@ -262,7 +258,7 @@ impl Sampler<'_> {
                     line.add(apart(n.complete_offset, f.complete_offset), -complete);
                 }
             }
-            if (0..2).all(|k| (n.offset[k] - lag[k]).abs() <= half[k]) {
+            if n.scatter > 0.0 && (0..2).all(|k| (n.offset[k] - lag[k]).abs() <= half[k]) {
                 line.add([0, 0], n.scatter);
                 line.add(n.spread, -n.scatter);
             }
@@ -273,13 +269,24 @@ impl Sampler<'_> {
     /// way, at cells given by `shift`, and the two cells.
     fn parts(&self, at: [isize; 2], count: u32, other: [isize; 2], blocks: usize, shift: [f64; 2]) -> Vec<Part> {
         let known: &[[isize; 2]] = if other == [0, 0] { &[[0, 0]] } else { &[[0, 0], other] };
-        let axes = [0, 1].map(|axis| Axis::new(self.window.half[axis], blocks));
+        let axes = [Axis::new(self.window.half[0], blocks), Axis::new(self.window.half[1], blocks)];
         let cell_share = 1.0 / f64::from(count);
+        let counts = self.data.blocks(at, &axes);
         let mut parts = Vec::with_capacity(blocks * blocks + 2);
         for index in 0..axes[0].blocks * axes[1].blocks {
-            let whole = [axes[0].span(index / axes[1].blocks), axes[1].span(index % axes[1].blocks)];
-            let place = [0, 1].map(|k| fraction(shift[k] + index as f64 * LATTICE[k]));
-            let (filled, data) = self.data.shrink(at, whole);
+            let (row, col) = (index / axes[1].blocks, index % axes[1].blocks);
+            let whole = [axes[0].span(row), axes[1].span(col)];
+            let place =
+                [fraction(shift[0] + index as f64 * LATTICE[0]), fraction(shift[1] + index as f64 * LATTICE[1])];
+            let complete_share = cells(whole) / self.window.area() as f64;
+            let complete_offset = [point(whole[0], place[0]), point(whole[1], place[1])];
+            let data = counts[row][col];
+            if data == 0 || f64::from(data) == cells(whole) {
+                let (share, offset) = (f64::from(data) * cell_share, complete_offset);
+                parts.push(Part { share, offset, complete_share, complete_offset, scatter: 0.0, spread: [0, 0] });
+                continue;
+            }
+            let filled = self.data.shrink(at, whole, data);
             let here = known.iter().filter(|cell| (0..2).all(|k| (filled[k][0]..filled[k][1]).contains(&cell[k])));
             let known_count = here.clone().count() as f64;
             let others = cells(filled) - known_count;
@@ -289,8 +296,8 @@ impl Sampler<'_> {
             parts.push(Part {
                 share: density * cells(filled) * cell_share,
                 offset,
-                complete_share: cells(whole) / self.window.area() as f64,
-                complete_offset: [0, 1].map(|k| point(whole[k], place[k])),
+                complete_share,
+                complete_offset,
                 scatter: scatter(density, cells(filled)) * cell_share * cell_share,
                 spread: [offset[0] - mate[0], offset[1] - mate[1]],
             });
@@ -311,6 +318,15 @@ impl Sampler<'_> {
     fn index(&self, [row, col]: [isize; 2]) -> Option<usize> {
         let inside = row >= 0 && col >= 0 && row < self.cells.rows as isize && col < self.cells.cols as isize;
         inside.then(|| row as usize * self.cells.cols + col as usize)
+    }
+}
+
+/// `- D_i(j) C(h - j)` (sign -1) or `- D_(i+h)(k) C(h + k)` (sign 1), less the same of a complete window.
+fn add_cell_window(lag: [isize; 2], sign: isize, parts: &[Part], line: &mut LagWeights) {
+    for p in parts {
+        let moved = |o: [isize; 2]| [lag[0] + sign * o[0], lag[1] + sign * o[1]];
+        line.add(moved(p.offset), -p.share);
+        line.add(moved(p.complete_offset), p.complete_share);
     }
 }
 
@@ -352,11 +368,17 @@ impl Axis {
 
     /// Offsets of a block, `from..to`.
     fn span(&self, block: usize) -> [isize; 2] {
-        [block, block + 1].map(|k| (k * self.width / self.blocks) as isize - self.half)
+        [self.end(block), self.end(block + 1)]
+    }
+
+    /// Offset of the first cell after so many blocks.
+    fn end(&self, blocks: usize) -> isize {
+        (blocks * self.width / self.blocks) as isize - self.half
     }
 }
 
 /// Number of cells with data in any rectangle within some rows, from sums over all cells above and to the left (Crow, 1984).
+/// Sums of more than 2^32 cells wrap round; differences, of a window's cells, do not show it.
 struct DataCount {
     rows: Range<isize>,
     cols: isize,
@@ -367,15 +389,13 @@ impl DataCount {
     fn new(cells: &DetrendedCells, rows: Range<usize>) -> Self {
         let cols = cells.cols;
         let stride = cols + 1;
-        let mut sums = vec![0; stride];
-        sums.reserve(rows.len() * stride);
+        let mut sums = vec![0u32; (rows.len() + 1) * stride];
         for row in rows.clone() {
-            let above = sums.len() - stride;
             let mut data = 0;
-            sums.push(0);
-            for c in 0..cols {
+            let (above, own) = sums[(row - rows.start) * stride..][..2 * stride].split_at_mut(stride);
+            for ((c, own), above) in (0..cols).zip(&mut own[1..]).zip(&above[1..]) {
                 data += u32::from(cells.trusted.get(row * cols + c));
-                sums.push(data + sums[above + c + 1]);
+                *own = above.wrapping_add(data);
             }
         }
         Self { rows: rows.start as isize..rows.end as isize, cols: cols as isize, sums }
@@ -383,21 +403,44 @@ impl DataCount {
 
     /// Cells with data in the rows and columns `from..to`; cells beyond the raster have none.
     fn within(&self, [rows, cols]: Rectangle) -> u32 {
-        let [top, bottom] = rows.map(|r| r.clamp(self.rows.start, self.rows.end) - self.rows.start);
-        let [left, right] = cols.map(|c| c.clamp(0, self.cols));
-        let at = |r: isize, c: isize| self.sums[(r * (self.cols + 1) + c) as usize];
-        at(bottom, right) + at(top, left) - at(top, right) - at(bottom, left)
+        let (top, bottom) = (self.line(rows[0]), self.line(rows[1]));
+        let between = |col: isize| {
+            let col = col.clamp(0, self.cols) as usize;
+            self.sums[bottom + col].wrapping_sub(self.sums[top + col])
+        };
+        between(cols[1]).wrapping_sub(between(cols[0]))
     }
 
-    /// The smallest rectangle in the block about the cell `at` that holds the block's data, and how much that is. A block
-    /// without data is left as it is.
-    fn shrink(&self, at: [isize; 2], block: Rectangle) -> (Rectangle, u32) {
-        let count = |r: Rectangle| self.within([0, 1].map(|k| r[k].map(|s| at[k] + s)));
-        let data = count(block);
-        let mut filled = block;
-        if data == 0 || f64::from(data) == cells(block) {
-            return (filled, data);
+    /// Where the sums above a row start.
+    fn line(&self, row: isize) -> usize {
+        ((row.clamp(self.rows.start, self.rows.end) - self.rows.start) * (self.cols + 1)) as usize
+    }
+
+    /// Cells with data in each block of the window about the cell `at`.
+    fn blocks(&self, at: [isize; 2], [down, across]: &[Axis; 2]) -> [[u32; FINE_BLOCKS]; FINE_BLOCKS] {
+        let mut counts = [[0; FINE_BLOCKS]; FINE_BLOCKS];
+        let mut above = [0; FINE_BLOCKS + 1];
+        for r in 0..=down.blocks {
+            let line = self.line(at[0] + down.end(r));
+            let mut left = 0;
+            for c in 0..=across.blocks {
+                let sum = self.sums[line + (at[1] + across.end(c)).clamp(0, self.cols) as usize];
+                // Data from the row above down, left of this end.
+                let between = sum.wrapping_sub(above[c]);
+                if r > 0 && c > 0 {
+                    counts[r - 1][c - 1] = between.wrapping_sub(left);
+                }
+                (above[c], left) = (sum, between);
+            }
         }
+        counts
+    }
+
+    /// The smallest rectangle in the block about the cell `at` that holds the block's `data` cells.
+    fn shrink(&self, at: [isize; 2], block: Rectangle, data: u32) -> Rectangle {
+        let moved = |span: [isize; 2], by: isize| [span[0] + by, span[1] + by];
+        let count = |r: Rectangle| self.within([moved(r[0], at[0]), moved(r[1], at[1])]);
+        let mut filled = block;
         for axis in 0..2 {
             let [from, to] = block[axis];
             let with = |span: [isize; 2]| if axis == 0 { [span, filled[1]] } else { [filled[0], span] };
@@ -405,7 +448,45 @@ impl DataCount {
             let last = bisect(first, to - 1, |s| count(with([first, s + 1])) == data);
             filled[axis] = [first, last + 1];
         }
-        (filled, data)
+        filled
+    }
+}
+
+/// Tiles of a window's size, and whether all their cells have data: most windows are known to be complete by the up to four
+/// tiles that they touch.
+struct CompleteTiles {
+    /// First row of the first tiles.
+    top: isize,
+    half: [isize; 2],
+    side: [isize; 2],
+    /// Tiles in a row of them.
+    across: isize,
+    complete: Vec<bool>,
+}
+
+impl CompleteTiles {
+    fn new(data: &DataCount, window: BoxWindow) -> Self {
+        let (side, half) = (window.cells().map(|n| n as isize), window.half.map(|n| n as isize));
+        // What is left over at the ends belongs to no tile: windows that reach there are counted.
+        let (top, down, across) = (data.rows.start, (data.rows.end - data.rows.start) / side[0], data.cols / side[1]);
+        let tile = |row: isize, col: isize| {
+            let rows = top + row * side[0];
+            data.within([[rows, rows + side[0]], [col * side[1], (col + 1) * side[1]]]) as usize == window.area()
+        };
+        let complete = (0..down).flat_map(|r| (0..across).map(move |c| (r, c))).map(|(r, c)| tile(r, c)).collect();
+        Self { top, half, side, across, complete }
+    }
+
+    /// True only where the window about a cell is complete.
+    fn at(&self, [row, col]: [isize; 2]) -> bool {
+        let (row, [down, across]) = (row - self.top, self.half);
+        if row < down || col < across {
+            return false;
+        }
+        let rows = [(row - down) / self.side[0], (row + down) / self.side[0]];
+        let cols = [(col - across) / self.side[1], (col + across) / self.side[1]];
+        let tile = |r: isize, c: isize| self.complete.get((r * self.across + c) as usize).is_some_and(|tile| *tile);
+        cols[1] < self.across && rows.iter().all(|&r| cols.iter().all(|&c| tile(r, c)))
     }
 }
 
@@ -446,5 +527,5 @@ impl Draw {
 
 /// Part of a positive number after the point.
 fn fraction(x: f64) -> f64 {
-    x - x.floor()
+    x - (x as u64) as f64
 }

@@ -4,13 +4,14 @@
 //! m = 1 on cells with data, else 0. Cells beyond the border have no data.
 //!
 //! The box is an odd number of cells wide each way, so that it has a centre. Cost: a few additions per cell whatever the
-//! window (running sums down the columns, then along the rows, started afresh on every strip of rows so that neither
-//! rounding nor the number of threads shows). Memory: 12 bytes per cell of result and three rows per strip.
+//! window (running sums down the columns, then along the rows, started afresh on every band of rows so that neither
+//! rounding nor the number of threads shows). Memory: 12 bytes per cell of result and two rows per band.
 
 use rayon::prelude::*;
+use std::borrow::Cow;
 
-/// Strips are at least this many rows, and four times the window.
-const STRIP_ROWS: usize = 64;
+/// Bands are at least this many rows, and four times the window.
+const BAND_ROWS: usize = 64;
 
 /// A centred box of an odd number of cells each way.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -55,20 +56,83 @@ pub struct BoxMean {
 
 /// Moving average of row-major `values` in rows of `cols`; NaN is no data.
 pub fn box_mean(values: &[f64], cols: usize, window: BoxWindow) -> BoxMean {
-    let mut mean = vec![f64::NAN; values.len()];
+    let mut mean = vec![0.0; values.len()];
     let mut count = vec![0; values.len()];
-    let strip = cols * STRIP_ROWS.max(4 * window.cells()[0]);
-    mean.par_chunks_mut(strip.max(1)).zip(count.par_chunks_mut(strip.max(1))).enumerate().for_each(
-        |(k, (mean, count))| {
-            let first = k * strip / cols;
-            let mut columns = ColumnSums::above(values, cols, first, window.half[0]);
-            for (r, (mean, count)) in mean.chunks_exact_mut(cols).zip(count.chunks_exact_mut(cols)).enumerate() {
-                columns.move_to(values, first + r, window.half[0]);
-                along_row(&columns.sum, &columns.count, window.half[1], mean, count);
-            }
-        },
-    );
+    let band = band_rows(window);
+    let cells = (band * cols).max(1);
+    mean.par_chunks_mut(cells).zip(count.par_chunks_mut(cells)).enumerate().for_each(|(k, (mean, count))| {
+        let mut average = RunningMean::from(values, cols, window, k * band);
+        mean.chunks_exact_mut(cols).zip(count.chunks_exact_mut(cols)).for_each(|(m, n)| average.next_row(m, n));
+    });
     BoxMean { mean, count }
+}
+
+/// Absolute differences of row-major `values` in rows of `cols` from the moving average over those not marked in `left_out`;
+/// NaN where there is no data, or none in the window.
+pub(crate) fn deviations(values: &[f64], left_out: &[bool], cols: usize, window: BoxWindow) -> Vec<f64> {
+    let averaged = match left_out.contains(&true) {
+        true => Cow::from_iter(values.iter().zip(left_out).map(|(&v, &out)| if out { f64::NAN } else { v })),
+        false => Cow::from(values),
+    };
+    let band = band_rows(window);
+    let mut deviations = vec![0.0; values.len()];
+    deviations.par_chunks_mut((band * cols).max(1)).enumerate().for_each(|(k, lines)| {
+        let mut average = RunningMean::from(&averaged, cols, window, k * band);
+        let (mut mean, mut count) = (vec![0.0; cols], vec![0; cols]);
+        for (line, own) in lines.chunks_exact_mut(cols).zip(values[k * band * cols..].chunks_exact(cols)) {
+            average.next_row(&mut mean, &mut count);
+            line.iter_mut().zip(own).zip(&mean).for_each(|((d, v), m)| *d = (v - m).abs());
+        }
+    });
+    deviations
+}
+
+/// Rows after which sums are started afresh.
+pub(crate) fn band_rows(window: BoxWindow) -> usize {
+    BAND_ROWS.max(4 * window.cells()[0])
+}
+
+/// Moving average row by row, from the north to the south.
+pub(crate) struct RunningMean<'a> {
+    values: &'a [f64],
+    window: BoxWindow,
+    columns: ColumnSums,
+    /// The row that comes next.
+    row: usize,
+}
+
+impl<'a> RunningMean<'a> {
+    /// The average of row-major `values` in rows of `cols`, from row `first` on.
+    pub fn from(values: &'a [f64], cols: usize, window: BoxWindow, first: usize) -> Self {
+        let half = window.half[0];
+        let mut columns = ColumnSums { sum: vec![0.0; cols], count: vec![0; cols] };
+        let rows = values.len() / cols;
+        // What the step to the first row takes off enters as well.
+        for r in first.saturating_sub(half + 1)..(first + half).min(rows) {
+            columns.enter(&values[r * cols..(r + 1) * cols]);
+        }
+        Self { values, window, columns, row: first }
+    }
+
+    /// Mean and count of data in the windows of the next row.
+    pub fn next_row(&mut self, mean: &mut [f64], count: &mut [u32]) {
+        let (cols, half) = (self.columns.sum.len(), self.window.half[0]);
+        let line = |row: usize| self.values.get(row * cols..(row + 1) * cols);
+        if let Some(entering) = line(self.row + half) {
+            self.columns.enter(entering);
+        }
+        if let Some(leaving) = self.row.checked_sub(half + 1).and_then(line) {
+            self.columns.leave(leaving);
+        }
+        self.row += 1;
+        let half = self.window.half[1];
+        // The difference does not wait for the sum.
+        along_row(&self.columns.sum, half, mean, |sum, entering, leaving| sum + (entering - leaving));
+        along_row(&self.columns.count, half, count, |sum, entering, leaving| sum + entering - leaving);
+        for (m, &n) in mean.iter_mut().zip(count.iter()) {
+            *m = if n > 0 { *m / f64::from(n) } else { f64::NAN };
+        }
+    }
 }
 
 /// Sums down each column over the rows of the window.
@@ -78,26 +142,6 @@ struct ColumnSums {
 }
 
 impl ColumnSums {
-    /// Sums for the row above `row`, from which [`Self::move_to`] steps down.
-    fn above(values: &[f64], cols: usize, row: usize, half: usize) -> Self {
-        let mut sums = Self { sum: vec![0.0; cols], count: vec![0; cols] };
-        let rows = values.len() / cols;
-        for r in row.saturating_sub(half + 1)..(row + half).min(rows) {
-            sums.enter(&values[r * cols..(r + 1) * cols]);
-        }
-        sums
-    }
-
-    fn move_to(&mut self, values: &[f64], row: usize, half: usize) {
-        let cols = self.sum.len();
-        if let Some(entering) = values.get((row + half) * cols..(row + half + 1) * cols) {
-            self.enter(entering);
-        }
-        if let Some(leaving) = row.checked_sub(half + 1) {
-            self.leave(&values[leaving * cols..(leaving + 1) * cols]);
-        }
-    }
-
     fn enter(&mut self, row: &[f64]) {
         for ((s, n), v) in self.sum.iter_mut().zip(&mut self.count).zip(row) {
             let data = !v.is_nan();
@@ -115,25 +159,24 @@ impl ColumnSums {
     }
 }
 
-/// Means along one row from the column sums.
-fn along_row(sums: &[f64], counts: &[u32], half: usize, mean: &mut [f64], count: &mut [u32]) {
-    let cols = sums.len();
-    let (mut s, mut n) = (0.0, 0);
-    for c in 0..half.min(cols) {
-        s += sums[c];
-        n += counts[c];
+/// Sums of `values` over as many as `half` to both sides of each; `moved(sum, entering, leaving)` is the next sum.
+fn along_row<T: Copy + Default>(values: &[T], half: usize, sums: &mut [T], moved: impl Fn(T, T, T) -> T) {
+    let (cols, zero) = (values.len(), T::default());
+    let mut sum = values[..half.min(cols)].iter().fold(zero, |sum, &v| moved(sum, v, zero));
+    let (first, others) = sums.split_at_mut((half + 1).min(cols));
+    for (c, out) in first.iter_mut().enumerate() {
+        sum = moved(sum, values.get(c + half).copied().unwrap_or(zero), zero);
+        *out = sum;
     }
-    for c in 0..cols {
-        if let Some(entering) = sums.get(c + half) {
-            s += entering;
-            n += counts[c + half];
-        }
-        if let Some(leaving) = c.checked_sub(half + 1) {
-            s -= sums[leaving];
-            n -= counts[leaving];
-        }
-        count[c] = n;
-        mean[c] = if n > 0 { s / f64::from(n) } else { f64::NAN };
+    let entering = &values[(2 * half + 1).min(cols)..];
+    let (middle, last) = others.split_at_mut(entering.len());
+    for ((out, &entering), &leaving) in middle.iter_mut().zip(entering).zip(values) {
+        sum = moved(sum, entering, leaving);
+        *out = sum;
+    }
+    for (out, &leaving) in last.iter_mut().zip(&values[entering.len()..]) {
+        sum = moved(sum, zero, leaving);
+        *out = sum;
     }
 }
 

@@ -41,6 +41,21 @@ fn val_box_mean_equals_the_definition() {
     }
 }
 
+/// Deviations from the average of what is not left out, by the double loop.
+#[test]
+fn val_deviations_equal_the_definition() {
+    let (rows, cols, window) = (150, 90, BoxWindow { half: [8, 5] });
+    let values = field(rows, cols, 0.2);
+    for share in [0, 3] {
+        let left_out: Vec<bool> = (0..values.len()).map(|k| k % 10 < share).collect();
+        let kept: Vec<f64> = values.iter().zip(&left_out).map(|(&v, &out)| if out { f64::NAN } else { v }).collect();
+        let mean = brute_force(&kept, cols, window).mean;
+        for ((d, v), m) in deviations(&values, &left_out, cols, window).iter().zip(&values).zip(&mean) {
+            assert!((d - (v - m).abs()).abs() < 1e-12 || (d.is_nan() && (v - m).is_nan()), "{d} {v} {m}");
+        }
+    }
+}
+
 /// Windows of the specification: 2 m is 33 cells of 6 cm and 21 cells of 10 cm.
 #[test]
 fn val_windows_are_odd() {

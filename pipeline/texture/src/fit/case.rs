@@ -2,7 +2,7 @@
 
 use super::heights::Heights;
 use super::search::Coordinates;
-use super::survey::{Detrended, Survey};
+use super::survey::Survey;
 use super::{FitError, FitSettings};
 use crate::covariance::bins::Layout;
 use crate::covariance::{Form, LagBins};
@@ -66,15 +66,14 @@ impl<'a> Case<'a> {
 
     /// Residuals of a part, trimmed.
     pub fn trimmed(&self, rows: Range<usize>, cols: Range<usize>) -> Result<Vec<f64>, FitError> {
-        let Detrended { mut residual, .. } = self.survey.detrended(self.heights, self.settings, rows, cols)?;
+        let mut residual = self.survey.residual(self.heights, self.settings, rows, cols)?;
         self.survey.trim.apply(&mut residual);
         Ok(residual)
     }
 
     /// All residuals, before trimming.
     pub fn residual(&self) -> Result<Vec<f64>, FitError> {
-        let (rows, cols) = (0..self.geometry.rows, 0..self.geometry.cols);
-        Ok(self.survey.detrended(self.heights, self.settings, rows, cols)?.residual)
+        self.survey.residual(self.heights, self.settings, 0..self.geometry.rows, 0..self.geometry.cols)
     }
 
     /// Width of the window, m (the mean of both ways; along transects).

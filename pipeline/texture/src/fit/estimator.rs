@@ -120,6 +120,11 @@ impl<'a> Estimator<'a> {
 
     /// Generalised least squares of a form, from an exponential of the given sigma and b.
     pub fn fit(&self, form: &Form, sigma_m: f64, range_m: f64) -> Estimate {
+        // Within the thread pool: thousands of small transforms would each be handed over to it.
+        rayon::scope(|_| self.fit_here(form, sigma_m, range_m))
+    }
+
+    fn fit_here(&self, form: &Form, sigma_m: f64, range_m: f64) -> Estimate {
         let coordinates = self.case.coordinates(form);
         let ends = coordinates.starts(sigma_m, range_m).into_iter().map(|start| self.search(form, &start, None));
         let mut end = least(ends);
@@ -205,9 +210,10 @@ impl<'a> Estimator<'a> {
             // sigma^2 / b is what the data tells best.
             start[0] += 0.5 * (held - estimate.at[coordinate]);
         }
-        let end = least_squares::least(&start, &open, |others| {
+        let misfit = |others: &[f64]| {
             self.misfit(&estimate.form, &whole(others), Some(&likelihood.weights), &self.bins.covariance_m2)
-        });
+        };
+        let end = rayon::scope(|_| least_squares::least(&start, &open, misfit));
         Some(Held { rise: (end.value - likelihood.chi2).max(0.0), at: whole(&end.at) })
     }
 }

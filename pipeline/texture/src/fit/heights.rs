@@ -9,12 +9,12 @@ pub trait Heights: Sync {
     /// Shape and place; cells in m.
     fn geometry(&self) -> Geometry;
 
-    /// Heights in m of some rows and columns, row-major; not finite where there is no data. A fit asks from one thread, and
-    /// never from a job of the thread pool.
+    /// Puts the heights in m of some rows and columns into `part`, row-major, in the place of what it held; not finite where
+    /// there is no data. A fit asks from one thread, and never from a job of the thread pool.
     ///
     /// # Errors
     /// What keeps the part from being read, as a sentence.
-    fn part(&self, rows: Range<usize>, cols: Range<usize>) -> Result<Vec<f64>, String>;
+    fn read(&self, rows: Range<usize>, cols: Range<usize>, part: &mut Vec<f64>) -> Result<(), String>;
 
     /// True when each row is a transect of its own, and neighbouring rows are no neighbours.
     fn are_profiles(&self) -> bool {
@@ -27,8 +27,11 @@ impl Heights for Grid {
         self.geometry
     }
 
-    fn part(&self, rows: Range<usize>, cols: Range<usize>) -> Result<Vec<f64>, String> {
-        Ok(rows.flat_map(|r| self.row(r)[cols.clone()].iter().copied()).collect())
+    fn read(&self, rows: Range<usize>, cols: Range<usize>, part: &mut Vec<f64>) -> Result<(), String> {
+        part.clear();
+        part.reserve(rows.len() * cols.len());
+        rows.for_each(|r| part.extend_from_slice(&self.row(r)[cols.clone()]));
+        Ok(())
     }
 }
 
@@ -68,8 +71,8 @@ impl Heights for Profiles {
         self.grid.geometry
     }
 
-    fn part(&self, rows: Range<usize>, cols: Range<usize>) -> Result<Vec<f64>, String> {
-        self.grid.part(rows, cols)
+    fn read(&self, rows: Range<usize>, cols: Range<usize>, part: &mut Vec<f64>) -> Result<(), String> {
+        self.grid.read(rows, cols, part)
     }
 
     fn are_profiles(&self) -> bool {

@@ -26,10 +26,12 @@ pub(crate) mod estimator;
 mod expectation;
 mod heights;
 pub(crate) mod least_squares;
+mod memory;
 mod params;
 mod profile;
 pub(crate) mod report;
 pub(crate) mod resampling;
+pub(crate) mod residual;
 mod search;
 pub(crate) mod simulate;
 pub(crate) mod survey;
@@ -83,10 +85,10 @@ impl FitOutcome {
     /// Heights that cannot be read.
     pub fn rasters(&self, heights: &dyn Heights) -> Result<[Grid; 2], FitError> {
         let geometry = heights.geometry();
-        let all = self.survey.detrended(heights, &self.settings, 0..geometry.rows, 0..geometry.cols)?;
-        let mut residual = all.residual;
+        let background = self.survey.background(heights, &self.settings)?;
+        let mut residual = self.survey.residual(heights, &self.settings, 0..geometry.rows, 0..geometry.cols)?;
         self.survey.trim.apply(&mut residual);
-        Ok([Grid::new(geometry, all.background), Grid::new(geometry, residual)])
+        Ok([Grid::new(geometry, background), Grid::new(geometry, residual)])
     }
 }
 
@@ -104,7 +106,7 @@ pub fn fit(heights: &dyn Heights, settings: &FitSettings, streams: &Streams) -> 
     };
     let (rows, cols) = middle(&case);
     // The shape of the heights is that before trimming.
-    let residual = case.survey.detrended(heights, settings, rows, cols)?.residual;
+    let residual = case.survey.residual(heights, settings, rows, cols)?;
     let fit = FitFile { height_quantiles_m: quantiles_m(&residual), ..fit };
     Ok(FitOutcome { fit, settings: settings.clone(), survey: case.survey, bins: case.bins, cell_m: case.geometry.cell })
 }
@@ -178,7 +180,9 @@ fn refuse_white(case: &Case, estimate: &Estimate) -> Result<(), FitError> {
 fn examined(case: &Case) -> Result<Box<dyn Heights>, FitError> {
     let (rows, cols) = middle(case);
     let geometry = case.geometry.window(rows.start, cols.start, rows.len(), cols.len());
-    let part = Grid::new(geometry, case.heights.part(rows, cols).map_err(FitError::Unreadable)?);
+    let mut heights = Vec::new();
+    case.heights.read(rows, cols, &mut heights).map_err(FitError::Unreadable)?;
+    let part = Grid::new(geometry, heights);
     Ok(if case.heights.are_profiles() { Box::new(Profiles::of(part)) } else { Box::new(part) })
 }
 

@@ -19,14 +19,17 @@ use super::FitError;
 use super::case::Case;
 use super::estimator::{Estimate, Estimator};
 use super::profile;
+use super::survey::Squares;
 use super::twins::Twins;
 use crate::covariance::bins;
 use crate::covariance::form::Role;
 use crate::covariance::{Covariance, LagBins, masked_covariance};
+use crate::detrend::BoxWindow;
 use rayon::prelude::*;
-use sastrugi_numeric::{Stream, Streams, sums};
+use sastrugi_numeric::{Geometry, Stream, Streams, sums};
 use sastrugi_schemas::fit::Intervals;
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 /// Name of `sigma^2 / b` among intervals and diagnostics.
 pub const SILL_OVER_RANGE: &str = "sigma2_over_range_m";
@@ -132,28 +135,31 @@ fn places(shape: [usize; 2], part: [usize; 2]) -> Vec<[usize; 2]> {
 
 /// One block of a DEM.
 pub struct Block {
-    /// Residuals.
-    pub cells: u64,
-    /// Sum of their squares, m2.
-    squares_m2: f64,
+    /// Its residuals.
+    squares: Squares,
     /// Sum of products and number of pairs of each bin, both cells within the block; empty when not asked for.
     sums: Vec<(f64, u64)>,
 }
 
 impl Block {
+    /// Number of its residuals.
+    pub fn cells(&self) -> u64 {
+        self.squares.count
+    }
+
     /// Mean square of its residuals, m2.
     pub fn variance_m2(&self) -> f64 {
-        self.squares_m2 / self.cells as f64
+        self.squares.sum_m2 / self.squares.count as f64
     }
 }
 
-/// The DEM cut into blocks of at least two windows; empty when too few have data. Blocks of more cells than are looked at
-/// stand for their surroundings. Pairs are counted only where blocks will be resampled.
-pub fn blocks(case: &Case, bins: &LagBins, with_pairs: bool) -> Result<Vec<Block>, FitError> {
-    let shape = [case.geometry.rows, case.geometry.cols];
-    let width = case.window.cells();
-    let along = match case.heights.are_profiles() {
-        true => [shape[0], (BLOCKS_ALONG * BLOCKS_ALONG / shape[0]).clamp(1, shape[1] / (2 * width[1]))],
+/// Rows and columns of the blocks of a DEM, of at least two windows each. Blocks of more cells than are looked at stand for
+/// their surroundings.
+pub fn block_places(geometry: &Geometry, window: BoxWindow, profiles: bool) -> Vec<[Range<usize>; 2]> {
+    let shape = [geometry.rows, geometry.cols];
+    let width = window.cells();
+    let along = match profiles {
+        true => [shape[0], (BLOCKS_ALONG * BLOCKS_ALONG / shape[0]).clamp(1, (shape[1] / (2 * width[1])).max(1))],
         false => [0, 1].map(|k| (shape[k] / (2 * width[k])).clamp(1, BLOCKS_ALONG)),
     };
     let span = |axis: usize, index: usize| {
@@ -161,25 +167,31 @@ pub fn blocks(case: &Case, bins: &LagBins, with_pairs: bool) -> Result<Vec<Block
         let cut = (to - from).saturating_sub(BLOCK_SIDE_MAX.max(2 * width[axis])) / 2;
         from + cut..to - cut
     };
-    let block = |(part, cols): &(Vec<f64>, usize)| {
-        let data = sums::finite(part);
-        let sums = match with_pairs {
-            true => bins.bin_sums(&masked_covariance(part, *cols, case.max_lag)),
-            false => Vec::new(),
-        };
-        let squares: Vec<f64> = data.iter().map(|r| r * r).collect();
-        Block { cells: data.len() as u64, squares_m2: sums::sum(&squares), sums }
-    };
-    let mut all: Vec<Block> = Vec::new();
-    for r in 0..along[0] {
-        // Heights are read by one thread.
-        let parts = (0..along[1]).map(|c| Ok((case.trimmed(span(0, r), span(1, c))?, span(1, c).len())));
-        let parts = parts.collect::<Result<Vec<_>, FitError>>()?;
-        all.par_extend(parts.par_iter().map(block));
-    }
+    (0..along[0]).flat_map(|r| (0..along[1]).map(move |c| [span(0, r), span(1, c)])).collect()
+}
+
+/// The blocks of a DEM; none when too few have data. Pairs are counted only where blocks will be resampled.
+pub fn blocks(case: &Case, bins: &LagBins, with_pairs: bool) -> Result<Vec<Block>, FitError> {
+    let places = block_places(&case.geometry, case.window, case.heights.are_profiles());
     // A block of less than a window's cells tells nothing.
     let least = case.window.area() as u64;
-    all.retain(|b| b.cells >= least && b.sums.iter().all(|(_, pairs)| *pairs > 0));
+    let mut all: Vec<Block> = Vec::new();
+    for places in places.iter().zip(&case.survey.blocks).collect::<Vec<_>>().chunks(BLOCKS_ALONG) {
+        // Heights are read by one thread.
+        let parts = places.iter().map(|([rows, cols], squares)| {
+            let part = if with_pairs { case.trimmed(rows.clone(), cols.clone())? } else { Vec::new() };
+            Ok((part, cols.len(), **squares))
+        });
+        let parts = parts.collect::<Result<Vec<_>, FitError>>()?;
+        all.par_extend(parts.par_iter().map(|(part, cols, squares)| {
+            let sums = match with_pairs {
+                true => bins.bin_sums(&masked_covariance(part, *cols, case.max_lag)),
+                false => Vec::new(),
+            };
+            Block { squares: *squares, sums }
+        }));
+    }
+    all.retain(|b| b.cells() >= least && b.sums.iter().all(|(_, pairs)| *pairs > 0));
     Ok(if all.len() < BLOCKS_MIN { Vec::new() } else { all })
 }
 
@@ -196,7 +208,7 @@ pub fn block_replicates(
     }
     let threshold_m = estimator.case.survey.trim.threshold_m;
     // Blocks that are looked at in part scatter more than whole ones.
-    let looked_at: u64 = blocks.iter().map(|b| b.cells).sum();
+    let looked_at: u64 = blocks.iter().map(Block::cells).sum();
     let scale = (looked_at as f64 / estimator.case.survey.kept as f64).sqrt().min(1.0);
     let together = |chosen: &[usize]| -> Vec<f64> {
         let mut total = vec![(0.0, 0); estimator.bins.len()];

@@ -2,13 +2,16 @@
 //!
 //! Rows are read in strips, three times: to find outliers (each strip judged by its own robust scale, with two windows
 //! around it), to find the threshold, and to add up pairs of residuals. So memory is bounded by the strip and two bits per
-//! cell: half a million cells, or eight windows (four of them around it) or four of the largest lags times the width where
-//! that is more, at about 100 bytes each. It grows with the raster's width, not with its length. Background and residual of
-//! any part are made again when they are asked for.
+//! cell: two million cells, or eight windows (four of them around it) or four of the largest lags times the width where
+//! that is more, at about 40 bytes each. It grows with the raster's width, not with its length. Heights and residuals of a
+//! strip lie where those of the one before did. Residuals of any part are made again when they are asked for.
 
 use super::heights::Heights;
+use super::resampling::block_places;
+use super::residual::{Part, Windows};
 use super::{FitError, FitSettings, Mode};
 use crate::bitmap::Bitmap;
+use crate::covariance::masked::even_step;
 use crate::covariance::partial::DetrendedCells;
 use crate::covariance::{MaskedCovariance, PairSums};
 use crate::detrend::{BoxWindow, box_mean};
@@ -16,10 +19,11 @@ use crate::outliers;
 use crate::sizes::Sizes;
 use sastrugi_numeric::{Geometry, sums};
 use sastrugi_statistics::normal;
+use std::iter::repeat;
 use std::ops::Range;
 
 /// Cells of a strip.
-const STRIP_CELLS: usize = 1 << 19;
+pub const STRIP_CELLS: usize = 1 << 21;
 
 /// A DEM detrended, trimmed and correlated.
 #[derive(Clone, Debug)]
@@ -44,6 +48,33 @@ pub struct Survey {
     pub kept: usize,
     /// Pair sums of the trimmed residual.
     pub covariance: MaskedCovariance,
+    /// Squares of the trimmed residual in each of [`block_places`].
+    pub blocks: Vec<Squares>,
+}
+
+/// Squares of residuals.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Squares {
+    /// Number of residuals.
+    pub count: u64,
+    /// Sum of their squares, m2.
+    pub sum_m2: f64,
+}
+
+impl Squares {
+    /// Adds the residuals of a part of a row; NaN is none.
+    fn add(&mut self, residual: &[f64]) {
+        let (mut count, mut sums) = (0, [0.0; 4]);
+        for four in residual.chunks(4) {
+            for (sum, r) in sums.iter_mut().zip(four) {
+                let here = !r.is_nan();
+                count += u64::from(here);
+                *sum += if here { r * r } else { 0.0 };
+            }
+        }
+        self.count += count;
+        self.sum_m2 += (sums[0] + sums[1]) + (sums[2] + sums[3]);
+    }
 }
 
 /// Where residuals are cut off.
@@ -77,42 +108,6 @@ impl Trim {
     }
 }
 
-/// Background and residual of a part of a DEM.
-pub struct Detrended {
-    /// Moving average, m.
-    pub background: Vec<f64>,
-    /// Data in each cell's window.
-    pub count: Vec<u32>,
-    /// Height less background, m; NaN where a cell is not trusted or its window lacks data.
-    pub residual: Vec<f64>,
-}
-
-impl Detrended {
-    /// Of heights without outliers (NaN: no data), in rows of `cols`.
-    pub fn of(heights: &[f64], cols: usize, settings: &FitSettings, window: BoxWindow) -> Self {
-        let average = box_mean(heights, cols, window);
-        let needed = settings.min_valid_share * window.area() as f64;
-        let height_above = |k: usize| heights[k] - average.mean[k];
-        let enough = |k: usize| f64::from(average.count[k]) > needed;
-        let residual = (0..heights.len()).map(|k| if enough(k) { height_above(k) } else { f64::NAN }).collect();
-        Self { background: average.mean, count: average.count, residual }
-    }
-
-    /// The part of rows of `cols` that starts at `row` and `col`.
-    fn cropped(self, cols: usize, [row, col]: [usize; 2], [part_rows, part_cols]: [usize; 2]) -> Self {
-        fn crop<T: Copy>(all: Vec<T>, cols: usize, at: [usize; 2], shape: [usize; 2]) -> Vec<T> {
-            let row = |r: usize| (at[0] + r) * cols + at[1];
-            (0..shape[0]).flat_map(|r| all[row(r)..row(r) + shape[1]].iter().copied()).collect()
-        }
-        let (at, shape) = ([row, col], [part_rows, part_cols]);
-        Self {
-            background: crop(self.background, cols, at, shape),
-            count: crop(self.count, cols, at, shape),
-            residual: crop(self.residual, cols, at, shape),
-        }
-    }
-}
-
 /// The readings of a DEM.
 struct Reading<'a> {
     heights: &'a dyn Heights,
@@ -121,6 +116,15 @@ struct Reading<'a> {
     window: BoxWindow,
     /// Rows of a strip.
     step: usize,
+}
+
+/// A part at work, whose memory serves the next.
+#[derive(Default)]
+struct Strip {
+    /// Heights of the part and of the windows about its cells, m; NaN where they are not trusted.
+    heights: Vec<f64>,
+    /// Residuals of the part, m.
+    residual: Vec<f64>,
 }
 
 impl Survey {
@@ -132,13 +136,19 @@ impl Survey {
         max_lag: [usize; 2],
     ) -> Result<Self, FitError> {
         let geometry = heights.geometry();
-        let least = 4 * window.cells()[0].max(max_lag[0]);
+        let most = (STRIP_CELLS / geometry.cols).max(4 * window.cells()[0].max(max_lag[0]));
         // Transects do not know each other.
-        let step = if heights.are_profiles() { 1 } else { (STRIP_CELLS / geometry.cols).max(least).min(geometry.rows) };
+        let step = if heights.are_profiles() { 1 } else { even_step(geometry.rows, most, max_lag[0]) };
         let reading = Reading { heights, settings, geometry, window, step };
         let (trusted, measured, lowest_m) = reading.trusted()?;
         let (used, partial, trim) = reading.threshold(&trusted, lowest_m)?;
-        let (covariance, kept) = reading.pairs(&trusted, &trim, max_lag)?;
+        let places = block_places(&geometry, window, heights.are_profiles());
+        let mut blocks = vec![Squares::default(); places.len()];
+        let (covariance, kept) = reading.pairs(&trusted, &trim, max_lag, |row, residual| {
+            for ([_, cols], block) in places.iter().zip(&mut blocks).filter(|([rows, _], _)| rows.contains(&row)) {
+                block.add(&residual[cols.clone()]);
+            }
+        })?;
         let (trusted_count, detrended) = (trusted.count(), used.count());
         Ok(Self {
             geometry,
@@ -152,6 +162,7 @@ impl Survey {
             trim,
             kept,
             covariance,
+            blocks,
         })
     }
 
@@ -167,16 +178,29 @@ impl Survey {
         }
     }
 
-    /// Background and residual of a part, before trimming.
-    pub fn detrended(
+    /// Residuals of a part, before trimming, m; NaN where a cell is not trusted or its window lacks data.
+    pub fn residual(
         &self,
         heights: &dyn Heights,
         settings: &FitSettings,
         rows: Range<usize>,
         cols: Range<usize>,
-    ) -> Result<Detrended, FitError> {
-        let Self { geometry, window, .. } = *self;
-        Reading { heights, settings, geometry, window, step: 1 }.detrended(&self.trusted, rows, cols)
+    ) -> Result<Vec<f64>, FitError> {
+        let mut part = Strip::default();
+        self.reading(heights, settings).residual(&self.trusted, rows, cols, &mut part)?;
+        Ok(part.residual)
+    }
+
+    /// The moving average of all of a DEM, m; NaN where the window has no data.
+    pub fn background(&self, heights: &dyn Heights, settings: &FitSettings) -> Result<Vec<f64>, FitError> {
+        let Geometry { rows, cols, .. } = self.geometry;
+        let mut trusted = Vec::new();
+        self.reading(heights, settings).read_trusted(&self.trusted, 0..rows, 0..cols, &mut trusted)?;
+        Ok(box_mean(&trusted, cols, self.window).mean)
+    }
+
+    fn reading<'a>(&self, heights: &'a dyn Heights, settings: &'a FitSettings) -> Reading<'a> {
+        Reading { heights, settings, geometry: self.geometry, window: self.window, step: 1 }
     }
 
     /// Which cells of a part entered the moving average.
@@ -206,10 +230,11 @@ impl Reading<'_> {
         span.start.saturating_sub(by)..(span.end + by).min(end)
     }
 
-    fn part(&self, rows: Range<usize>, cols: Range<usize>) -> Result<Vec<f64>, FitError> {
-        let mut part = self.heights.part(rows, cols).map_err(FitError::Unreadable)?;
-        part.iter_mut().filter(|z| !z.is_finite()).for_each(|z| *z = f64::NAN);
-        Ok(part)
+    /// Puts the heights of a part into `part`, NaN where there is no data.
+    fn read(&self, rows: Range<usize>, cols: Range<usize>, part: &mut Vec<f64>) -> Result<(), FitError> {
+        self.heights.read(rows, cols, part).map_err(FitError::Unreadable)?;
+        part.iter_mut().for_each(|z| *z = if z.is_finite() { *z } else { f64::NAN });
+        Ok(())
     }
 
     /// Cells that enter the moving average, the number of cells with data, and the lowest height.
@@ -218,18 +243,20 @@ impl Reading<'_> {
         let mut trusted = Bitmap::with_capacity(self.geometry.len());
         let (mut measured, mut lowest_m) = (0, f64::INFINITY);
         let margin = if self.heights.are_profiles() { 0 } else { 2 * self.window.cells()[0] };
+        let mut heights = Vec::new();
         for strip in self.strips() {
             let wide = self.widened(&strip, margin, rows);
-            let heights = self.part(wide.clone(), 0..cols)?;
+            self.read(wide.clone(), 0..cols, &mut heights)?;
             let outlier = match self.settings.find_outliers() {
                 true => outliers::find(&heights, cols, self.window),
                 false => Vec::new(),
             };
             let own = (strip.start - wide.start) * cols..(strip.end - wide.start) * cols;
-            for (k, z) in heights[own.clone()].iter().enumerate() {
+            let found = outlier.get(own.clone()).unwrap_or_default().iter().copied().chain(repeat(false));
+            trusted.extend(heights[own.clone()].iter().zip(found).map(|(z, outlier)| !(z.is_nan() || outlier)));
+            for z in &heights[own] {
                 measured += usize::from(!z.is_nan());
                 lowest_m = f64::min(lowest_m, *z);
-                trusted.push(!z.is_nan() && !outlier.get(own.start + k).copied().unwrap_or(false));
             }
         }
         if measured == 0 {
@@ -238,19 +265,38 @@ impl Reading<'_> {
         Ok((trusted, measured, lowest_m))
     }
 
-    /// Background and residual of a part, before trimming.
-    fn detrended(&self, trusted: &Bitmap, rows: Range<usize>, cols: Range<usize>) -> Result<Detrended, FitError> {
+    /// Puts the heights of a part into `heights`, NaN where they are not trusted.
+    fn read_trusted(
+        &self,
+        trusted: &Bitmap,
+        rows: Range<usize>,
+        cols: Range<usize>,
+        heights: &mut Vec<f64>,
+    ) -> Result<(), FitError> {
+        self.read(rows.clone(), cols.clone(), heights)?;
+        for (row, line) in rows.zip(heights.chunks_exact_mut(cols.len())) {
+            let first = row * self.geometry.cols + cols.start;
+            trusted.unset(first..first + line.len()).for_each(|k| line[k - first] = f64::NAN);
+        }
+        Ok(())
+    }
+
+    /// Makes the residuals of a part, before trimming.
+    fn residual(
+        &self,
+        trusted: &Bitmap,
+        rows: Range<usize>,
+        cols: Range<usize>,
+        Strip { heights, residual }: &mut Strip,
+    ) -> Result<Windows, FitError> {
         let [half_rows, half_cols] = self.window.half;
         let wide_rows = self.widened(&rows, half_rows, self.geometry.rows);
         let wide_cols = self.widened(&cols, half_cols, self.geometry.cols);
-        let mut heights = self.part(wide_rows.clone(), wide_cols.clone())?;
-        for (row, line) in wide_rows.clone().zip(heights.chunks_exact_mut(wide_cols.len())) {
-            let first = row * self.geometry.cols + wide_cols.start;
-            line.iter_mut().enumerate().filter(|(k, _)| !trusted.get(first + k)).for_each(|(_, z)| *z = f64::NAN);
-        }
-        let wide = Detrended::of(&heights, wide_cols.len(), self.settings, self.window);
         let at = [rows.start - wide_rows.start, cols.start - wide_cols.start];
-        Ok(wide.cropped(wide_cols.len(), at, [rows.len(), cols.len()]))
+        let width = wide_cols.len();
+        self.read_trusted(trusted, wide_rows, wide_cols, heights)?;
+        let part = Part { heights, cols: width, at, shape: [rows.len(), cols.len()] };
+        Ok(part.residual(self.settings, self.window, residual))
     }
 
     /// Cells with a residual, how many of them have a window that is not complete, and where residuals are cut off.
@@ -258,62 +304,62 @@ impl Reading<'_> {
         let cols = self.geometry.cols;
         let mut used = Bitmap::with_capacity(self.geometry.len());
         let (mut sizes, mut moments) = (Sizes::new(), Moments::default());
-        let (mut partial, mut best, mut largest, mut height) = (0, 0, 0.0, 0.0);
+        let (mut windows, mut at_work) = (Windows::default(), Strip::default());
         for strip in self.strips() {
-            let Detrended { background, count, residual } = self.detrended(trusted, strip, 0..cols)?;
-            sizes.add(&residual);
+            windows = windows.with(self.residual(trusted, strip, 0..cols, &mut at_work)?);
+            let residual = &at_work.residual;
+            sizes.add(residual);
             if self.settings.mode() == Mode::Paper {
-                moments.add(&residual);
+                moments.add(residual);
             }
-            for (k, r) in residual.iter().enumerate() {
-                let here = !r.is_nan();
-                used.push(here);
-                best = best.max(count[k]);
-                if here {
-                    partial += usize::from((count[k] as usize) < self.window.area());
-                    largest = f64::max(largest, r.abs());
-                    height = f64::max(height, background[k].abs());
-                }
-            }
+            used.extend(residual.iter().map(|r| !r.is_nan()));
         }
         if used.count() == 0 {
-            let best_share = f64::from(best) / self.window.area() as f64;
+            let best_share = f64::from(windows.most) / self.window.area() as f64;
             return Err(FitError::NoWindow { needed_share: self.settings.min_valid_share, best_share });
         }
         // Rounding of the running sums is far below 1e-11 of the heights.
-        if largest <= 1e-11 * height {
+        if windows.largest_m <= 1e-11 * windows.highest_m {
             return Err(FitError::Constant { height_m: lowest_m });
         }
         let trim = Trim::of(&sizes, self.settings);
         let trim = if self.settings.mode() == Mode::Paper { self.paper_trim(trusted, trim, &moments)? } else { trim };
-        Ok((used, partial, trim))
+        Ok((used, windows.partial, trim))
     }
 
     /// The normal threshold about the mean, `z(1 - level / 2)` standard deviations, and the mean of what it keeps.
     fn paper_trim(&self, trusted: &Bitmap, trim: Trim, all: &Moments) -> Result<Trim, FitError> {
         let threshold_m = normal::quantile(1.0 - 0.5 * self.settings.trim()) * all.variance().sqrt();
         let trim = Trim { centre_m: all.mean(), threshold_m, ..trim };
-        let mut kept = Moments::default();
+        let (mut kept, mut at_work) = (Moments::default(), Strip::default());
         for strip in self.strips() {
-            let mut residual = self.detrended(trusted, strip, 0..self.geometry.cols)?.residual;
-            trim.apply(&mut residual);
-            kept.add(&residual);
+            self.residual(trusted, strip, 0..self.geometry.cols, &mut at_work)?;
+            trim.apply(&mut at_work.residual);
+            kept.add(&at_work.residual);
         }
         Ok(Trim { offset_m: kept.mean(), ..trim })
     }
 
-    /// Pair sums of the trimmed residual, and the number of cells in it.
-    fn pairs(&self, trusted: &Bitmap, trim: &Trim, max_lag: [usize; 2]) -> Result<(MaskedCovariance, usize), FitError> {
+    /// Pair sums of the trimmed residual, and the number of cells in it; each of its rows is shown to `see` once.
+    fn pairs(
+        &self,
+        trusted: &Bitmap,
+        trim: &Trim,
+        max_lag: [usize; 2],
+        mut see: impl FnMut(usize, &[f64]),
+    ) -> Result<(MaskedCovariance, usize), FitError> {
         let Geometry { rows, cols, .. } = self.geometry;
         let max_lag = [max_lag[0].min(rows - 1), max_lag[1].min(cols - 1)];
         let mut sums = PairSums::new(self.step, cols, max_lag);
-        let mut kept = 0;
+        let (mut kept, mut at_work) = (0, Strip::default());
         for strip in self.strips() {
             let below = strip.start..(strip.end + max_lag[0]).min(rows);
-            let mut residual = self.detrended(trusted, below, 0..cols)?.residual;
-            trim.apply(&mut residual);
+            self.residual(trusted, below, 0..cols, &mut at_work)?;
+            let residual = &mut at_work.residual;
+            trim.apply(residual);
             kept += residual[..strip.len() * cols].iter().filter(|r| !r.is_nan()).count();
-            sums.add(&residual);
+            strip.zip(residual.chunks_exact(cols)).for_each(|(row, line)| see(row, line));
+            sums.add(residual);
         }
         Ok((sums.finish(), kept))
     }

@@ -264,9 +264,9 @@ fn prop_strips_change_nothing_that_matters() {
         fn geometry(&self) -> Geometry {
             self.0.geometry
         }
-        fn part(&self, rows: std::ops::Range<usize>, cols: std::ops::Range<usize>) -> Result<Vec<f64>, String> {
+        fn read(&self, rows: Range<usize>, cols: Range<usize>, part: &mut Vec<f64>) -> Result<(), String> {
             assert!(rows.len() * cols.len() < 3 << 20, "{rows:?}");
-            self.0.part(rows, cols)
+            self.0.read(rows, cols, part)
         }
     }
     let dem = field(0.28, 2048, CELL_M, 2);

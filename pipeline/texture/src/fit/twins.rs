@@ -1,8 +1,9 @@
 //! Surfaces of a covariance on a case's own grid and mask, measured and detrended as the case was: the null of every test.
 
 use super::case::Case;
+use super::residual::residual;
 use super::simulate::{Shape, Simulator};
-use super::survey::{Detrended, Trim};
+use super::survey::Trim;
 use crate::covariance::Covariance;
 use crate::sizes::Sizes;
 use sastrugi_numeric::Streams;
@@ -40,7 +41,7 @@ impl<'a> Twins<'a> {
     pub fn one(&self, streams: &Streams) -> Twin {
         let mut surface = self.simulator.surface(streams);
         surface.iter_mut().zip(&self.trusted).filter(|(_, trusted)| !**trusted).for_each(|(z, _)| *z = f64::NAN);
-        let residual = Detrended::of(&surface, self.cols, self.case.settings, self.case.window).residual;
+        let residual = residual(&surface, self.cols, self.case.settings, self.case.window);
         let trim = Trim::of(&Sizes::of(&residual), self.case.settings);
         Twin { residual, trim }
     }

@@ -152,7 +152,7 @@ pub fn stationarity(estimator: &Estimator, estimate: &Estimate, blocks: &[Block]
     let variance_of_one = estimator.expectation.covariance(&estimate.covariance, threshold_m).first().copied()?
         * estimator.case.survey.kept as f64;
     let variances: Vec<f64> = blocks.iter().map(Block::variance_m2).collect();
-    let cells: Vec<f64> = blocks.iter().map(|b| b.cells as f64).collect();
+    let cells: Vec<f64> = blocks.iter().map(|b| b.cells() as f64).collect();
     let total: f64 = sums::sum(&cells);
     let mean = variances.iter().zip(&cells).map(|(v, n)| v * n).sum::<f64>() / total;
     let chi2: f64 = variances.iter().zip(&cells).map(|(v, n)| (v - mean) * (v - mean) * n / variance_of_one).sum();

@@ -8,17 +8,19 @@
 //! afresh, so that a cell pulled down by a tree nearby is taken back once the tree is out.
 //!
 //! An object stands out from its own surroundings. The scale is that of the whole raster or, where it is larger, of the
-//! place: the median over nine blocks of a window each ([`Scales`]). Against the raster's scale alone the steep fifth of a bare
+//! place: the median over nine blocks of a window each (`Scales`). Against the raster's scale alone the steep fifth of a bare
 //! site would be taken for objects, because the texture of slopes is larger than that of flats. An object of up to about two
 //! windows that stands alone fills less than half of the blocks and does not hide itself; a thicket does, and is better
 //! masked by hand.
 //!
 //! On normal data 6e-7 of the cells pass the first bound, so a surface without objects is left as it is.
 //!
-//! Cost: a moving average, a count and a selection per round; rounds end when nothing changes, at most `ROUNDS`.
+//! Cost: a moving average and a count per round, and medians about what stands out; rounds end when nothing changes, at most
+//! `ROUNDS`.
 
-use crate::detrend::{BoxWindow, box_mean};
+use crate::detrend::{BoxWindow, deviations};
 use crate::sizes::{NORMAL_CONSISTENCY, Sizes};
+use std::cell::OnceCell;
 use std::ops::Range;
 
 /// Robust standard deviations beyond which a cell is an outlier by itself.
@@ -46,67 +48,72 @@ pub fn find(values: &[f64], cols: usize, window: BoxWindow) -> Vec<bool> {
 
 /// Outliers about the background of the cells not marked in `outlier`.
 fn judge(values: &[f64], outlier: &[bool], cols: usize, window: BoxWindow) -> Vec<bool> {
-    let trusted: Vec<f64> = values.iter().zip(outlier).map(|(&v, &out)| if out { f64::NAN } else { v }).collect();
-    let background = box_mean(&trusted, cols, window).mean;
-    let deviation: Vec<f64> = values.iter().zip(&background).map(|(v, b)| (v - b).abs()).collect();
+    let deviation = deviations(values, outlier, cols, window);
     let scales = Scales::of(&deviation, cols, window);
-    let joined = scales.exceeded(&deviation, GROWTH_SCALES);
-    let grown = grow(scales.exceeded(&deviation, SEED_SCALES), cols, &joined);
+    let seeds = (0..deviation.len()).map(|k| scales.exceeded(k, SEED_SCALES)).collect();
+    let grown = grow(seeds, cols, |k| scales.exceeded(k, GROWTH_SCALES));
     with_margin(&grown, values, cols)
 }
 
 /// Robust standard deviation of the deviations about each place: the median over [`BLOCKS`] blocks of their own, and no less
-/// than that of the whole raster.
-struct Scales {
-    /// Blocks that a row and a column of the raster fall into.
-    block_of_row: Vec<usize>,
-    block_of_col: Vec<usize>,
-    /// By rows of blocks.
-    values: Vec<f64>,
-    /// Blocks in a row of them.
-    across: usize,
+/// than that of the whole raster. What cells beyond the latter do not ask for is not computed.
+struct Scales<'a> {
+    deviation: &'a [f64],
+    cols: usize,
+    /// Rows and columns of a block; the last ones take the rest.
+    side: [usize; 2],
+    /// Blocks down and across the raster.
+    blocks: [usize; 2],
+    /// Blocks down and across of which the median is taken.
+    near: [usize; 2],
+    /// Robust standard deviation of the whole raster.
+    raster: f64,
+    /// Median deviation of each block, and scale of each.
+    medians: Vec<OnceCell<f64>>,
+    scales: Vec<OnceCell<f64>>,
 }
 
-impl Scales {
-    fn of(deviation: &[f64], cols: usize, window: BoxWindow) -> Self {
-        let [tall, wide] = window.cells();
-        let (block_of_row, block_of_col) = (blocks(deviation.len() / cols, tall), blocks(cols, wide));
-        let count = |of: &[usize]| of.last().map_or(0, |last| last + 1);
-        let (down, across) = (count(&block_of_row), count(&block_of_col));
-        let mut within = vec![Vec::new(); down * across];
-        for (line, block) in deviation.chunks_exact(cols).zip(&block_of_row) {
-            line.iter().zip(&block_of_col).for_each(|(d, b)| within[block * across + b].push(*d));
-        }
-        let own: Vec<f64> = within.into_iter().map(median).collect();
-        let raster = Sizes::of(deviation).exceeded_by(0.5);
+impl<'a> Scales<'a> {
+    fn of(deviation: &'a [f64], cols: usize, window: BoxWindow) -> Self {
+        let side = window.cells();
+        let shape = [deviation.len() / cols, cols];
+        let blocks = [0, 1].map(|k| (shape[k] / side[k]).max(1));
         // A narrow raster has as many blocks along it.
-        let near_across = (BLOCKS / down.clamp(1, 3)).min(across);
-        let near_down = (BLOCKS / near_across.max(1)).min(down);
-        let local = |row: usize, col: usize| {
-            let places =
-                around(row, near_down, down).flat_map(|r| around(col, near_across, across).map(move |c| (r, c)));
-            median(places.map(|(r, c)| own[r * across + c]).collect())
-        };
-        let all = (0..down).flat_map(|r| (0..across).map(move |c| (r, c)));
-        let values = all.map(|(r, c)| NORMAL_CONSISTENCY * raster.max(local(r, c))).collect();
-        Self { block_of_row, block_of_col, values, across }
+        let near_across = (BLOCKS / blocks[0].min(3)).min(blocks[1]);
+        let near = [(BLOCKS / near_across).min(blocks[0]), near_across];
+        let raster = NORMAL_CONSISTENCY * Sizes::of(deviation).exceeded_by(0.5);
+        let [medians, scales] = [(); 2].map(|()| vec![OnceCell::new(); blocks[0] * blocks[1]]);
+        Self { deviation, cols, side, blocks, near, raster, medians, scales }
     }
 
-    /// The cells that deviate by more than so many scales.
-    fn exceeded(&self, deviation: &[f64], times: f64) -> Vec<bool> {
-        let lines = deviation.chunks_exact(self.block_of_col.len().max(1)).zip(&self.block_of_row);
-        let of_line = |(line, block): (_, &usize)| {
-            let scales = &self.values[block * self.across..];
-            std::iter::zip::<&[f64], _>(line, &self.block_of_col).map(move |(d, b)| *d > times * scales[*b])
-        };
-        lines.flat_map(of_line).collect()
+    /// True for a cell that deviates by more than so many scales.
+    fn exceeded(&self, cell: usize, times: f64) -> bool {
+        let deviation = self.deviation[cell];
+        deviation > times * self.raster && deviation > times * self.scale(cell)
     }
-}
 
-/// The block of a window's side that each cell of a line falls into; the last one takes the rest.
-fn blocks(cells: usize, side: usize) -> Vec<usize> {
-    let last = (cells / side).max(1) - 1;
-    (0..cells).map(|cell| (cell / side).min(last)).collect()
+    fn scale(&self, cell: usize) -> f64 {
+        let place = [cell / self.cols, cell % self.cols];
+        let [row, col] = [0, 1].map(|k| (place[k] / self.side[k]).min(self.blocks[k] - 1));
+        *self.scales[row * self.blocks[1] + col].get_or_init(|| {
+            let rows = around(row, self.near[0], self.blocks[0]);
+            let places = rows.flat_map(|r| around(col, self.near[1], self.blocks[1]).map(move |c| [r, c]));
+            self.raster.max(NORMAL_CONSISTENCY * median(places.map(|block| self.median(block)).collect()))
+        })
+    }
+
+    /// Median deviation of a block.
+    fn median(&self, block: [usize; 2]) -> f64 {
+        *self.medians[block[0] * self.blocks[1] + block[1]].get_or_init(|| {
+            let end = [self.deviation.len() / self.cols, self.cols];
+            let span = |k: usize| {
+                let last = block[k] + 1 == self.blocks[k];
+                block[k] * self.side[k]..if last { end[k] } else { (block[k] + 1) * self.side[k] }
+            };
+            let line = |row: usize| &self.deviation[row * self.cols..][span(1)];
+            median(span(0).flat_map(|row| line(row).iter().copied()).collect())
+        })
+    }
 }
 
 /// `near` blocks about block `at` of `end`, all within.
@@ -123,11 +130,11 @@ fn median(mut values: Vec<f64>) -> f64 {
 }
 
 /// Flood fill from the marked cells to neighbours (eight) that are `joined`.
-fn grow(mut marked: Vec<bool>, cols: usize, joined: &[bool]) -> Vec<bool> {
+fn grow(mut marked: Vec<bool>, cols: usize, joined: impl Fn(usize) -> bool) -> Vec<bool> {
     let mut front: Vec<usize> = (0..marked.len()).filter(|&k| marked[k]).collect();
     while let Some(k) = front.pop() {
         for neighbour in neighbours(k, cols, marked.len()) {
-            if !marked[neighbour] && joined[neighbour] {
+            if !marked[neighbour] && joined(neighbour) {
                 marked[neighbour] = true;
                 front.push(neighbour);
             }

@@ -70,3 +70,32 @@ fn val_transects() {
     assert!(outlier[200..206].iter().all(|o| *o));
     assert!(outlier.iter().filter(|&&o| o).count() < 12);
 }
+
+/// Scales asked for cell by cell are those of the definition: medians of all blocks, then of nine about each.
+#[test]
+fn val_scales_equal_the_definition() {
+    let rough = |k: usize| if k % COLS < COLS / 3 { 10.0 } else { 1.0 };
+    let deviation: Vec<f64> = noise().iter().enumerate().map(|(k, v)| (rough(k) * v).abs()).collect();
+    for window in [BoxWindow { half: [8, 8] }, BoxWindow { half: [40, 3] }, BoxWindow { half: [200, 5] }] {
+        let scales = Scales::of(&deviation, COLS, window);
+        let shape = [deviation.len() / COLS, COLS];
+        let count = [0, 1].map(|k| (shape[k] / window.cells()[k]).max(1));
+        let block = |k: usize| {
+            let place = [k / COLS, k % COLS];
+            [0, 1].map(|axis| (place[axis] / window.cells()[axis]).min(count[axis] - 1))
+        };
+        let mut own = vec![Vec::new(); count[0] * count[1]];
+        deviation.iter().enumerate().for_each(|(k, d)| own[block(k)[0] * count[1] + block(k)[1]].push(*d));
+        let own: Vec<f64> = own.into_iter().map(median).collect();
+        let wide = (9 / count[0].min(3)).min(count[1]);
+        let tall = (9 / wide).min(count[0]);
+        let raster = Sizes::of(&deviation).exceeded_by(0.5);
+        for k in (0..deviation.len()).step_by(7) {
+            let [row, col] = block(k);
+            let near = around(row, tall, count[0]).flat_map(|r| around(col, wide, count[1]).map(move |c| (r, c)));
+            let local = median(near.map(|(r, c)| own[r * count[1] + c]).collect());
+            assert_eq!(scales.scale(k), NORMAL_CONSISTENCY * raster.max(local));
+            assert_eq!(scales.exceeded(k, 2.5), deviation[k] > 2.5 * (NORMAL_CONSISTENCY * raster.max(local)));
+        }
+    }
+}

@@ -1,0 +1,85 @@
+//! Height less background.
+
+use super::FitSettings;
+use crate::detrend::{BoxWindow, RunningMean, band_rows};
+use rayon::prelude::*;
+
+/// A part of a raster of heights without outliers.
+pub struct Part<'a> {
+    /// Heights of the raster, m; NaN where there is no data or none that is trusted.
+    pub heights: &'a [f64],
+    /// Length of the raster's rows.
+    pub cols: usize,
+    /// First row and column of the part.
+    pub at: [usize; 2],
+    /// Its rows and columns.
+    pub shape: [usize; 2],
+}
+
+/// What residuals and their windows are like.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Windows {
+    /// Residuals whose window is not complete.
+    pub partial: usize,
+    /// Most data in any window.
+    pub most: u32,
+    /// Largest absolute residual, m.
+    pub largest_m: f64,
+    /// Largest absolute background of a residual, m.
+    pub highest_m: f64,
+}
+
+impl Windows {
+    /// Of two parts.
+    pub fn with(self, other: Self) -> Self {
+        Self {
+            partial: self.partial + other.partial,
+            most: self.most.max(other.most),
+            largest_m: self.largest_m.max(other.largest_m),
+            highest_m: self.highest_m.max(other.highest_m),
+        }
+    }
+}
+
+/// The residuals of a raster of heights without outliers (NaN: no data), in rows of `cols`, m.
+pub fn residual(heights: &[f64], cols: usize, settings: &FitSettings, window: BoxWindow) -> Vec<f64> {
+    let rows = heights.len().checked_div(cols).unwrap_or(0);
+    let mut residual = Vec::new();
+    Part { heights, cols, at: [0, 0], shape: [rows, cols] }.residual(settings, window, &mut residual);
+    residual
+}
+
+impl Part<'_> {
+    /// Puts the residuals of the part into `residual`, m: NaN where a cell has no data or its window lacks data.
+    pub fn residual(&self, settings: &FitSettings, window: BoxWindow, residual: &mut Vec<f64>) -> Windows {
+        let [rows, cols] = self.shape;
+        residual.resize(rows * cols, 0.0);
+        let band = band_rows(window);
+        let bands = residual.par_chunks_mut((band * cols).max(1)).enumerate();
+        let windows: Vec<Windows> = bands.map(|(k, band_of)| self.band(k * band, settings, window, band_of)).collect();
+        windows.into_iter().fold(Windows::default(), Windows::with)
+    }
+
+    /// The rows of the part from `first` on.
+    fn band(&self, first: usize, settings: &FitSettings, window: BoxWindow, residual: &mut [f64]) -> Windows {
+        let needed = settings.min_valid_share * window.area() as f64;
+        let ([row, col], [_, cols]) = (self.at, self.shape);
+        let mut average = RunningMean::from(self.heights, self.cols, window, row + first);
+        let (mut mean, mut count) = (vec![0.0; self.cols], vec![0; self.cols]);
+        let mut windows = Windows::default();
+        for (r, line) in residual.chunks_exact_mut(cols).enumerate() {
+            average.next_row(&mut mean, &mut count);
+            let heights = &self.heights[(row + first + r) * self.cols + col..];
+            for (((out, &z), &m), &n) in line.iter_mut().zip(heights).zip(&mean[col..]).zip(&count[col..]) {
+                *out = if f64::from(n) > needed { z - m } else { f64::NAN };
+                windows.most = windows.most.max(n);
+                if !out.is_nan() {
+                    windows.partial += usize::from((n as usize) < window.area());
+                    windows.largest_m = windows.largest_m.max(out.abs());
+                    windows.highest_m = windows.highest_m.max(m.abs());
+                }
+            }
+        }
+        windows
+    }
+}
