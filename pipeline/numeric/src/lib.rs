@@ -22,6 +22,7 @@ mod simd;
 pub mod streams;
 pub mod sums;
 pub mod surface;
+pub mod turns;
 
 pub use grid::{Geometry, Grid};
 pub use streams::{Stream, Streams};
