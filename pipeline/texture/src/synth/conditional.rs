@@ -14,7 +14,7 @@
 //! 3.4 and 7.3. A self-affine covariance is made as its stationary twin over the DEM's longer side.
 //!
 //! Cost, for each filled cell: one system of at most 51 equations, and steps along the rays. Memory: a torus that is the DEM
-//! and the reach of the covariance wide, 36 bytes a cell.
+//! and the reach of the covariance wide, 18 bytes a cell.
 
 use super::fft_ma::{self, FftMaParameters, Phase};
 use super::tile::{Cell, TileParameters};
