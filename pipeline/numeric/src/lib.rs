@@ -9,8 +9,8 @@
 //! * Transforms are unnormalised forward (`exp(-2 pi i k n / N)`) and divided by `N` on the way back.
 //!
 //! # Same bits everywhere
-//! Kernels use `+ - * /`, `sqrt` and the `libm` crate only; sums run in a fixed order; the Fourier planner is the
-//! scalar one. Work is spread over threads only where each output element is computed by one task from inputs
+//! Kernels use `+ - * /`, `sqrt` and the `libm` crate only; sums run in a fixed order; transforms take vectors as wide as
+//! the CPU's, number by number with the operations of the narrow ones. Work is spread over threads only where each output element is computed by one task from inputs
 //! that are already complete, so that the number of threads changes no bit.
 
 pub mod fft;
@@ -18,9 +18,11 @@ pub mod filters;
 pub mod grid;
 pub mod ops;
 pub mod resample;
+mod simd;
 pub mod streams;
 pub mod sums;
 pub mod surface;
+pub mod turns;
 
 pub use grid::{Geometry, Grid};
 pub use streams::{Stream, Streams};

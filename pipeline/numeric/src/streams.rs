@@ -69,7 +69,12 @@ impl Stream {
 
     /// Uniform in [0, 1): the top 53 of 64 bits.
     pub fn uniform(&mut self) -> f64 {
-        (self.bits() >> 11) as f64 * (1.0 / (1u64 << 53) as f64)
+        unit(self.bits())
+    }
+
+    /// The next values of [`Self::uniform`], all at once.
+    pub fn fill_uniform(&mut self, values: &mut [f64]) {
+        values.iter_mut().for_each(|v| *v = self.uniform());
     }
 
     /// Uniform in [low, high).
@@ -105,6 +110,11 @@ impl Stream {
     }
 }
 
+/// The top 53 bits as a fraction.
+fn unit(bits: u64) -> f64 {
+    (bits >> 11) as f64 * (1.0 / (1u64 << 53) as f64)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -124,6 +134,19 @@ mod tests {
         let a = Streams::for_item(1, "ab", "c").stream("p").bits();
         let b = Streams::for_item(1, "a", "bc").stream("p").bits();
         assert_ne!(a, b);
+    }
+
+    /// Many at once are the draws one by one, also after single ones.
+    #[test]
+    fn prop_filling_changes_no_draw() {
+        let mut one_by_one = Streams::for_seed(3, "test").stream("uniform");
+        let mut at_once = one_by_one.clone();
+        for n in [1, 5, 128, 300, 7] {
+            let mut values = vec![0.0; n];
+            at_once.fill_uniform(&mut values);
+            assert!(values.iter().all(|v| v.to_bits() == one_by_one.uniform().to_bits()), "{n}");
+            assert_eq!(at_once.bits(), one_by_one.bits());
+        }
     }
 
     /// Null: draws are standard normal. n = 200 000; thresholds at 5 standard errors of each moment

@@ -15,7 +15,7 @@
 //! torus of [`TWIN_CELLS`] cells has room for.
 //!
 //! Cost, for each filled cell: one system of at most 51 equations, and steps along the rays. Memory: a torus that is the DEM
-//! and the reach of the covariance wide, 36 bytes a cell.
+//! and the reach of the covariance wide, 18 bytes a cell.
 
 use super::fft_ma::{self, FftMaParameters, Phase};
 use super::tile::{Cell, TileParameters};

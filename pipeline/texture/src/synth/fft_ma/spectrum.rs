@@ -1,12 +1,14 @@
 //! Spectrum of a covariance on a torus: real, as the covariance is even, and where rows and columns of the torus are axes
 //! of symmetry also even in each wavenumber, so that a quarter of it is computed.
 
-use super::sums;
+use super::{reach, sums};
 use crate::covariance::Covariance;
 use crate::covariance::filtered::torus_covariance;
-use rayon::prelude::*;
-use sastrugi_numeric::fft::{Complex64, HalfSpectrum, RealFft2, Transform};
+use sastrugi_numeric::fft::{Complex64, HalfSpectrum, RealFft2, even_spectrum};
 use std::f64::consts::PI;
+
+/// Share of its variance below which a term of the covariance is taken as nothing: far below the rounding of a transform.
+const NOTHING: f64 = 1e-20;
 
 /// The eigenvalues `lambda(kx, ky)` of a covariance on a torus, m2, for `kx <= cols / 2`.
 pub struct Spectrum {
@@ -33,22 +35,21 @@ impl Spectrum {
 
     /// Of a covariance that is isotropic once cells have these sides.
     fn even(covariance: &Covariance, [rows, cols]: [usize; 2], [dx, dy]: [f64; 2]) -> Self {
-        let (half_rows, half_cols) = (rows / 2 + 1, cols / 2 + 1);
-        let mut by_row = vec![0.0; half_rows * half_cols];
         // Square cells: whole numbers under the root, so that cells as far from the origin have the same bits.
         let aspect = dy / dx;
-        by_row.par_chunks_mut(half_cols).enumerate().for_each(|(r, line)| {
+        let reach = reach::reach_m(covariance, NOTHING) / dx;
+        let values = even_spectrum([rows, cols], |r, line| {
             let y = r as f64 * aspect;
-            for (c, v) in line.iter_mut().enumerate() {
+            // NaN beyond the reach, which is column 0 as an integer.
+            let within = ((reach * reach - y * y).sqrt().ceil() as usize).min(line.len());
+            let (near, far) = line.split_at_mut(within);
+            for (c, v) in near.iter_mut().enumerate() {
                 let x = c as f64;
                 *v = covariance.at_distance((x * x + y * y).sqrt() * dx);
             }
+            far.fill(0.0);
         });
-        even_transforms(&mut by_row, cols);
-        let mut values = transposed(&by_row, half_cols);
-        drop(by_row);
-        even_transforms(&mut values, rows);
-        Self { rows, cols, stored: half_rows, values }
+        Self { rows, cols, stored: rows / 2 + 1, values }
     }
 
     /// Eq. 10 of Vecherin et al. 2022 with its missing factor, `2 pi sigma^2 b^2 / (1 + b^2 k^2)^(3/2)`, at the wavenumbers
@@ -80,6 +81,9 @@ impl Spectrum {
 
     /// Sum of the absolute values of the negative eigenvalues.
     pub fn negative(&self) -> f64 {
+        if self.values.iter().all(|v| *v >= 0.0) {
+            return 0.0;
+        }
         // Rounding of the transforms is no negative eigenvalue.
         let rounding = 1e-14 * self.values.iter().fold(0.0, |m, v| f64::max(m, v.abs()));
         self.weighted_sum(|v| if v < -rounding { -v } else { 0.0 })
@@ -88,7 +92,14 @@ impl Spectrum {
     /// Share of the spectrum that is negative.
     pub fn negative_share(&self) -> f64 {
         let negative = self.negative();
-        negative / (self.total() + 2.0 * negative)
+        if negative == 0.0 { 0.0 } else { negative / (self.total() + 2.0 * negative) }
+    }
+
+    /// The magnitudes `sqrt(lambda M)` of the modes of a field, those of negative eigenvalues 0.
+    pub fn amplitudes(mut self) -> Self {
+        let cells = (self.rows * self.cols) as f64;
+        self.values.iter_mut().for_each(|v| *v = (v.max(0.0) * cells).sqrt());
+        self
     }
 
     /// The covariance that belongs to it, row-major, m2.
@@ -124,39 +135,4 @@ fn stretches(covariance: &Covariance) -> Option<[f64; 2]> {
         90.0 => Some([1.0, across]),
         _ => None,
     }
-}
-
-/// Replaces each line (values 0 to `len / 2` of an even sequence of `len`) by its transform, which is real and even
-/// too. Two lines share a complex transform: one is the real part, the other the imaginary.
-fn even_transforms(lines: &mut [f64], len: usize) {
-    let half = len / 2 + 1;
-    let transform = Transform::new(len);
-    lines.par_chunks_mut(2 * half).for_each_init(
-        || (vec![Complex64::default(); len], transform.scratch()),
-        |(work, scratch), pair| {
-            let (first, second) = pair.split_at_mut(half);
-            for k in 0..half {
-                work[k] = Complex64::new(first[k], second.get(k).copied().unwrap_or(0.0));
-                work[(len - k) % len] = work[k];
-            }
-            transform.forward(work, scratch);
-            first.iter_mut().zip(work.iter()).for_each(|(v, w)| *v = w.re);
-            second.iter_mut().zip(work.iter()).for_each(|(v, w)| *v = w.im);
-        },
-    );
-}
-
-/// Transpose of a row-major matrix with rows of `cols`.
-fn transposed(matrix: &[f64], cols: usize) -> Vec<f64> {
-    /// Columns moved together: four cache lines.
-    const BLOCK: usize = 32;
-    let rows = matrix.len() / cols;
-    let mut out = vec![0.0; matrix.len()];
-    out.par_chunks_mut(BLOCK * rows).enumerate().for_each(|(block, out)| {
-        for (r, line) in matrix.chunks_exact(cols).enumerate() {
-            let columns = &line[block * BLOCK..(block * BLOCK + out.len() / rows)];
-            columns.iter().enumerate().for_each(|(k, v)| out[k * rows + r] = *v);
-        }
-    });
-    out
 }

@@ -1,0 +1,111 @@
+//! Transforms of real fields.
+
+use super::plane::Plane;
+use super::{Complex64, Transform};
+
+/// Real two-dimensional transform of a fixed shape.
+///
+/// Cost: two complex half transforms. Memory: the field and its half spectrum ([`RealFft2::inverse_of`]: the field alone).
+#[derive(Clone)]
+pub struct RealFft2 {
+    rows: usize,
+    cols: usize,
+    kind: Kind,
+}
+
+#[derive(Clone)]
+enum Kind {
+    /// One row or one column, for which the transforms side by side would be empty.
+    Line(Transform),
+    Plane(Plane),
+}
+
+/// The non-negative column frequencies of a real field's transform, stored column frequency first:
+/// the value at column frequency `kx` in `0..=cols / 2` and row frequency `ky` in `0..rows` is `values[kx * rows + ky]`.
+#[derive(Clone, Debug)]
+pub struct HalfSpectrum {
+    /// Rows of the field.
+    pub rows: usize,
+    /// Columns of the field.
+    pub cols: usize,
+    /// `(cols / 2 + 1) * rows` values.
+    pub values: Vec<Complex64>,
+}
+
+impl HalfSpectrum {
+    /// Number of stored column frequencies.
+    pub fn half_cols(&self) -> usize {
+        self.cols / 2 + 1
+    }
+
+    /// How often the mode at column frequency `kx` stands in the full spectrum: 1 on the self-conjugate columns, else 2.
+    pub fn multiplicity(&self, kx: usize) -> f64 {
+        if kx == 0 || 2 * kx == self.cols { 1.0 } else { 2.0 }
+    }
+}
+
+impl RealFft2 {
+    /// A transform of fields of `rows` by `cols`.
+    pub fn new(rows: usize, cols: usize) -> Self {
+        let kind = match rows.min(cols) {
+            1 => Kind::Line(Transform::new(rows.max(cols))),
+            _ => Kind::Plane(Plane::new(rows, cols)),
+        };
+        Self { rows, cols, kind }
+    }
+
+    /// Transform of a row-major real field.
+    ///
+    /// # Panics
+    /// If the field does not have `rows * cols` values.
+    pub fn forward(&self, field: &[f64]) -> HalfSpectrum {
+        let Self { rows, cols, .. } = *self;
+        assert_eq!(field.len(), rows * cols, "field of the transform's shape");
+        let values = match &self.kind {
+            Kind::Line(transform) => self.forward_line(transform, field),
+            Kind::Plane(plane) => plane.forward(field),
+        };
+        HalfSpectrum { rows, cols, values }
+    }
+
+    /// Field of a spectrum. Only the Hermitian part counts: what the stored columns 0 and `cols / 2` hold beyond it is
+    /// dropped.
+    pub fn inverse(&self, spectrum: HalfSpectrum) -> Vec<f64> {
+        assert_eq!((spectrum.rows, spectrum.cols), (self.rows, self.cols), "spectrum of the transform's shape");
+        let rows = self.rows;
+        self.inverse_of(|kx, column| column.copy_from_slice(&spectrum.values[kx * rows..(kx + 1) * rows]))
+    }
+
+    /// Field of the spectrum whose columns `fill` writes, each of `rows` values, for column frequencies `0..=cols / 2` in
+    /// any order: the half spectrum is never there as a whole. Only its Hermitian part counts.
+    pub fn inverse_of(&self, fill: impl Fn(usize, &mut [Complex64]) + Sync) -> Vec<f64> {
+        match &self.kind {
+            Kind::Line(transform) => self.inverse_line(transform, fill),
+            Kind::Plane(plane) => plane.inverse_of(fill),
+        }
+    }
+
+    fn forward_line(&self, transform: &Transform, field: &[f64]) -> Vec<Complex64> {
+        let mut line: Vec<Complex64> = field.iter().map(|&v| Complex64::new(v, 0.0)).collect();
+        transform.forward(&mut line, &mut transform.scratch());
+        match self.rows {
+            // Rounding breaks the symmetry of a row's modes.
+            1 => (0..=self.cols / 2).map(|k| (line[k] + line[(self.cols - k) % self.cols].conj()) * 0.5).collect(),
+            _ => line,
+        }
+    }
+
+    fn inverse_line(&self, transform: &Transform, fill: impl Fn(usize, &mut [Complex64])) -> Vec<f64> {
+        let Self { rows, cols, .. } = *self;
+        let mut line = vec![Complex64::default(); rows * cols];
+        let stored = line[..rows * (cols / 2 + 1)].chunks_mut(rows);
+        stored.enumerate().for_each(|(kx, column)| fill(kx, column));
+        if rows == 1 {
+            (1..cols.div_ceil(2)).for_each(|k| line[cols - k] = line[k].conj());
+            (0..=cols / 2).filter(|k| 2 * k % cols == 0).for_each(|k| line[k].im = 0.0);
+        }
+        transform.inverse_unscaled(&mut line, &mut transform.scratch());
+        let scale = 1.0 / (rows * cols) as f64;
+        line.into_iter().map(|v| v.re * scale).collect()
+    }
+}
