@@ -139,9 +139,12 @@ fn val_textures_are_tiled_shaped_and_fill_holes() {
     let head = "ncols 5\nnrows 5\nxllcorner 0\nyllcorner 0\ncellsize 0.05\nnodata_value -9999";
     write(path, "holed.asc", &format!("{head}\n{rows}\n1 1.02 -9999 1 0.99\n{rows}\n"));
     let sized = sastrugi_in(path, &["texture", "own.json", "--fill", "holed.asc", "--size", "5x5", "-o", "sized.asc"]);
-    assert!(sized.code == 2 && sized.stderr.contains("`size_m` has no place"), "{} {}", sized.code, sized.stderr);
+    assert!(sized.code == 2 && sized.stderr.contains("cannot be used with"), "{} {}", sized.code, sized.stderr);
     let filled = ok_json(path, &["texture", "own.json", "--fill", "holed.asc", "-o", "filled.asc"]);
     assert_eq!((filled["filled_cells"].as_u64(), filled["grid"]["valid"].as_u64()), (Some(1), Some(25)));
+    ok(path, &["convert", "holed.asc", "holed.npy"]);
+    let stated = ok_json(path, &["texture", "own.json", "--fill", "holed.npy", "--cell", "0.05", "-o", "stated.tif"]);
+    assert_eq!(stated["filled_cells"], 1);
 }
 
 #[test]

@@ -331,8 +331,9 @@ pub struct Texture {
     /// Raster of factors, 0 or above, by which the texture is multiplied on its base.
     #[arg(long, value_name = "RASTER")]
     pub amplitude: Option<PathBuf>,
-    /// Fill the holes of this DEM with texture that fits what is around them; makes no other texture.
-    #[arg(long, value_name = "DEM", conflicts_with_all = ["onto", "size", "cell", "tile", "phase", "method", "set"])]
+    /// Fill the holes of this DEM with texture that fits what is around them; makes no other texture. `--cell` is for a DEM that
+    /// states none.
+    #[arg(long, value_name = "DEM", conflicts_with_all = ["onto", "size", "tile", "phase", "method", "set"])]
     pub fill: Option<PathBuf>,
     /// Any other parameter of the method (see `kinds`), `name=value`.
     #[arg(long = "set", value_name = "K=V")]

@@ -13,9 +13,6 @@ use sastrugi_texture::synth::conditional;
 use serde_json::{Value, json};
 use std::path::Path;
 
-/// The one parameter that filling takes.
-const CELL: &str = "cell_m";
-
 /// What to synthesise.
 pub struct Request<'a> {
     /// Fit file.
@@ -96,14 +93,8 @@ pub fn texture(request: &Request<'_>) -> Result<Value, Error> {
 /// Fills the holes of a DEM and writes it.
 fn fill(request: &Request<'_>, path: &Path, fit: &FitFile) -> Result<Value, Error> {
     super::check_output(request.output)?;
-    // The cell is for a DEM that states none.
-    let own = request.parameters.as_object().into_iter().flatten().map(|(name, _)| name).find(|name| *name != CELL);
-    if let Some(name) = own {
-        return Err(Error::Usage(format!(
-            "`--fill` takes its cells from the DEM and its covariance from the fit; `{name}` has no place"
-        )));
-    }
-    let cell_m = request.parameters[CELL].as_f64().map(|side| [side; 2]);
+    // For a DEM that states none.
+    let cell_m = request.parameters["cell_m"].as_f64().map(|side| [side; 2]);
     let Read { dem, mut notes, .. } = read(path, &Reading { cell_m, ..Reading::default() })?;
     let streams = Streams::for_seed(request.seed, STAGE);
     let covariance = Covariance::of_fit(fit).map_err(|e| Error::Input(format!("{}: {e}", request.fit.display())))?;
