@@ -12,7 +12,7 @@
 //!
 //! Source: Journel and Huijbregts 1978, Mining Geostatistics, section VII.A; Chiles and Delfiner 2012, Geostatistics, sections
 //! 3.4 and 7.3. A self-affine covariance is made as its stationary twin over the DEM's longer side, or over as much of it as a
-//! torus of [`TWIN_CELLS`] cells has room for.
+//! torus of 2^24 cells has room for.
 //!
 //! Cost, for each filled cell: one system of at most 51 equations, and steps along the rays. Memory: a torus that is the DEM
 //! and the reach of the covariance wide, 18 bytes a cell.
