@@ -20,6 +20,11 @@ pub fn even_spectrum([rows, cols]: [usize; 2], fill: impl Fn(usize, &mut [f64]) 
         || (vec![0.0; half_cols], along_row.buffers()),
         |(line, buffers), (group, mut blocks)| {
             let mut empty = true;
+            // A line that is not there is zero: what an earlier group left would change the rounding of its partner.
+            let there = GROUP.min(half_rows - group * GROUP);
+            buffers.data[..half_cols]
+                .iter_mut()
+                .for_each(|quad| (there..GROUP).for_each(|lane| *quad.part_mut(lane) = 0.0));
             for (lane, row) in (group * GROUP..half_rows).take(GROUP).enumerate() {
                 fill(row, line);
                 empty &= line.iter().all(|v| *v == 0.0);
