@@ -89,6 +89,7 @@ fn gold_kills_change_nothing() {
 }
 
 /// glibc is told that the CPU has neither FMA nor AVX2: its mathematical functions then change bits, ours must not.
+/// Transforms and phases ask the CPU itself; that their paths agree is shown in `numeric` (`prop_vectors_change_no_bit`).
 #[test]
 fn gold_the_cpu_changes_nothing() {
     let study = sastrugi_fixtures::study("quickstart.toml");

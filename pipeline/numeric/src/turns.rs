@@ -11,7 +11,7 @@ use std::f64::consts::FRAC_PI_2;
 
 /// Sine and cosine of `2 pi turns`, for less than 2^49 turns either way.
 #[inline(always)]
-pub fn sincos(turns: f64) -> (f64, f64) {
+fn sincos(turns: f64) -> (f64, f64) {
     /// Adding it leaves no room below the ones, whose last bits are those of the whole number.
     const ROUND: f64 = 1.5 * (1u64 << 52) as f64;
     let quarters = 4.0 * turns;

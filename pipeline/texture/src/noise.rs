@@ -25,7 +25,8 @@ pub struct Noise {
 pub enum NoiseError {
     /// Too small, or full of holes.
     #[error(
-        "the noise reference holds {found} runs of three neighbouring cells with data; at least {DIFFERENCES_MIN} are needed: a larger part"
+        "the noise reference holds {found} runs of three neighbouring cells with data within the DEM (and its window); at least \
+         {DIFFERENCES_MIN} are needed: a larger part"
     )]
     TooSmall {
         /// Runs that are there.
@@ -50,11 +51,12 @@ pub fn of_reference(reference: &Grid) -> Result<Noise, NoiseError> {
         return Err(NoiseError::TooSmall { found: bends.len() });
     }
     let largest_m = reference.range().map_or(0.0, |(low, high)| low.abs().max(high.abs()));
-    let sigma_m = NORMAL_CONSISTENCY * Sizes::of(&bends).exceeded_by(0.5) / 6f64.sqrt();
     // Rounding of heights is far below this.
-    if sigma_m <= 1e-11 * largest_m.max(f64::MIN_POSITIVE) {
+    let still = bends.iter().filter(|b| b.abs() <= 1e-11 * largest_m).count();
+    if 2 * still >= bends.len() {
         return Err(NoiseError::Plane);
     }
+    let sigma_m = NORMAL_CONSISTENCY * Sizes::of(&bends).exceeded_by(0.5) / 6f64.sqrt();
     Ok(Noise { sigma_m, differences: bends.len() })
 }
 
@@ -81,6 +83,7 @@ mod tests {
     fn val_references_that_tell_nothing() {
         let plane = Grid::new(Geometry::square(20, 20, 1.0), (0..400).map(|k| 5.0 + 0.25 * (k % 20) as f64).collect());
         assert_eq!(of_reference(&plane), Err(NoiseError::Plane));
+        assert_eq!(of_reference(&plane.map(|_| 0.0)), Err(NoiseError::Plane));
         let small = Grid::new(Geometry::square(5, 5, 1.0), (0..25).map(|k| (k * k % 7) as f64).collect());
         assert_eq!(of_reference(&small), Err(NoiseError::TooSmall { found: 30 }));
         let none = small.map(|_| f64::NAN);

@@ -88,9 +88,11 @@ pub fn alike(texture: &Grid, fit: &FitFile) -> Option<Grid> {
     Some(Grid::new(texture.geometry, residual))
 }
 
-/// The settings of a fit; those of a file that does not say are the default ones.
+/// The settings of a fit; those of a file that does not say are the default ones, with its level of trimming.
 fn settings_of(fit: &FitFile) -> Option<FitSettings> {
-    let parameters: FitParameters = serde_json::from_value(fit.settings.clone()).unwrap_or_default();
+    let stated: Option<FitParameters> = serde_json::from_value(fit.settings.clone()).ok();
+    let trim = fit.trim.map_or(FitParameters::default().trim, |t| t.level);
+    let parameters = stated.unwrap_or_else(|| FitParameters { trim, ..FitParameters::default() });
     FitSettings::try_from(parameters).ok()
 }
 

@@ -210,7 +210,8 @@ fn check_purpose(entry: &Entry<'_>, item: &TextureItem, params: &Value) -> Resul
     if item.fill.is_some() && !alone {
         return Err(entry.error("fill", "`fill` goes with neither `onto`, `methods` nor a method other than `fft_ma`"));
     }
-    if let Some(name) = params.as_object().into_iter().flat_map(|p| p.keys()).find(|_| item.fill.is_some()) {
+    let keys = params.as_object().into_iter().flat_map(|p| p.keys()).chain(item.sweep.keys());
+    if let Some(name) = keys.into_iter().find(|_| item.fill.is_some()) {
         let message =
             format!("`fill` takes its cells from the DEM and its covariance from the fit; `{name}` has no place");
         return Err(entry.error(name, message));

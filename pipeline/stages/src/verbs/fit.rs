@@ -47,6 +47,7 @@ pub fn fit(request: &Request<'_>) -> Result<(FitFile, Vec<String>), Error> {
     let raw: FitParameters = read_parameters(&request.parameters)?;
     let settings = FitSettings::try_from(raw)?;
     check_noise_reference(request.reading.noise_reference.is_some(), request.minus.is_some())?;
+    check_map(request)?;
     let Fitted { outcome, notes, masked_share, noise, minus } = fitted(request, &settings)?;
     let source = Source { masked_share, minus, ..source_of(request, noise.as_ref())? };
     if let Some(path) = request.map {
@@ -57,6 +58,20 @@ pub fn fit(request: &Request<'_>) -> Result<(FitFile, Vec<String>), Error> {
     atomic::write(request.output, to_json(&fit)?.as_bytes())
         .map_err(|e| Error::failed(format!("{}: {e}", request.output.display())))?;
     Ok((fit, notes))
+}
+
+/// Refuses a map that no DEM format has, or that would replace a file of this fit.
+fn check_map(request: &Request<'_>) -> Result<(), Error> {
+    let Some(map) = request.map else { return Ok(()) };
+    super::check_output(map)?;
+    let files = [Some(request.dem), request.minus, Some(request.output)];
+    if files.contains(&Some(map)) {
+        return Err(Error::Usage(format!(
+            "{}: is a file of this fit as well; the map needs its own name",
+            map.display()
+        )));
+    }
+    Ok(())
 }
 
 struct Fitted {

@@ -52,6 +52,7 @@ use sastrugi_numeric::{Geometry, Grid, Streams};
 use sastrugi_schemas::fit::FitFile;
 use std::ops::Range;
 use survey::Survey;
+use verdicts::Windows;
 
 /// A fit and what is needed to show the rasters behind it.
 #[derive(Clone)]
@@ -140,14 +141,14 @@ fn corrected(case: &Case, naive: &Estimate, streams: &Streams) -> Result<FitFile
         (settings.bootstrap() > 0).then(|| resampling::parametric(&estimator, estimate, settings.bootstrap(), streams));
     let blocks = resampling::blocks(case, bins, settings.bootstrap() > 0)?;
     let resampled = resampling::block_replicates(&estimator, estimate, &blocks, settings.bootstrap(), streams);
-    let others = verdicts::other_windows(examined(case)?.as_ref(), settings, estimate);
+    let windows = Windows::of(examined(case)?.as_ref(), case, estimate);
     let rough = (!case.heights.are_profiles()).then(|| Estimator::rough(case, &by_direction));
     let rough_rings = directional.then(|| Estimator::rough(case, &case.bins));
     let on_rings = rough_rings.as_ref().unwrap_or(&estimator);
-    let disagreement = verdicts::window_disagreement(case, estimate, &others);
+    let disagreement = verdicts::window_disagreement(&windows);
     let findings = Findings {
         scale_explicit: verdicts::no_scale_separation(disagreement)
-            .then(|| verdicts::scale_explicit(on_rings, &estimates, &others)),
+            .then(|| verdicts::scale_explicit(on_rings, &estimates, &windows)),
         intervals: replicates
             .as_ref()
             .and_then(|r| resampling::intervals(&estimator, estimate, &r.at))
@@ -156,7 +157,7 @@ fn corrected(case: &Case, naive: &Estimate, streams: &Streams) -> Result<FitFile
         candidates: verdicts::candidates(&estimates, on_rings),
         profile: profile::profile(&estimator, estimate),
         disagreement,
-        others: others.iter().map(verdicts::window_entry).collect(),
+        others: windows.others.iter().map(verdicts::window_entry).collect(),
         isotropy: rough.as_ref().and_then(|rough| verdicts::isotropy(rough, estimate)),
         stationarity: verdicts::stationarity(&estimator, estimate, &blocks),
         misfit_p: verdicts::misfit_p(estimate, replicates.as_ref()),

@@ -221,7 +221,8 @@ impl FitSettings {
         if outer_scale_m > narrow_m / 3.0 {
             return Err(FitError::OuterScaleTooLarge { outer_scale_m, largest_m: narrow_m / 3.0 });
         }
-        if outer_scale_m < WINDOW_CELLS_MIN * cell_m {
+        // Three cells of 0.1 m are 0.30000000000000004 m.
+        if outer_scale_m < (1.0 - 1e-9) * WINDOW_CELLS_MIN * cell_m {
             return Err(FitError::OuterScaleTooSmall { outer_scale_m, cell_m, smallest_m: WINDOW_CELLS_MIN * cell_m });
         }
         let BoxWindow { half: [rows, cols] } = BoxWindow::nearest(outer_scale_m, dem.cell);

@@ -425,11 +425,12 @@ fn stat_misspecification_is_told() {
     assert!(warned("exponential", &exponential_truth(), 200, 0) <= 0.05);
 }
 
-/// The other half of it with every test that a default fit makes: 99 replicates, 100 fields.
+/// The other half of it with every test that a default fit makes: 99 replicates, 200 fields. A true share of 2 % passes with
+/// probability 0.997, one of 5 % with 0.58 (1 of 100 fields was seen).
 #[test]
 #[ignore = "slow: ./test --full"]
 fn stat_exponentials_are_not_warned_of() {
-    assert!(warned("exponential, 99 replicates", &exponential_truth(), 100, 99) <= 0.05);
+    assert!(warned("exponential, 99 replicates", &exponential_truth(), 200, 99) <= 0.05);
 }
 
 fn exponential_truth() -> Covariance {
@@ -544,4 +545,17 @@ fn val_no_scale_leads_with_scale_explicit_figures() {
     // Below twice the window there is 2^H times the height.
     let twice = found.diagnostics["other_windows"][1]["band_rms_m"].as_f64().unwrap();
     assert!((twice / figure("band_rms_m") / libm::exp2(0.8) - 1.0).abs() < 0.1);
+}
+
+/// A raster of which the middle is fitted at other windows, with a rim that is half as rough: windows are compared in the same
+/// place, and one exponential has one scale.
+#[test]
+fn val_windows_are_compared_in_one_place() {
+    let n = 1152;
+    let mut dem = field(0.15, n, CELL_M, 6);
+    // The middle of a million cells.
+    let rim = |k: usize| k < 64 || k >= n - 64;
+    (0..n * n).filter(|k| rim(k / n) || rim(k % n)).for_each(|k| dem.values[k] *= 0.5);
+    let found = fit(&dem, &with_bootstrap("exponential", 0), &streams()).unwrap().fit;
+    assert!(found.diagnostics["window_disagreement_z"].as_f64().unwrap() < 2.58, "{:?}", found.warnings);
 }

@@ -32,10 +32,28 @@ pub struct AtWindow {
     pub rms_m: f64,
 }
 
-/// Fits of the same form at half and at twice the outer scale, where the DEM allows them.
-pub fn other_windows(dem: &dyn Heights, settings: &FitSettings, estimate: &Estimate) -> Vec<AtWindow> {
-    let scales = [0.5, 2.0].map(|factor| factor * settings.outer_scale_m());
-    scales.into_iter().filter_map(|outer_scale_m| at_window(dem, settings, estimate, outer_scale_m)).collect()
+/// Fits of one form at several outer scales of one area: the fit's own, and half and twice of it where the DEM allows them.
+pub struct Windows {
+    own: AtWindow,
+    pub others: Vec<AtWindow>,
+}
+
+impl Windows {
+    /// The fits of a part of the DEM, or of all of it: then `case` and `estimate` are the own fit.
+    pub fn of(part: &dyn Heights, case: &Case, estimate: &Estimate) -> Self {
+        let (settings, scale_m) = (case.settings, case.settings.outer_scale_m());
+        let is_whole = part.geometry().len() == case.geometry.len();
+        // Places of a site differ: windows are compared on the same ones.
+        let of_part = (!is_whole).then(|| at_window(part, settings, estimate, scale_m)).flatten();
+        let own = of_part.unwrap_or_else(|| AtWindow {
+            outer_scale_m: scale_m,
+            estimate: estimate.clone(),
+            is_range_told: is_range_told(case, estimate),
+            rms_m: case.survey.trim.rms_m,
+        });
+        let others = [0.5, 2.0].into_iter().filter_map(|factor| at_window(part, settings, estimate, factor * scale_m));
+        Self { others: others.collect(), own }
+    }
 }
 
 fn at_window(dem: &dyn Heights, settings: &FitSettings, estimate: &Estimate, outer_scale_m: f64) -> Option<AtWindow> {
@@ -58,10 +76,9 @@ pub struct ScaleExplicit {
 }
 
 /// What is to be said of a surface whose fits at several windows disagree; `estimates` are the fits of this window.
-pub fn scale_explicit(estimator: &Estimator, estimates: &[Estimate], others: &[AtWindow]) -> ScaleExplicit {
-    let case = estimator.case;
-    let own = [case.settings.outer_scale_m(), case.survey.trim.rms_m];
-    let mut bands: Vec<[f64; 2]> = others.iter().map(|o| [o.outer_scale_m, o.rms_m]).chain([own]).collect();
+pub fn scale_explicit(estimator: &Estimator, estimates: &[Estimate], windows: &Windows) -> ScaleExplicit {
+    let all = windows.others.iter().chain([&windows.own]);
+    let mut bands: Vec<[f64; 2]> = all.map(|w| [w.outer_scale_m, w.rms_m]).collect();
     bands.sort_by(|a, b| a[0].total_cmp(&b[0]));
     let known = estimates.iter().find(|e| e.form.name() == SELF_AFFINE).cloned();
     let fitted = || {
@@ -74,17 +91,18 @@ pub fn scale_explicit(estimator: &Estimator, estimates: &[Estimate], others: &[A
 
 /// How far apart fits at neighbouring windows are, in standard errors: the largest over sigma and b (or the shape), and over
 /// sigma^2 / b, which the data tells where it does not tell the two (they are left out where a search for b ended at its
-/// bound). The errors are those of a model that is right: of a wrong one parameters move with the window, and that is what
-/// is to be told.
-pub fn window_disagreement(case: &Case, estimate: &Estimate, others: &[AtWindow]) -> Option<f64> {
-    let b_told = is_range_told(case, estimate);
+/// upper bound). The errors are those of a model that is right: of a wrong one parameters move with the window, and that is
+/// what is to be told.
+pub fn window_disagreement(windows: &Windows) -> Option<f64> {
+    let Windows { own, others } = windows;
     let pairs = others.iter().flat_map(|other| {
-        compared(estimate, b_told && other.is_range_told).into_iter().map(|weights| (&other.estimate, weights))
+        let b_told = own.is_range_told && other.is_range_told;
+        compared(&own.estimate, b_told).into_iter().map(|weights| (&other.estimate, weights))
     });
     let z = |(other, weights): (&Estimate, Vec<(usize, f64)>)| {
-        let apart: f64 = weights.iter().map(|(k, w)| w * (estimate.at[*k] - other.at[*k])).sum();
-        let variance = estimate.variance_of(&weights)? + other.variance_of(&weights)?;
-        Some(apart.abs() / variance.sqrt())
+        let apart: f64 = weights.iter().map(|(k, w)| w * (own.estimate.at[*k] - other.at[*k])).sum();
+        let variance = own.estimate.variance_of(&weights)? + other.variance_of(&weights)?;
+        Some(apart.abs() / variance.sqrt()).filter(|z| z.is_finite())
     };
     pairs.filter_map(z).fold(None, |largest, v| Some(largest.map_or(v, |l: f64| l.max(v))))
 }
@@ -101,7 +119,7 @@ fn compared(estimate: &Estimate, b_told: bool) -> Vec<Vec<(usize, f64)>> {
     all
 }
 
-/// False when the search for b ended at its bound.
+/// False when the search for b ended at its upper bound.
 pub fn is_range_told(case: &Case, estimate: &Estimate) -> bool {
     let Some(k) = estimate.coordinate(Role::Range(0)) else { return true };
     let (_, end) = case.coordinates(&estimate.form).bounds()[k];

@@ -67,6 +67,8 @@ pub struct Filled {
     pub cells: usize,
     /// Cells that stay without data: there is none around them.
     pub left: usize,
+    /// Range of the stationary surface that stood in for a self-affine one, m.
+    pub twin_range_m: Option<f64>,
 }
 
 impl std::fmt::Display for Filled {
@@ -74,6 +76,9 @@ impl std::fmt::Display for Filled {
         write!(f, "{} cells without data were filled", self.cells)?;
         if self.left > 0 {
             write!(f, "; {} stay without: there is no data around them", self.left)?;
+        }
+        if let Some(range_m) = self.twin_range_m {
+            write!(f, "; the self-affine fit was made as a Matern one of range {range_m} m")?;
         }
         Ok(())
     }
@@ -104,7 +109,9 @@ pub fn fill(dem: &Grid, covariance: &Covariance, streams: &Streams) -> Result<Fi
     if dem.finite_count() == 0 {
         return Err(FillError::NoData);
     }
-    let covariance = stationary(dem, covariance);
+    let twin = stationary(dem, covariance);
+    let twin_range_m = (!covariance.is_stationary()).then(|| twin.range_m());
+    let covariance = twin;
     let unconditional = unconditional(dem, &covariance, streams)?;
     let holes: Vec<usize> = (0..dem.values.len()).filter(|k| !dem.values[*k].is_finite()).collect();
     let fill_one = |k: &usize| estimate(dem, &unconditional, &covariance, [k / dem.cols(), k % dem.cols()]);
@@ -112,16 +119,18 @@ pub fn fill(dem: &Grid, covariance: &Covariance, streams: &Streams) -> Result<Fi
     let mut grid = dem.clone();
     let left = filled.iter().filter(|z| z.is_nan()).count();
     holes.iter().zip(&filled).for_each(|(k, z)| grid.values[*k] = *z);
-    Ok(Filled { grid, cells: holes.len() - left, left })
+    Ok(Filled { grid, cells: holes.len() - left, left, twin_range_m })
 }
 
 /// The covariance, or its twin with the longest range whose torus is not too large.
 fn stationary(dem: &Grid, covariance: &Covariance) -> Covariance {
     let [width_m, height_m] = dem.geometry.size();
     let [dx, dy] = dem.geometry.cell;
+    // A DEM of its own size again each way is always room.
+    let room = TWIN_CELLS.max(4.0 * dem.values.len() as f64);
     let has_room = |twin: &Covariance| {
-        let [x_m, y_m] = reach::torus_m(twin);
-        (x_m + width_m) / dx * ((y_m + height_m) / dy) <= TWIN_CELLS
+        let [across, down] = torus_px(dem, twin);
+        f64::from(across) * f64::from(down) <= room
     };
     let mut outer_m = width_m.max(height_m);
     let mut twin = covariance.stationary(outer_m);
@@ -135,13 +144,8 @@ fn stationary(dem: &Grid, covariance: &Covariance) -> Covariance {
 /// A normal field with the covariance on the cells of the DEM, from a torus so wide that its edges do not know each other.
 fn unconditional(dem: &Grid, covariance: &Covariance, streams: &Streams) -> Result<Grid, FillError> {
     let g = dem.geometry;
-    let torus_m = reach::torus_m(covariance);
-    let side = |n: usize, torus_m: f64, cell_m: f64| {
-        let torus = torus_m / cell_m;
-        smooth_length((torus.ceil() as usize).max(n + (0.5 * torus).ceil() as usize)) as u32
-    };
     let parameters = TileParameters {
-        size_px: Some([side(g.cols, torus_m[0], g.cell[0]), side(g.rows, torus_m[1], g.cell[1])]),
+        size_px: Some(torus_px(dem, covariance)),
         cell_m: Cell::Oblong(g.cell),
         ..TileParameters::default()
     };
@@ -149,6 +153,15 @@ fn unconditional(dem: &Grid, covariance: &Covariance, streams: &Streams) -> Resu
     let texture = fft_ma::texture(parameters, own, covariance.clone())?;
     let made = texture.generate(streams).map_err(|e| FillError::Field(e.to_string()))?;
     Ok(Grid { geometry: g, ..made.grid.window(0, 0, g.rows, g.cols) })
+}
+
+/// Columns and rows of a torus whose edges do not know each other across the DEM.
+fn torus_px(dem: &Grid, covariance: &Covariance) -> [u32; 2] {
+    let (g, torus_m) = (dem.geometry, reach::torus_m(covariance));
+    [(g.cols, 0), (g.rows, 1)].map(|(n, axis)| {
+        let torus = torus_m[axis] / g.cell[axis];
+        smooth_length((torus.ceil() as usize).max(n + (0.5 * torus).ceil() as usize)) as u32
+    })
 }
 
 /// Measured cells around a hole's cell, and in how many directions there are any.
