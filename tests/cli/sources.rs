@@ -217,6 +217,12 @@ fn val_bad_noise_references() {
         assert_eq!(call.code, 2, "{more}: {}", call.stderr);
         assert!(call.stderr.contains(word), "{more}: {}", call.stderr);
     }
+    let before = std::fs::read(path.join("snow.tif")).unwrap();
+    for (map, word) in [("snow.tif", "needs its own name"), ("map.xyz", "names no DEM format")] {
+        let call = sastrugi_in(path, &["fit", "snow.tif", "--outer-scale", "2", "--map", map, "-o", "fit.json"]);
+        assert!(call.code == 2 && call.stderr.contains(word), "{map}: {} {}", call.code, call.stderr);
+    }
+    assert_eq!(std::fs::read(path.join("snow.tif")).unwrap(), before);
     write(
         path,
         "tiny.geojson",
