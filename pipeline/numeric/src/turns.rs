@@ -57,7 +57,7 @@ fn cos_of_eighth(x: f64) -> f64 {
     most + ((1.0 - most - half) + z * z * (C[0] + z * (C[1] + z * (C[2] + z * (C[3] + z * (C[4] + z * C[5]))))))
 }
 
-/// [`sincos`] of each value.
+/// Sine and cosine of `2 pi turns` for each of many turns.
 ///
 /// # Panics
 /// If the slices differ in length.
