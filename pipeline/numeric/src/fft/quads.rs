@@ -6,7 +6,7 @@
 
 use super::Complex64;
 use super::butterflies::{Butterfly, Number, Radix};
-use super::stockham::{radices, twiddle};
+use super::stockham::{Pass, radices, turns};
 use super::transform::Chirp;
 use crate::simd::Vectors;
 use pulp::{Simd, WithSimd, cast};
@@ -137,26 +137,13 @@ pub(super) struct Plan {
     passes: Vec<Pass>,
 }
 
-/// A pass of `stockham.rs`, or two of radix 4 as one of radix 16.
-struct Pass {
-    radix: usize,
-    stride: usize,
-    /// The factors of the pass for each `p`; of radix 16 those of the first pass of radix 4 at `p + m n / 16`, m from 0 to 3,
-    /// then those of the second at `p`.
-    twiddles: Vec<Complex64>,
-}
-
-impl Pass {
-    fn new(radix: usize, stride: usize, left: usize) -> Self {
-        let blocks = left / radix;
-        let one = |p: usize, radix: usize, left: usize| (1..radix).map(move |k| twiddle(p * k, left));
-        let two = |p: usize| (0..4).flat_map(move |m| one(p + m * blocks, 4, left)).chain(one(p, 4, left / 4));
-        let twiddles = match radix {
-            16 => (0..blocks).flat_map(two).collect(),
-            _ => (0..blocks).flat_map(|p| one(p, radix, left)).collect(),
-        };
-        Self { radix, stride, twiddles }
-    }
+/// Two passes of radix 4 as one of radix 16: for each `p` the factors of the first at `p + m n / 16`, m from 0 to 3, then those
+/// of the second at `p`.
+fn fused(stride: usize, left: usize) -> Pass {
+    let blocks = left / 16;
+    let first = |p: usize| (0..4).flat_map(move |m| turns(4, left, p + m * blocks));
+    let twiddles = (0..blocks).flat_map(|p| first(p).chain(turns(4, left / 4, p))).collect();
+    Pass { radix: 16, stride, twiddles }
 }
 
 impl Plan {
@@ -169,7 +156,7 @@ impl Plan {
                 [4, after @ ..] => (16, after),
                 _ => (*first, others),
             };
-            passes.push(Pass::new(radix, stride, left));
+            passes.push(if radix == 16 { fused(stride, left) } else { Pass::new(radix, stride, left) });
             (left, stride, rest) = (left / radix, stride * radix, after);
         }
         Some(Self { len, passes })

@@ -24,15 +24,16 @@ pub struct Stockham {
     passes: Vec<Pass>,
 }
 
-struct Pass {
-    radix: usize,
-    stride: usize,
-    /// `exp(-2 pi i p k / n)` for `k` in `1..radix`, one such run for each `p`.
-    twiddles: Vec<Complex64>,
+/// A pass of a plan.
+pub struct Pass {
+    pub radix: usize,
+    pub stride: usize,
+    /// [`turns`] of each `p`.
+    pub twiddles: Vec<Complex64>,
 }
 
 /// `exp(-2 pi i turn / of)`.
-pub fn twiddle(turn: usize, of: usize) -> Complex64 {
+fn twiddle(turn: usize, of: usize) -> Complex64 {
     let (sin, cos) = libm::sincos(-2.0 * PI * turn as f64 / of as f64);
     Complex64::new(cos, sin)
 }
@@ -49,9 +50,14 @@ pub fn radices(len: usize) -> Option<Vec<usize>> {
     (left == 1).then_some(all)
 }
 
+/// The factors `exp(-2 pi i p k / n)` of a pass with `n = left` points left, for `k` in `1..radix`.
+pub fn turns(radix: usize, left: usize, p: usize) -> impl Iterator<Item = Complex64> {
+    (1..radix).map(move |k| twiddle(p * k, left))
+}
+
 impl Pass {
-    fn new(radix: usize, stride: usize, left: usize) -> Self {
-        let twiddles = (0..left / radix).flat_map(|p| (1..radix).map(move |k| twiddle(p * k, left))).collect();
+    pub fn new(radix: usize, stride: usize, left: usize) -> Self {
+        let twiddles = (0..left / radix).flat_map(|p| turns(radix, left, p)).collect();
         Self { radix, stride, twiddles }
     }
 }
