@@ -18,7 +18,7 @@ pub struct Part<'a> {
 
 /// What residuals and their windows are like.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Windows {
+pub struct WindowTally {
     /// Residuals whose window is not complete.
     pub partial: usize,
     /// Most data in any window.
@@ -29,7 +29,7 @@ pub struct Windows {
     pub highest_m: f64,
 }
 
-impl Windows {
+impl WindowTally {
     /// Of two parts.
     pub fn with(self, other: Self) -> Self {
         Self {
@@ -51,22 +51,23 @@ pub fn residual(heights: &[f64], cols: usize, settings: &FitSettings, window: Bo
 
 impl Part<'_> {
     /// Puts the residuals of the part into `residual`, m: NaN where a cell has no data or its window lacks data.
-    pub fn residual(&self, settings: &FitSettings, window: BoxWindow, residual: &mut Vec<f64>) -> Windows {
+    pub fn residual(&self, settings: &FitSettings, window: BoxWindow, residual: &mut Vec<f64>) -> WindowTally {
         let [rows, cols] = self.shape;
         residual.resize(rows * cols, 0.0);
         let band = band_rows(window);
         let bands = residual.par_chunks_mut((band * cols).max(1)).enumerate();
-        let windows: Vec<Windows> = bands.map(|(k, band_of)| self.band(k * band, settings, window, band_of)).collect();
-        windows.into_iter().fold(Windows::default(), Windows::with)
+        let windows: Vec<WindowTally> =
+            bands.map(|(k, band_of)| self.band(k * band, settings, window, band_of)).collect();
+        windows.into_iter().fold(WindowTally::default(), WindowTally::with)
     }
 
     /// The rows of the part from `first` on.
-    fn band(&self, first: usize, settings: &FitSettings, window: BoxWindow, residual: &mut [f64]) -> Windows {
+    fn band(&self, first: usize, settings: &FitSettings, window: BoxWindow, residual: &mut [f64]) -> WindowTally {
         let needed = settings.min_valid_share * window.area() as f64;
         let ([row, col], [_, cols]) = (self.at, self.shape);
         let mut average = RunningMean::from(self.heights, self.cols, window, row + first);
         let (mut mean, mut count) = (vec![0.0; self.cols], vec![0; self.cols]);
-        let mut windows = Windows::default();
+        let mut windows = WindowTally::default();
         for (r, line) in residual.chunks_exact_mut(cols).enumerate() {
             average.next_row(&mut mean, &mut count);
             let heights = &self.heights[(row + first + r) * self.cols + col..];

@@ -8,7 +8,7 @@
 
 use super::heights::Heights;
 use super::resampling::block_places;
-use super::residual::{Part, Windows};
+use super::residual::{Part, WindowTally};
 use super::{FitError, FitSettings, Mode};
 use crate::bitmap::Bitmap;
 use crate::covariance::masked::even_step;
@@ -288,7 +288,7 @@ impl Reading<'_> {
         rows: Range<usize>,
         cols: Range<usize>,
         Strip { heights, residual }: &mut Strip,
-    ) -> Result<Windows, FitError> {
+    ) -> Result<WindowTally, FitError> {
         let [half_rows, half_cols] = self.window.half;
         let wide_rows = self.widened(&rows, half_rows, self.geometry.rows);
         let wide_cols = self.widened(&cols, half_cols, self.geometry.cols);
@@ -304,7 +304,7 @@ impl Reading<'_> {
         let cols = self.geometry.cols;
         let mut used = Bitmap::with_capacity(self.geometry.len());
         let (mut sizes, mut moments) = (Sizes::new(), Moments::default());
-        let (mut windows, mut at_work) = (Windows::default(), Strip::default());
+        let (mut windows, mut at_work) = (WindowTally::default(), Strip::default());
         for strip in self.strips() {
             windows = windows.with(self.residual(trusted, strip, 0..cols, &mut at_work)?);
             let residual = &at_work.residual;
