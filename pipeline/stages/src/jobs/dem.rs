@@ -101,7 +101,7 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
         let id = item.id.clone();
         let original = Original::of(&format!("dem/{id}"), &builder.study.folder, &item.file)?;
         let claimed = dem::claimed(&builder.study.folder.join(&item.file), &ReadOptions { cell_m: item.cell_m });
-        // Other formats have two bytes or more for a cell.
+        // Other formats have a byte or more for a cell.
         let claimed = claimed.unwrap_or(Claimed { cells: original.bytes(), points: 0, cell_m: None });
         let key = entry.path_of("file");
         builder.inputs.push(InputPlace { key, release_path: original.release_path().to_owned() });

@@ -258,7 +258,7 @@ pub struct Claimed {
     pub cell_m: Option<f64>,
 }
 
-/// The claims of a GeoTIFF, LAS or LAZ file; `None` for other formats, whose files have two bytes or more for a cell, and
+/// The claims of a GeoTIFF, PNG, LAS or LAZ file; `None` for other formats, whose files have a byte or more for a cell, and
 /// for files that cannot be read.
 pub fn claimed(path: &Path, options: &ReadOptions) -> Option<Claimed> {
     let mut file = File::open(path).ok()?;
@@ -267,7 +267,11 @@ pub fn claimed(path: &Path, options: &ReadOptions) -> Option<Claimed> {
     if points::looks_like(&first) {
         return points::claimed(file, options.cell_m.map(|[x, y]| x.min(y)));
     }
-    geotiff::looks_like(&first).then(|| geotiff::claimed(path, options)).flatten()
+    match first.as_slice() {
+        bytes if geotiff::looks_like(bytes) => geotiff::claimed(path, options),
+        [0x89, b'P', b'N', b'G'] => png::claimed(file, options),
+        _ => None,
+    }
 }
 
 fn square_cell(path: &Path, options: &ReadOptions) -> Result<Option<f64>, DemError> {

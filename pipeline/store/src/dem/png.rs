@@ -1,8 +1,9 @@
 //! Greyscale PNG: heights as 16-bit levels, for game engines and image programs.
 
-use super::{Crs, Dem, DemError, DemInfo, Format, ReadOptions, Refusal, cell_count, geotiff, save};
+use super::{Claimed, Crs, Dem, DemError, DemInfo, Format, MAX_CELLS, ReadOptions, Refusal, cell_count, geotiff, save};
 use sastrugi_numeric::Grid;
-use std::io::Cursor;
+use std::fs::File;
+use std::io::{Cursor, Read};
 use std::path::Path;
 
 /// Keyword of the text that tells how to turn levels into heights.
@@ -43,6 +44,16 @@ impl HeightScale {
         let scale = Self { offset_m: offset.parse().ok()?, step_m: step.parse().ok()? };
         (scale.offset_m.is_finite() && scale.step_m.is_finite()).then_some(scale)
     }
+}
+
+/// What the header says, from after the first four bytes of the file: the rest of the signature, the length and the name of
+/// the first chunk, width, height.
+pub(super) fn claimed(mut file: File, options: &ReadOptions) -> Option<Claimed> {
+    let mut header = [0; 20];
+    file.read_exact(&mut header).ok()?;
+    let side = |at: usize| Some(u64::from(u32::from_be_bytes(header.get(at..at + 4)?.try_into().ok()?)));
+    let cells = side(12)?.saturating_mul(side(16)?).min(MAX_CELLS);
+    Some(Claimed { cells, points: 0, cell_m: options.cell_m.map(|[x, y]| x.min(y)) })
 }
 
 /// Writes levels as they are.

@@ -325,10 +325,17 @@ fn val_claims() {
     };
     let cell_m = Some(grid.geometry.cell[0].min(grid.geometry.cell[1]));
     assert_eq!(claim("a.tif", &ReadOptions::default()), Some(Claimed { cells: 60 * 27, points: 0, cell_m }));
+    let unsized_png = Some(Claimed { cells: 60 * 27, points: 0, cell_m: None });
+    assert_eq!(claim("a.png", &ReadOptions::default()), unsized_png);
+    std::fs::write(folder.path().join("stub.png"), b"\x89PNG\r\n").unwrap();
+    assert_eq!(claimed(&folder.path().join("stub.png"), &ReadOptions::default()), None);
     assert_eq!(claim("a.npy", &ReadOptions::default()), None);
     assert_eq!(claimed(&folder.path().join("none.tif"), &ReadOptions::default()), None);
-    if let Some(cloud) = data("akl_lidar.laz") {
-        assert!(claimed(&cloud, &ReadOptions::default()).is_some_and(|c| c.points > 0 && c.cells > 0));
+    if let Some(cloud) = data("pozo_blanca.laz") {
+        let claims = claimed(&cloud, &ReadOptions { cell_m: Some([0.5; 2]) }).unwrap();
+        // 271 m x 280 m (../shared/data/INDEX.md).
+        assert_eq!(claims.points, 574_092);
+        assert!((541 * 559..545 * 563).contains(&claims.cells), "{claims:?}");
     }
 }
 
