@@ -33,6 +33,9 @@ pub struct StudyHead {
     /// Flavour of the MCAP files.
     #[serde(default)]
     pub mcap: McapFlavour,
+    /// Whether groups share their random draws.
+    #[serde(default)]
+    pub pairing: Pairing,
 }
 
 fn default_license() -> String {
@@ -50,6 +53,19 @@ pub enum McapFlavour {
     /// Foxglove protobuf, for viewers.
     #[default]
     Viewer,
+}
+
+/// Whether terrains of different groups share their random draws.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Pairing {
+    /// Every terrain and every mission is drawn by itself.
+    #[default]
+    Independent,
+    /// The k-th replicates of all terrains draw from one stream, so that they differ by their parameters alone, and their
+    /// missions lead from the same starts to the same goals: a start has low roughness, a goal low or semi roughness, on
+    /// every one of them.
+    Common,
 }
 
 /// `[[dem]]`: a measured DEM.
@@ -280,6 +296,9 @@ pub struct TraverseItem {
     pub id: String,
     /// Id of the missions to drive.
     pub missions: String,
+    /// One run per value of a parameter: `sweep.<parameter> = [...]`.
+    #[serde(default)]
+    pub sweep: BTreeMap<String, Vec<serde_json::Value>>,
 }
 
 /// `[roughness]`: how every heightfield is classified and described.

@@ -11,6 +11,12 @@ super::table! {
         }
         /// Label of the terrain.
         group: Option<String> [""],
+        /// What differs from the study's plain run: the swept parameters of terrain and traverse, as `surface.wheel_friction
+        /// = 0.7`; null for the plain run.
+        variant: Option<String> [""],
+        /// Missions with the same `pair_id` lead from the same start to the same goal, on one terrain or (with `pairing =
+        /// "common"`) on terrains that share their random draws.
+        pair_id: String [""],
         /// Id of the traverse stage.
         traverse_id: String [""],
         /// Vehicle.
@@ -33,6 +39,9 @@ super::table! {
         time_s: f64 ["s"],
         /// Length of the path driven, in plan, from the recorded samples.
         path_length_m: f64 ["m"],
+        /// Distance along the mission's line from start to outcome: the largest that a sample reached, at most the line's
+        /// length.
+        progress_m: f64 ["m"],
         /// Straight distance from the first to the last sample over path length; null unless successful.
         efficiency: f64 ["1"],
         /// Root mean square of the vertical acceleration, from the recorded heights differentiated twice.
@@ -49,6 +58,21 @@ super::table! {
         max_pitch_deg: f64 ["deg"],
         /// Largest absolute roll.
         max_roll_deg: f64 ["deg"],
+        /// Share of the mission's line over cells of low roughness (class map before closing).
+        line_share_low: f64 ["1"],
+        /// Share of the mission's line over cells of semi roughness.
+        line_share_semi: f64 ["1"],
+        /// Share of the mission's line over cells of high roughness.
+        line_share_high: f64 ["1"],
+        /// Largest gradient of the bilinear surface under the mission's line.
+        line_max_slope: f64 ["1"],
+        /// Standard deviation of the heights along the mission's line after a centred moving average over the vehicle's
+        /// wheelbase is removed.
+        line_band_rms_m: f64 ["m"],
+        /// Starts driven of this mission: the drawn one, which all other columns describe, and perturbed ones.
+        replicates: i64 ["1"],
+        /// Share of those starts from which the goal was reached.
+        success_probability: f64 ["1"],
         /// Recorded samples.
         samples: i64 ["1"],
         /// Rate of the recorded samples.

@@ -11,6 +11,7 @@ pub mod likelihood_profile;
 pub mod missions;
 pub mod profile_psd;
 pub mod psd;
+pub mod replicates;
 pub mod samples;
 pub mod scoreboard;
 pub mod structure;
@@ -26,6 +27,7 @@ pub use likelihood_profile::LikelihoodProfileRow;
 pub use missions::MissionRow;
 pub use profile_psd::ProfilePsdRow;
 pub use psd::PsdRow;
+pub use replicates::ReplicateRow;
 pub use samples::SampleRow;
 pub use scoreboard::{ScoreCovarianceRow, ScoreRow};
 pub use structure::StructureRow;
@@ -75,7 +77,7 @@ pub struct Table {
 }
 
 /// All tables, in the order of the report and of `schema`.
-pub const ALL: [&Table; 15] = [
+pub const ALL: [&Table; 16] = [
     &TerrainRow::TABLE,
     &SurfaceRow::TABLE,
     &FitRow::TABLE,
@@ -90,6 +92,7 @@ pub const ALL: [&Table; 15] = [
     &ScoreRow::TABLE,
     &ScoreCovarianceRow::TABLE,
     &MissionRow::TABLE,
+    &ReplicateRow::TABLE,
     &SampleRow::TABLE,
 ];
 

@@ -9,6 +9,9 @@ super::table! {
         }
         /// Label for statistics.
         group: Option<String> [""],
+        /// What differs from other terrains of the group: the swept parameters, as `z_scale_percent = 1.0`; null for plain
+        /// terrains.
+        variant: Option<String> [""],
         /// `terrain`, `dem` or `texture`: the stage that made it.
         stage: String [""],
         /// Generator, or the file format of a measured DEM.

@@ -1,9 +1,8 @@
 //! A recorded mission as rows of the tables `missions` and `samples`.
 
 use super::{Differentiator, EulerAngles, Metrics};
-use crate::missions::Mission;
+use crate::missions::{Difficulty, Mission, class_at};
 use sastrugi_numeric::Grid;
-use sastrugi_schemas::RoughnessClass;
 use sastrugi_schemas::tables::{MissionRow, SampleRow};
 use sastrugi_schemas::topics::{CommandSample, EventKind, Recording, StateSample};
 
@@ -14,6 +13,10 @@ pub struct MissionLabels {
     pub terrain_id: String,
     /// Label of the terrain.
     pub group: Option<String>,
+    /// What differs from the study's plain run.
+    pub variant: Option<String>,
+    /// Name of the start and goal, shared by missions that can be compared one by one.
+    pub pair_id: String,
     /// Id of the traverse stage.
     pub traverse_id: String,
     /// MCAP recording in the release.
@@ -24,6 +27,7 @@ pub struct MissionLabels {
 pub fn mission_row(
     labels: &MissionLabels,
     mission: &Mission,
+    difficulty: &Difficulty,
     recording: &Recording,
     differentiator: Differentiator,
 ) -> MissionRow {
@@ -34,6 +38,8 @@ pub fn mission_row(
         terrain_id: labels.terrain_id.clone(),
         mission_id: mission.id(),
         group: labels.group.clone(),
+        variant: labels.variant.clone(),
+        pair_id: labels.pair_id.clone(),
         traverse_id: labels.traverse_id.clone(),
         vehicle: recording.vehicle.name.clone(),
         start_x_m: mission.start_m[0],
@@ -45,6 +51,7 @@ pub fn mission_row(
         outcome: outcome.map_or("", |event| event.kind.name()).to_owned(),
         time_s: outcome.map_or(f64::NAN, |event| event.time_s),
         path_length_m: metrics.path_length_m,
+        progress_m: progress_m(mission, recording),
         efficiency: if success { metrics.efficiency } else { f64::NAN },
         rms_vertical_acceleration_m_s2: metrics.rms_vertical_acceleration_m_s2,
         rms_pitch_rate_deg_s: metrics.rms_pitch_rate_rad_s.to_degrees(),
@@ -53,10 +60,23 @@ pub fn mission_row(
         rms_body_roll_rate_deg_s: metrics.rms_body_roll_rate_rad_s.to_degrees(),
         max_pitch_deg: metrics.max_pitch_rad.to_degrees(),
         max_roll_deg: metrics.max_roll_rad.to_degrees(),
+        line_share_low: difficulty.shares[0],
+        line_share_semi: difficulty.shares[1],
+        line_share_high: difficulty.shares[2],
+        line_max_slope: difficulty.max_slope,
+        line_band_rms_m: difficulty.band_rms_m,
+        replicates: 1,
+        success_probability: f64::from(u8::from(success)),
         samples: recording.states.len() as i64,
         sample_rate_hz: recording.sample_rate_hz,
         path: labels.path.clone(),
     }
+}
+
+/// The farthest that a sample came along the mission's line, at most its length, m.
+pub fn progress_m(mission: &Mission, recording: &Recording) -> f64 {
+    let along = recording.states.iter().map(|s| mission.along_m([s.position_m[0], s.position_m[1]]));
+    along.fold(0.0, f64::max).min(mission.length_m())
 }
 
 /// The rows of a mission's samples; `classes` (codes of [`RoughnessClass`]) tells the class under base_link.
@@ -64,15 +84,10 @@ pub fn sample_rows(terrain_id: &str, mission: &Mission, recording: &Recording, c
     let mission_id = mission.id();
     let commands = recording.commands.iter().map(Some).chain(std::iter::repeat(None));
     let row = |(sample, (state, command)): (usize, (&StateSample, Option<&CommandSample>))| {
-        let class = class_at(classes, state.position_m);
+        let class = class_at(classes, state.position_m[0], state.position_m[1]).map(|class| class as i64);
         sample_row(terrain_id, &mission_id, sample as i64, state, command, class)
     };
     recording.states.iter().zip(commands).enumerate().map(row).collect()
-}
-
-fn class_at(classes: &Grid<u8>, [x, y, _]: [f64; 3]) -> Option<i64> {
-    let (row, col) = classes.geometry.cell_at(x, y)?;
-    RoughnessClass::from_code(classes.at(row, col)).map(|class| class as i64)
 }
 
 fn sample_row(

@@ -10,10 +10,13 @@
 //!
 //! Cost: one pass over the map and a few draws per mission; memory: four bytes per eligible cell.
 
+mod difficulty;
 mod params;
 #[cfg(test)]
 mod tests;
 
+pub use difficulty::Difficulty;
+pub(crate) use difficulty::class_at;
 pub use params::{MissionParameters, MissionSettings};
 
 use sastrugi_numeric::{Geometry, Grid, Stream, Streams};
@@ -50,6 +53,12 @@ impl Mission {
     /// Distance from start to goal, m.
     pub fn length_m(&self) -> f64 {
         distance(self.start_m, self.goal_m)
+    }
+
+    /// Distance of a point along the line from the start, m; negative behind it.
+    pub fn along_m(&self, [x, y]: [f64; 2]) -> f64 {
+        let [dx, dy] = [0, 1].map(|axis| self.goal_m[axis] - self.start_m[axis]);
+        ((x - self.start_m[0]) * dx + (y - self.start_m[1]) * dy) / self.length_m()
     }
 }
 

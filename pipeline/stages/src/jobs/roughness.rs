@@ -40,6 +40,7 @@ impl RoughnessJob {
         TerrainRow {
             terrain_id: self.id.clone(),
             group: self.field.group.clone(),
+            variant: None,
             stage: self.field.item.stage.clone(),
             kind: self.field.kind.clone(),
             params: self.field.parameters.to_string(),

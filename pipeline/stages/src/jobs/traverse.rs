@@ -7,7 +7,7 @@ use crate::revision::Room;
 use crate::runner::graph::Node;
 use rayon::prelude::*;
 use sastrugi_mobility::metrics::{MissionLabels, mission_row, sample_rows};
-use sastrugi_mobility::missions::Mission;
+use sastrugi_mobility::missions::{Difficulty, Mission};
 use sastrugi_mobility::vehicle::{Ground, TraverseParameters, TraverseSettings, Vehicle, drive};
 use sastrugi_numeric::Grid;
 use sastrugi_schemas::Kind;
@@ -132,11 +132,14 @@ impl TraverseJob {
         let labels = MissionLabels {
             terrain_id: self.terrain.clone(),
             group: self.group.clone(),
+            variant: None,
+            pair_id: format!("{}-{:04}", self.missions.id, mission.index + 1),
             traverse_id: self.traverse.clone(),
             path: release_path.clone(),
         };
         let differentiator = self.settings.parameters().differentiator;
-        let mut row = mission_row(&labels, mission, &recording, differentiator);
+        let difficulty = Difficulty::along(&site.heights, &site.classes, mission, self.vehicle.wheelbase_m());
+        let mut row = mission_row(&labels, mission, &difficulty, &recording, differentiator);
         row.mission_id.clone_from(&id);
         let mut samples = sample_rows(&self.terrain, mission, &recording, &site.classes);
         samples.iter_mut().for_each(|s| s.mission_id.clone_from(&id));
