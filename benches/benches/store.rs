@@ -69,10 +69,16 @@ fn recording(dem: &Grid) -> Recording {
             lateral_force_n,
             slip_ratio,
             contact_m,
+            steering_rad: 0.0,
+            hub_m: [0.25, 0.28, 0.03],
         }
     };
     let wheels = times(20)
-        .map(|time_s| WheelSample { time_s, wheels: (0..4).map(|_| wheel(position(time_s))).collect() })
+        .map(|time_s| WheelSample {
+            time_s,
+            wheels: (0..4).map(|_| wheel(position(time_s))).collect(),
+            chassis_force_n: 0.0,
+        })
         .collect();
     let command = |time_s| CommandSample {
         time_s,

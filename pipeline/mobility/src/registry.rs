@@ -1,6 +1,8 @@
 //! The list of vehicles.
 
-use crate::vehicle::{HUSKY_A200, Vehicle, VehicleParameters};
+use crate::vehicle::{
+    HUSKY_A200, MATERIALS, Material, ROCKER_BOGIE_ROVER, SurfaceParameters, UGV_4X4, Vehicle, VehicleParameters,
+};
 use sastrugi_schemas::kind::{read_parameters, schema_of};
 use sastrugi_schemas::{Kind, ParameterError};
 use serde_json::{Map, Value};
@@ -14,16 +16,38 @@ struct Entry {
     data: &'static str,
 }
 
-const ENTRIES: [Entry; 1] = [Entry {
-    kind: "husky_a200",
-    summary: "Clearpath Husky A200: four driven wheels without suspension, steered by skidding",
-    source: "public husky_description URDF and husky_control control.yaml (Clearpath Robotics); Majhor and Bos, section 2",
-    data: HUSKY_A200,
-}];
+const ENTRIES: [Entry; 3] = [
+    Entry {
+        kind: "husky_a200",
+        summary: "Clearpath Husky A200: four driven wheels without suspension, steered by skidding",
+        source: "public husky_description URDF and husky_control control.yaml (Clearpath Robotics); Majhor and Bos, section 2",
+        data: HUSKY_A200,
+    },
+    Entry {
+        kind: "ugv_4x4",
+        summary: "generic car-sized 4x4: wheel motors, independent suspension, front wheels steered",
+        source: "round numbers of the class, each marked as assumed or computed",
+        data: UGV_4X4,
+    },
+    Entry {
+        kind: "rocker_bogie_rover",
+        summary: "generic six-wheel rover: rocker-bogie suspension, wheel motors, corner wheels steered",
+        source: "Lindemann and Voorhees (2005) for wheels and wheelbase; the rest assumed or computed, as marked",
+        data: ROCKER_BOGIE_ROVER,
+    },
+];
 
-/// Every vehicle, with the JSON Schema of its parameters, their values and sources.
+/// Every vehicle and every surface preset, with the JSON Schema of its parameters, their values and sources.
 pub fn kinds() -> Vec<Kind> {
-    ENTRIES.iter().map(Entry::describe).collect()
+    ENTRIES.iter().map(Entry::describe).chain(MATERIALS.iter().map(surface)).collect()
+}
+
+fn surface(material: &Material) -> Kind {
+    let mut parameters = schema_of::<SurfaceParameters>();
+    if let (Value::Object(schema), Ok(friction)) = (&mut parameters, serde_json::to_value(material.friction)) {
+        schema.insert("default".to_owned(), friction);
+    }
+    Kind { family: "surface", kind: material.name, summary: material.summary, source: material.source, parameters }
 }
 
 /// The vehicle `kind` with `changes`: those of its parameters that differ from the data file, nested as there.
@@ -69,6 +93,7 @@ fn from_toml(item: &Item) -> Value {
         }
         Item::Value(toml_edit::Value::Float(number)) => Value::from(*number.value()),
         Item::Value(toml_edit::Value::Integer(number)) => Value::from(*number.value()),
+        Item::Value(toml_edit::Value::Boolean(yes)) => Value::from(*yes.value()),
         Item::Value(toml_edit::Value::String(word)) => Value::from(word.value().as_str()),
         _ => Value::Null,
     }

@@ -43,7 +43,7 @@ pub struct VehicleOutline {
 pub struct WheelOutline {
     /// Frame name, as `front_left_wheel`.
     pub name: String,
-    /// Hub in base_link, m.
+    /// Hub in base_link with all joints of the suspension at zero, m.
     pub hub_m: [f64; 3],
     /// Radius, m.
     pub radius_m: f64,
@@ -86,6 +86,8 @@ pub struct WheelSample {
     pub time_s: f64,
     /// Wheels in the order of [`VehicleOutline::wheels`].
     pub wheels: Vec<WheelState>,
+    /// Size of the force of the ground on the chassis, N.
+    pub chassis_force_n: f64,
 }
 
 /// One wheel at one instant.
@@ -107,6 +109,10 @@ pub struct WheelState {
     pub slip_ratio: f64,
     /// Contact point in the map frame, m; meaningless without contact.
     pub contact_m: [f64; 3],
+    /// Steering angle about the body's z axis, rad (left positive).
+    pub steering_rad: f64,
+    /// Hub in base_link, m: where the suspension has it.
+    pub hub_m: [f64; 3],
 }
 
 /// Command and controller state.

@@ -1,13 +1,13 @@
 //! Topic `/wheels`.
 
-use super::FieldKind::{Doubles, Floats, Texts};
+use super::FieldKind::{Doubles, Float, Floats, Texts};
 use super::{Topic, field};
 
 /// The topic.
 pub const TOPIC: Topic = Topic {
     name: "/wheels",
     schema: "sastrugi.Wheels",
-    description: "all wheels at one instant, at the sampling rate; every field has one value per wheel; angles, spins and \
+    description: "all wheels at one instant, at the sampling rate; a field has one value per wheel unless it says otherwise; angles, spins and \
                   ratios in steps of 1/4096, torques of 1/512 N m, forces of 1/32 N",
     fields: &[
         field("wheel", Texts, "", "name of the wheel and of its frame"),
@@ -21,5 +21,7 @@ pub const TOPIC: Topic = Topic {
         field("contact_x_m", Doubles, "m", "contact point in the map frame, east, to 0.1 mm; 0 without contact"),
         field("contact_y_m", Doubles, "m", "contact point in the map frame, north, to 0.1 mm; 0 without contact"),
         field("contact_z_m", Doubles, "m", "contact point in the map frame, up, to 0.1 mm; 0 without contact"),
+        field("steering_rad", Floats, "rad", "steering angle, left positive"),
+        field("chassis_force_n", Float, "N", "size of the force of the ground on the chassis; one value"),
     ],
 };

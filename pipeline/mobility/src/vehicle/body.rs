@@ -6,9 +6,9 @@ use super::vector::{Axes, Quaternion, Vec3, add, add_scaled, cross, scale, sub, 
 /// State of the chassis. Map frame unless said otherwise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Body {
-    /// Centre of mass, m.
+    /// Reference point, m: the centre of mass of the vehicle with all joints at zero.
     pub position: Vec3,
-    /// Of the centre of mass, m/s.
+    /// Of the reference point, m/s.
     pub velocity: Vec3,
     /// Map from body.
     pub orientation: Quaternion,
@@ -26,6 +26,11 @@ impl Body {
         let momentum: Vec3 = std::array::from_fn(|i| inertia[i] * self.rate[i]);
         let torque = sub(axes.to_body(moment), cross(self.rate, momentum));
         self.rate = std::array::from_fn(|i| self.rate[i] + step_s * torque[i] / inertia[i]);
+        self.advance(step_s);
+    }
+
+    /// Moves on for a step with the present velocities.
+    pub(crate) fn advance(&mut self, step_s: f64) {
         self.position = add_scaled(self.position, self.velocity, step_s);
         self.orientation = turned(self.orientation, scale(self.rate, step_s));
     }

@@ -3,10 +3,11 @@
 //! The look-ahead point lies on the line, `lookahead` beyond the foot of the vehicle, and not beyond the goal. With `a`
 //! the bearing of that point relative to the vehicle and `d` its distance, the arc through it asks for the yaw rate
 //! `gain * speed * 2 sin a / d`. When the point falls behind the vehicle (`|a|` above `turn_start`) the vehicle turns on
-//! the spot, always in the direction in which it began, until `|a|` is below `turn_stop`. Speed and yaw rate change no
+//! the spot, or on its smallest circle where it cannot, always in the direction in which it began, until `|a|` is below
+//! `turn_stop`. Speed and yaw rate change no
 //! faster than the vehicle's limits allow.
 
-use super::params::SkidSteerParameters;
+use super::actuation::Limits;
 use super::settings::TraverseSettings;
 use crate::missions::Mission;
 use std::f64::consts::{PI, TAU};
@@ -60,7 +61,7 @@ impl Controller {
         let from_start = [pose.x - self.start[0], pose.y - self.start[1]];
         let [cos, sin] = self.direction;
         let along = from_start[0] * cos + from_start[1] * sin;
-        let ahead = (along + settings.controller().lookahead_m).min(self.length);
+        let ahead = (along + settings.lookahead_m()).min(self.length);
         let target = [self.start[0] + ahead * cos - pose.x, self.start[1] + ahead * sin - pose.y];
         self.command.cross_track_m = from_start[1] * cos - from_start[0] * sin;
         self.command.heading_error_rad = wrapped(libm::atan2(target[1], target[0]) - pose.yaw);
@@ -74,21 +75,15 @@ impl Controller {
     }
 
     /// Looks at the pose and sets the commands for the coming `period_s`.
-    pub(crate) fn update(
-        &mut self,
-        pose: PlanPose,
-        settings: &TraverseSettings,
-        limits: &SkidSteerParameters,
-        period_s: f64,
-    ) {
+    pub(crate) fn update(&mut self, pose: PlanPose, settings: &TraverseSettings, limits: &Limits, period_s: f64) {
         let distance = self.observe(pose, settings);
         self.switch(settings);
-        let (speed, yaw_rate) = self.wanted(distance, settings);
-        let yaw_limit = limits.yaw_rate_limit_rad_s;
-        let (yaw_rate, speed) = (yaw_rate.clamp(-yaw_limit, yaw_limit), speed.min(limits.speed_limit_m_s));
-        let yaw_step = limits.yaw_acceleration_limit_rad_s2 * period_s;
+        let (speed, yaw_rate) = self.wanted(distance, settings, limits);
+        let yaw_limit = limits.yaw_rate_rad_s;
+        let (yaw_rate, speed) = (yaw_rate.clamp(-yaw_limit, yaw_limit), speed.min(limits.speed_m_s));
+        let yaw_step = limits.yaw_acceleration_rad_s2 * period_s;
         let command = &mut self.command;
-        command.speed_m_s = towards(command.speed_m_s, speed, limits.acceleration_limit_m_s2 * period_s);
+        command.speed_m_s = towards(command.speed_m_s, speed, limits.acceleration_m_s2 * period_s);
         command.yaw_rate_rad_s = towards(command.yaw_rate_rad_s, yaw_rate, yaw_step);
     }
 
@@ -102,14 +97,20 @@ impl Controller {
         }
     }
 
-    /// Speed and yaw rate before limits.
-    fn wanted(&self, distance_m: f64, settings: &TraverseSettings) -> (f64, f64) {
+    /// Speed and yaw rate before the vehicle's limits of speed and acceleration.
+    fn wanted(&self, distance_m: f64, settings: &TraverseSettings, limits: &Limits) -> (f64, f64) {
         let controller = settings.controller();
-        if self.turning != 0.0 {
+        let speed = settings.speed_m_s().min(limits.speed_m_s);
+        if self.turning != 0.0 && limits.turn_radius_m == 0.0 {
             return (0.0, self.turning * controller.turn_rate_rad_s);
         }
-        let curvature = 2.0 * libm::sin(self.command.heading_error_rad) / distance_m.max(DISTANCE_MIN_M);
-        (settings.speed_m_s(), controller.steering_gain * settings.speed_m_s() * curvature)
+        let tightest = 1.0 / limits.turn_radius_m;
+        if self.turning != 0.0 {
+            return (speed, self.turning * speed * tightest);
+        }
+        let arc = 2.0 * libm::sin(self.command.heading_error_rad) / distance_m.max(DISTANCE_MIN_M);
+        let curvature = (controller.steering_gain * arc).clamp(-tightest, tightest);
+        (speed, speed * curvature)
     }
 }
 

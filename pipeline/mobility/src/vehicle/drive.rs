@@ -11,7 +11,7 @@
 //!
 //! At rest nothing is forgotten, so that a parked or hung vehicle does not creep (true stiction).
 //!
-//! *Spin* of a side: `W'` solves the implicit Euler step
+//! *Spin* of a motor channel (the wheels of a side, or one wheel): `W'` solves the implicit Euler step
 //!
 //! ```text
 //! J (W' - W) / h = torque(W') - r sum F_x(W') - rolling(W')
@@ -20,6 +20,8 @@
 //!
 //! All terms on the right fall with `W'`, so there is one root; Newton's method inside a bracket finds it, normally in two
 //! or three steps. `w_y` is the body's rate about the axle: motor and encoder turn with the chassis.
+
+use super::surface::Friction;
 
 /// Below this spin rolling resistance fades to 0, rad/s.
 const ROLLING_SPIN_RAD_S: f64 = 0.05;
@@ -37,19 +39,7 @@ pub(crate) struct Tread {
     /// N s/m.
     pub damping: f64,
     pub relaxation_length_m: f64,
-    /// Friction coefficient.
-    pub friction: f64,
-    /// Rolling resistance over normal force.
-    pub rolling_resistance: f64,
     pub step_s: f64,
-}
-
-impl Tread {
-    /// Couple that rolling resistance puts on a wheel, N m.
-    #[inline(always)]
-    pub(crate) fn rolling_n_m(&self, normal_n: f64, spin: f64) -> f64 {
-        -self.rolling_resistance * self.radius_m * normal_n * (spin / ROLLING_SPIN_RAD_S).clamp(-1.0, 1.0)
-    }
 }
 
 /// Friction of one wheel over a time step, as a function of its spin at the end.
@@ -61,6 +51,8 @@ pub(crate) struct Grip {
     slope: f64,
     /// Radius of the friction circle, N.
     limit_n: f64,
+    /// Largest couple of rolling resistance, N m.
+    rolling_limit_n_m: f64,
     /// Normal force, N.
     pub normal_n: f64,
     /// Velocity of the contact point of the wheel without spin, forward and left, m/s.
@@ -68,18 +60,32 @@ pub(crate) struct Grip {
 }
 
 impl Grip {
-    /// From the bristle's `deflection` and the side's `spin` at the start of the step.
-    pub(crate) fn new(tread: &Tread, normal_n: f64, deflection: [f64; 2], velocity: [f64; 2], spin: f64) -> Self {
+    /// From the bristle's `deflection` and the wheel's `spin` at the start of the step, on ground with that friction.
+    pub(crate) fn new(
+        tread: &Tread,
+        ground: Friction,
+        normal_n: f64,
+        deflection: [f64; 2],
+        velocity: [f64; 2],
+        spin: f64,
+    ) -> Self {
         let kept = 1.0 / (1.0 + tread.step_s * (tread.radius_m * spin).abs() / tread.relaxation_length_m);
         let elastic = tread.stiffness * kept;
         let viscous = elastic * tread.step_s + tread.damping;
         Self {
             free_n: [0, 1].map(|i| -elastic * deflection[i] - viscous * velocity[i]),
             slope: viscous * tread.radius_m,
-            limit_n: tread.friction * normal_n,
+            limit_n: ground.wheel * normal_n,
+            rolling_limit_n_m: ground.rolling * tread.radius_m * normal_n,
             normal_n,
             velocity,
         }
+    }
+
+    /// Couple that rolling resistance puts on the wheel, N m.
+    #[inline(always)]
+    pub(crate) fn rolling_n_m(&self, spin: f64) -> f64 {
+        -self.rolling_limit_n_m * (spin / ROLLING_SPIN_RAD_S).clamp(-1.0, 1.0)
     }
 
     /// Forward and left force at a spin, and the derivative of the forward force, N and N s/rad.
@@ -129,18 +135,18 @@ impl Servo {
     }
 }
 
-/// The wheels of one side over a time step.
-pub(crate) struct Side<'a> {
+/// The wheels of one motor channel over a time step.
+pub(crate) struct Channel<'a> {
     pub tread: &'a Tread,
     pub servo: Servo,
-    /// Moment of inertia of all wheels of the side over the time step, kg m2/s.
+    /// Moment of inertia of all wheels of the channel over the time step, kg m2/s.
     pub inertia_over_step: f64,
-    /// Body rate about the axle, rad/s.
-    pub chassis_spin: f64,
+    /// Rate of the motor's mount about the axle, rad/s.
+    pub mount_spin: f64,
 }
 
-impl Side<'_> {
-    /// Spin at the end of the step, rad/s, given the wheels of the side that touch the ground.
+impl Channel<'_> {
+    /// Spin at the end of the step, rad/s, given the wheels of the channel that touch the ground.
     pub(crate) fn solve<'g>(&self, start: f64, grips: impl Iterator<Item = &'g Grip> + Clone) -> f64 {
         let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
         let mut spin = start;
@@ -162,20 +168,20 @@ impl Side<'_> {
         spin
     }
 
-    /// Momentum balance of the side, N m, and its derivative by the spin.
+    /// Momentum balance of the channel, N m, and its derivative by the spin.
     #[inline(always)]
     fn residual<'g>(&self, spin: f64, start: f64, grips: impl Iterator<Item = &'g Grip>) -> (f64, f64) {
-        let torque = self.servo.torque(spin - self.chassis_spin);
+        let torque = self.servo.torque(spin - self.mount_spin);
         let servo_slope = if torque.abs() < self.servo.limit { self.servo.gain } else { 0.0 };
         let mut residual = self.inertia_over_step * (spin - start) - torque;
         let mut slope = self.inertia_over_step + servo_slope;
         let rolls = spin.abs() >= ROLLING_SPIN_RAD_S;
         for grip in grips {
             let (force, force_slope) = grip.forces(spin);
-            residual += self.tread.radius_m * force[0] - self.tread.rolling_n_m(grip.normal_n, spin);
+            residual += self.tread.radius_m * force[0] - grip.rolling_n_m(spin);
             slope += self.tread.radius_m * force_slope;
             if !rolls {
-                slope -= self.tread.rolling_n_m(grip.normal_n, ROLLING_SPIN_RAD_S) / ROLLING_SPIN_RAD_S;
+                slope += grip.rolling_limit_n_m / ROLLING_SPIN_RAD_S;
             }
         }
         (residual, slope)

@@ -9,6 +9,7 @@
 //! Memory: eight bytes per cell and a rim of one vehicle length; cost of building: two running maxima over the grid.
 
 use super::Vehicle;
+use super::surface::{Friction, SurfaceMap};
 use sastrugi_numeric::Grid;
 
 /// Why a terrain cannot carry a vehicle.
@@ -65,6 +66,7 @@ pub struct Ground {
     ceiling: Vec<f32>,
     reach_m: f64,
     extent_m: f64,
+    surface: Option<SurfaceMap>,
     warnings: Vec<String>,
 }
 
@@ -108,8 +110,26 @@ impl Ground {
             heights,
             reach_m: vehicle.reach_m(),
             extent_m: vehicle.extent_m(),
+            surface: None,
             warnings: cell_warning(coarse_m, vehicle).into_iter().collect(),
         })
+    }
+
+    /// The same ground with a surface that changes from place to place.
+    pub fn with_surface(mut self, surface: SurfaceMap) -> Self {
+        self.surface = Some(surface);
+        self
+    }
+
+    /// True when the ground says what it is made of.
+    pub(crate) fn has_surface(&self) -> bool {
+        self.surface.is_some()
+    }
+
+    /// Coefficients at a point, where the ground has a surface of its own.
+    #[inline(always)]
+    pub(crate) fn friction(&self, x: f64, y: f64) -> Option<Friction> {
+        self.surface.as_ref().map(|surface| surface.at(x, y))
     }
 
     /// What a reader of the results should know about this terrain.

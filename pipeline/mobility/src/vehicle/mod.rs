@@ -21,16 +21,20 @@
 //! `libm` are used. Cost: about a microsecond per step and vehicle. What the model leaves out (side walls, spikes between
 //! rays, soil) is listed in `docs/traversal.md`.
 
+mod actuation;
+mod articulated;
 mod belly;
 mod body;
 mod contact;
 mod controller;
 mod drive;
 mod ground;
+mod linkage;
 mod model;
 mod params;
 mod settings;
 mod simulation;
+mod surface;
 #[cfg(test)]
 mod tests;
 mod traverse;
@@ -39,11 +43,18 @@ mod vector;
 pub use ground::{Ground, GroundError};
 pub use model::Vehicle;
 pub use params::{
-    BellyParameters, ChassisParameters, DriveParameters, SkidSteerParameters, TyreParameters, VehicleParameters,
+    AckermannParameters, BellyParameters, ChassisParameters, DriveParameters, IndependentParameters,
+    RockerBogieParameters, SkidSteerParameters, SuspensionParameters, TyreParameters, VehicleParameters,
     WheelParameters,
 };
-pub use settings::{ControllerParameters, SurfaceParameters, TraverseParameters, TraverseSettings};
+pub use settings::{ControllerParameters, TraverseParameters, TraverseSettings};
+pub use surface::{ClassSurfaceParameters, SurfaceError, SurfaceLayers, SurfaceMap, SurfaceParameters, SurfacePreset};
+pub(crate) use surface::{MATERIALS, Material};
 pub use traverse::{TraverseError, drive};
 
 /// Data file of the Clearpath Husky A200.
 pub(crate) const HUSKY_A200: &str = include_str!("models/husky_a200.toml");
+/// Data file of a generic car-sized vehicle.
+pub(crate) const UGV_4X4: &str = include_str!("models/ugv_4x4.toml");
+/// Data file of a generic six-wheel rover.
+pub(crate) const ROCKER_BOGIE_ROVER: &str = include_str!("models/rocker_bogie_rover.toml");

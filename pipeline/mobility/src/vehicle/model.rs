@@ -2,8 +2,9 @@
 
 use super::belly::Belly;
 use super::contact::Tyre;
-use super::params::{DriveParameters, SkidSteerParameters, VehicleParameters};
-use super::vector::{Vec3, norm, sub};
+use super::linkage::Linkage;
+use super::params::{DriveParameters, VehicleParameters};
+use super::vector::{Vec3, add, norm, sub};
 use sastrugi_schemas::ParameterError;
 use sastrugi_schemas::topics::{VehicleOutline, WheelOutline};
 
@@ -17,10 +18,13 @@ pub(crate) const SIDES: [&str; 2] = ["left", "right"];
 #[derive(Clone, Debug)]
 pub(crate) struct Wheel {
     pub name: String,
-    /// Hub from the centre of mass, m.
+    /// Hub from the centre of mass with all joints at zero, m.
     pub hub: Vec3,
-    /// 0 left, 1 right.
-    pub side: usize,
+    /// Motor channel that turns it.
+    pub channel: usize,
+    pub steered: bool,
+    /// Hub in plan from the point of the chassis that a turn is commanded about: forward and left, m.
+    pub turning_arm_m: [f64; 2],
 }
 
 /// A vehicle that was checked and can drive.
@@ -29,11 +33,21 @@ pub struct Vehicle {
     name: String,
     parameters: VehicleParameters,
     pub(crate) mass_kg: f64,
-    /// Moments of inertia of the whole vehicle about its centre of mass, without the spin of the wheels, kg m2.
+    /// Moments of inertia of the whole vehicle about its centre of mass, joints at zero, without the spin of the wheels,
+    /// kg m2.
     pub(crate) inertia_kg_m2: Vec3,
-    /// Centre of mass of the whole vehicle in base_link, m.
+    /// Those of chassis and wheels about their own centres, without the spin of the wheels, kg m2.
+    pub(crate) own_inertia_kg_m2: Vec3,
+    /// Centre of mass of the whole vehicle in base_link, joints at zero, m.
     pub(crate) centre_of_mass_m: Vec3,
+    /// Centre of mass of the chassis from that of the whole vehicle, m.
+    pub(crate) chassis_centre_m: Vec3,
     pub(crate) wheels: Vec<Wheel>,
+    /// Hubs of all wheels, as in `wheels`.
+    pub(crate) hubs: Vec<Vec3>,
+    /// Moment of inertia about the axle of all wheels of each motor channel, kg m2.
+    pub(crate) spin_inertia: Vec<f64>,
+    pub(crate) linkage: Linkage,
     pub(crate) tyre: Tyre,
     pub(crate) belly: Belly,
 }
@@ -55,15 +69,25 @@ impl Vehicle {
         let static_load_n = mass_kg * GRAVITY_M_S2 / hubs.len() as f64;
         let tyre = Tyre::new(&parameters, static_load_n)?;
         let belly = Belly::new(&parameters, centre_of_mass_m, tyre.reach_m);
-        let axles = parameters.wheels.axles_m.len();
-        let wheel = |(i, &hub): (usize, &Vec3)| Wheel {
-            name: format!("{}_{}_wheel", axle_name(i / 2, axles), SIDES[i % 2]),
-            hub: sub(hub, centre_of_mass_m),
-            side: i % 2,
-        };
-        let wheels = hubs.iter().enumerate().map(wheel).collect();
-        let name = name.to_owned();
-        Ok(Self { name, parameters, mass_kg, inertia_kg_m2, centre_of_mass_m, wheels, tyre, belly })
+        let sprung_weight_n = parameters.chassis.mass_kg * GRAVITY_M_S2;
+        let linkage = Linkage::new(&parameters, sprung_weight_n, centre_of_mass_m);
+        let wheels = wheels(&parameters, &hubs, centre_of_mass_m);
+        check_spot_turn(&parameters.drive, &wheels)?;
+        Ok(Self {
+            name: name.to_owned(),
+            mass_kg,
+            inertia_kg_m2,
+            own_inertia_kg_m2: own_inertia(&parameters),
+            centre_of_mass_m,
+            chassis_centre_m: sub(parameters.chassis.centre_of_mass_m, centre_of_mass_m),
+            hubs: wheels.iter().map(|w| w.hub).collect(),
+            spin_inertia: spin_inertia(&wheels, parameters.wheels.spin_inertia_kg_m2),
+            wheels,
+            linkage,
+            tyre,
+            belly,
+            parameters,
+        })
     }
 
     /// Name, as `husky_a200`.
@@ -95,7 +119,7 @@ impl Vehicle {
         let (chassis, wheels) = (&self.parameters.chassis, &self.parameters.wheels);
         let wheel = |w: &Wheel| WheelOutline {
             name: w.name.clone(),
-            hub_m: super::vector::add(w.hub, self.centre_of_mass_m),
+            hub_m: add(w.hub, self.centre_of_mass_m),
             radius_m: wheels.radius_m,
             width_m: wheels.width_m,
         };
@@ -107,14 +131,13 @@ impl Vehicle {
         }
     }
 
-    pub(crate) fn skid_steer(&self) -> &SkidSteerParameters {
-        let DriveParameters::SkidSteer(drive) = &self.parameters.drive;
-        drive
+    pub(crate) fn chassis_mass_kg(&self) -> f64 {
+        self.parameters.chassis.mass_kg
     }
 
-    /// Moment of inertia of the wheels of one side about the axle, kg m2.
-    pub(crate) fn side_spin_inertia(&self) -> f64 {
-        self.parameters.wheels.spin_inertia_kg_m2 * self.parameters.wheels.axles_m.len() as f64
+    /// Number of motor channels.
+    pub(crate) fn channels(&self) -> usize {
+        self.spin_inertia.len()
     }
 
     /// No contact point lies farther from the centre of its wheel or group, m.
@@ -125,7 +148,7 @@ impl Vehicle {
     /// No contact point lies farther from the centre of mass, m.
     pub(crate) fn extent_m(&self) -> f64 {
         let wheels = self.wheels.iter().map(|w| norm(w.hub) + self.tyre.reach_m);
-        wheels.fold(self.belly.extent_m, f64::max)
+        wheels.fold(self.belly.extent_m, f64::max) + self.linkage.travel_m(&self.hubs)
     }
 }
 
@@ -134,6 +157,48 @@ fn hubs(parameters: &VehicleParameters) -> Vec<Vec3> {
     let wheels = &parameters.wheels;
     let axle = |&x: &f64| [0.5, -0.5].map(|side| [x, side * wheels.track_m, wheels.axle_z_m]);
     wheels.axles_m.iter().flat_map(axle).collect()
+}
+
+/// Wheels in the order of the hubs.
+fn wheels(parameters: &VehicleParameters, hubs: &[Vec3], centre_of_mass: Vec3) -> Vec<Wheel> {
+    let axles = &parameters.wheels.axles_m;
+    let steered = |axle: usize| match &parameters.drive {
+        DriveParameters::SkidSteer(_) => false,
+        DriveParameters::Ackermann(drive) => drive.steered_axles.contains(&(axle as u32)),
+    };
+    let fixed: Vec<f64> = (0..axles.len()).filter(|&axle| !steered(axle)).map(|axle| axles[axle]).collect();
+    let turning_x = if fixed.is_empty() { 0.0 } else { fixed.iter().sum::<f64>() / fixed.len() as f64 };
+    let wheel = |(i, &hub): (usize, &Vec3)| Wheel {
+        name: format!("{}_{}_wheel", axle_name(i / 2, axles.len()), SIDES[i % 2]),
+        hub: sub(hub, centre_of_mass),
+        channel: match &parameters.drive {
+            DriveParameters::SkidSteer(_) => i % 2,
+            DriveParameters::Ackermann(_) => i,
+        },
+        steered: steered(i / 2),
+        turning_arm_m: [hub[0] - turning_x, hub[1]],
+    };
+    hubs.iter().enumerate().map(wheel).collect()
+}
+
+/// A vehicle that turns on the spot can point its steered wheels along the circle about its middle.
+fn check_spot_turn(drive: &DriveParameters, wheels: &[Wheel]) -> Result<(), ParameterError> {
+    let DriveParameters::Ackermann(drive) = drive else { return Ok(()) };
+    let angle = |w: &Wheel| libm::atan2(w.turning_arm_m[0].abs(), w.turning_arm_m[1].abs()).to_degrees();
+    let needed = wheels.iter().filter(|w| w.steered).map(angle).fold(0.0, f64::max);
+    if !drive.spot_turn || needed <= drive.steering_limit_deg {
+        return Ok(());
+    }
+    let message = format!(
+        "is true, but a turn on the spot needs {needed:.1} deg of steering; the limit is {} deg",
+        drive.steering_limit_deg
+    );
+    Err(ParameterError::new("drive.spot_turn", message))
+}
+
+fn spin_inertia(wheels: &[Wheel], of_wheel: f64) -> Vec<f64> {
+    let channels = wheels.iter().map(|w| w.channel + 1).max().unwrap_or(0);
+    (0..channels).map(|channel| of_wheel * wheels.iter().filter(|w| w.channel == channel).count() as f64).collect()
 }
 
 fn centre_of_mass(parameters: &VehicleParameters, hubs: &[Vec3], mass_kg: f64) -> Vec3 {
@@ -147,15 +212,23 @@ fn centre_of_mass(parameters: &VehicleParameters, hubs: &[Vec3], mass_kg: f64) -
 /// Steiner's theorem over chassis and wheels; the spin of the wheels about the axle is a degree of freedom of its own.
 fn inertia(parameters: &VehicleParameters, hubs: &[Vec3], centre: Vec3) -> Vec3 {
     let (chassis, wheels) = (&parameters.chassis, &parameters.wheels);
-    let own = [wheels.transverse_inertia_kg_m2, 0.0, wheels.transverse_inertia_kg_m2];
+    let own = own_inertia(parameters);
     std::array::from_fn(|axis| {
         let steiner = |mass: f64, at: Vec3| {
             let d = sub(at, centre);
             mass * (d[(axis + 1) % 3] * d[(axis + 1) % 3] + d[(axis + 2) % 3] * d[(axis + 2) % 3])
         };
-        let of_wheels: f64 = hubs.iter().map(|&hub| own[axis] + steiner(wheels.mass_kg, hub)).sum();
-        chassis.inertia_kg_m2[axis] + steiner(chassis.mass_kg, chassis.centre_of_mass_m) + of_wheels
+        let of_wheels: f64 = hubs.iter().map(|&hub| steiner(wheels.mass_kg, hub)).sum();
+        own[axis] + steiner(chassis.mass_kg, chassis.centre_of_mass_m) + of_wheels
     })
+}
+
+/// Chassis and wheels about their own centres.
+fn own_inertia(parameters: &VehicleParameters) -> Vec3 {
+    let (chassis, wheels) = (&parameters.chassis, &parameters.wheels);
+    let transverse = wheels.transverse_inertia_kg_m2 * 2.0 * wheels.axles_m.len() as f64;
+    let [x, y, z] = chassis.inertia_kg_m2;
+    [x + transverse, y, z + transverse]
 }
 
 fn axle_name(index: usize, axles: usize) -> String {

@@ -1,6 +1,8 @@
 //! Parameters of a traverse: vehicle, surface, steering, rules of the mission, clocks.
 
 use super::model::{GRAVITY_M_S2, Vehicle};
+use super::params::SuspensionParameters;
+use super::surface::SurfaceParameters;
 use super::vector::{Vec3, add};
 use crate::metrics::Differentiator;
 use crate::registry;
@@ -17,7 +19,7 @@ pub struct TraverseParameters {
     pub vehicle: String,
     /// Vehicle parameters that differ from its data file, as `{ drive = { torque_limit_n_m = 30 } }`.
     pub vehicle_changes: Map<String, Value>,
-    /// Friction of the ground.
+    /// Friction and rolling resistance of the ground.
     pub surface: SurfaceParameters,
     /// Steering along the line.
     pub controller: ControllerParameters,
@@ -33,7 +35,8 @@ pub struct TraverseParameters {
     pub stuck_time_s: f64,
     /// Longest mission, s (chosen here: about seven times the undisturbed drive).
     pub timeout_s: f64,
-    /// Time for the vehicle to come to rest on the ground before the clock starts, s.
+    /// Time for the vehicle to come to rest on the ground before the clock starts, s; up to ten times as long while its
+    /// suspension still moves.
     pub settle_s: f64,
     /// Time steps per second, Hz (500; 1000 to check convergence).
     pub step_rate_hz: u32,
@@ -47,24 +50,13 @@ pub struct TraverseParameters {
     pub differentiator: Differentiator,
 }
 
-/// Friction of the ground.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct SurfaceParameters {
-    /// Friction coefficient between tyre and ground (husky_description URDF: 1).
-    pub wheel_friction: f64,
-    /// Friction coefficient between chassis and ground (assumed).
-    pub belly_friction: f64,
-    /// Rolling resistance over normal force (assumed; hard soil).
-    pub rolling_resistance: f64,
-}
-
 /// Pure pursuit of the straight line.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ControllerParameters {
-    /// Distance along the line from the vehicle's foot point to the point it steers for, m (assumed: three wheelbases).
-    pub lookahead_m: f64,
+    /// Distance along the line from the vehicle's foot point to the point it steers for, m; three wheelbases when absent
+    /// (assumed).
+    pub lookahead_m: Option<f64>,
     /// Factor on the yaw rate of the pursuit arc (assumed: 1, the plain arc).
     pub steering_gain: f64,
     /// Bearing of the point beyond which the vehicle turns on the spot, deg (assumed: the point is behind).
@@ -98,15 +90,9 @@ impl Default for TraverseParameters {
     }
 }
 
-impl Default for SurfaceParameters {
-    fn default() -> Self {
-        Self { wheel_friction: 1.0, belly_friction: 0.5, rolling_resistance: 0.03 }
-    }
-}
-
 impl Default for ControllerParameters {
     fn default() -> Self {
-        Self { lookahead_m: 1.5, steering_gain: 1.0, turn_start_deg: 90.0, turn_stop_deg: 30.0, turn_rate_rad_s: 1.0 }
+        Self { lookahead_m: None, steering_gain: 1.0, turn_start_deg: 90.0, turn_stop_deg: 30.0, turn_rate_rad_s: 1.0 }
     }
 }
 
@@ -124,7 +110,8 @@ impl TraverseParameters {
         self.check_rates()?;
         self.check_step(&vehicle)?;
         let tip_sin_cos = libm::sincos(self.tip_deg.to_radians());
-        Ok((vehicle, TraverseSettings { parameters: self.clone(), tip_sin_cos }))
+        let lookahead_m = self.controller.lookahead_m.unwrap_or(LOOKAHEAD_WHEELBASES * vehicle.wheelbase_m());
+        Ok((vehicle, TraverseSettings { parameters: self.clone(), tip_sin_cos, lookahead_m }))
     }
 
     fn check_rules(&self) -> Result<(), ParameterError> {
@@ -179,23 +166,16 @@ impl TraverseParameters {
     }
 }
 
+/// Look-ahead distance over wheelbase.
+const LOOKAHEAD_WHEELBASES: f64 = 3.0;
 /// Longest mission and settling that is accepted, s.
 const TIME_MAX_S: f64 = 86_400.0;
 /// Highest step rate that is accepted, Hz.
 const STEP_RATE_MAX_HZ: u32 = 100_000;
 
-impl SurfaceParameters {
-    fn check(&self) -> Result<(), ParameterError> {
-        ParameterError::not_negative("wheel_friction", self.wheel_friction)?;
-        ParameterError::not_negative("belly_friction", self.belly_friction)?;
-        ParameterError::not_negative("rolling_resistance", self.rolling_resistance)?;
-        Ok(())
-    }
-}
-
 impl ControllerParameters {
     fn check(&self) -> Result<(), ParameterError> {
-        ParameterError::positive("lookahead_m", self.lookahead_m)?;
+        self.lookahead_m.map_or(Ok(0.0), |v| ParameterError::positive("lookahead_m", v))?;
         ParameterError::positive("steering_gain", self.steering_gain)?;
         ParameterError::positive("turn_rate_rad_s", self.turn_rate_rad_s)?;
         ParameterError::between("turn_start_deg", self.turn_start_deg, 0.0, 180.0)?;
@@ -209,6 +189,7 @@ impl ControllerParameters {
 pub struct TraverseSettings {
     parameters: TraverseParameters,
     tip_sin_cos: (f64, f64),
+    lookahead_m: f64,
 }
 
 impl TraverseSettings {
@@ -219,6 +200,10 @@ impl TraverseSettings {
 
     pub(crate) fn controller(&self) -> &ControllerParameters {
         &self.parameters.controller
+    }
+
+    pub(crate) fn lookahead_m(&self) -> f64 {
+        self.lookahead_m
     }
 
     pub(crate) fn speed_m_s(&self) -> f64 {
@@ -246,13 +231,14 @@ impl TraverseSettings {
 /// Largest stable time step of a vehicle with every contact point in the ground, s.
 ///
 /// A semi-implicit Euler step `h` of a mass `M` on a spring `K` with an explicit damper `C` is stable while
-/// `K h^2 + 2 C h < 4 M`; taken for each of the six degrees of freedom by itself.
+/// `K h^2 + 2 C h < 4 M`; taken for each of the six degrees of freedom of the body by itself, and for every joint of the
+/// suspension.
 pub(crate) fn step_limit_s(vehicle: &Vehicle) -> f64 {
     let contacts = contacts(vehicle);
     let limit = |mass: f64, arm_squared: &dyn Fn(Vec3) -> f64| {
         let stiffness: f64 = contacts.iter().map(|c| c.stiffness * arm_squared(c.arm)).sum();
         let damping: f64 = contacts.iter().map(|c| c.damping * arm_squared(c.arm)).sum();
-        ((damping * damping + 4.0 * stiffness * mass).sqrt() - damping) / stiffness
+        step_limit_of(mass, stiffness, damping)
     };
     let shift = limit(vehicle.mass_kg, &|_| 1.0);
     let turn = |axis: usize| {
@@ -262,7 +248,37 @@ pub(crate) fn step_limit_s(vehicle: &Vehicle) -> f64 {
         };
         limit(vehicle.inertia_kg_m2[axis], &arm_squared)
     };
-    (0..3).map(turn).fold(shift, f64::min)
+    (0..3).map(turn).fold(shift, f64::min).min(joint_step_limit_s(vehicle))
+}
+
+fn step_limit_of(mass: f64, stiffness: f64, damping: f64) -> f64 {
+    ((damping * damping + 4.0 * stiffness * mass).sqrt() - damping) / stiffness
+}
+
+/// Largest stable time step of a wheel between its tyre and its suspension, s; infinite without joints.
+fn joint_step_limit_s(vehicle: &Vehicle) -> f64 {
+    let (tyre, wheel_kg) = (&vehicle.parameters().tyre, vehicle.parameters().wheels.mass_kg);
+    let stiffness = vehicle.tyre.stiffness_max_n_m().max(tyre.tangential_stiffness_n_m);
+    let damping = tyre.damping_n_s_m.max(tyre.tangential_damping_n_s_m);
+    match &vehicle.parameters().suspension {
+        SuspensionParameters::Rigid => f64::INFINITY,
+        SuspensionParameters::Independent(springs) => {
+            let stiffness = stiffness + springs.stiffness_n_m + springs.stop_stiffness_n_m;
+            step_limit_of(wheel_kg, stiffness, damping + springs.damping_n_s_m)
+        }
+        SuspensionParameters::RockerBogie(joints) => {
+            // The lightest turning part is a bogie with its two wheels.
+            let [x, z] = joints.bogie_pivot_m;
+            let wheels = &vehicle.parameters().wheels;
+            let arm_squared = |axle: usize| {
+                let (dx, dz) = (wheels.axles_m[axle] - x, wheels.axle_z_m - z);
+                dx * dx + dz * dz
+            };
+            let both = arm_squared(1) + arm_squared(2);
+            let (stop, friction) = (joints.stop_stiffness_n_m, joints.damping_n_m_s);
+            step_limit_of(wheel_kg * both, stiffness * both + stop, damping * both + friction)
+        }
+    }
 }
 
 /// A contact as a spring and damper in every direction.

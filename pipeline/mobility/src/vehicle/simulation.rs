@@ -1,13 +1,17 @@
 //! One vehicle on the ground, step by step.
 
+use super::articulated;
 use super::belly::{Bristles, Load, Motion};
 use super::body::Body;
 use super::contact::Touch;
-use super::drive::{Grip, Servo, Side, Tread};
+use super::drive::{Channel, Grip, Servo, Tread};
 use super::ground::Ground;
+use super::linkage::{Carrier, Joints};
 use super::model::Vehicle;
+use super::params::DriveParameters;
 use super::settings::TraverseSettings;
-use super::vector::{Vec3, add, add_scaled, cross, dot, scale, sub};
+use super::surface::Friction;
+use super::vector::{Axes, Vec3, add, add_scaled, cross, dot, norm, scale, sub};
 use sastrugi_schemas::topics::WheelState;
 
 /// State of a simulation.
@@ -15,19 +19,33 @@ use sastrugi_schemas::topics::WheelState;
 pub(crate) struct Simulation<'a> {
     ground: &'a Ground,
     vehicle: &'a Vehicle,
-    belly_friction: f64,
+    /// Coefficients where the ground has no surface of its own.
+    friction: Friction,
     tread: Tread,
+    /// Largest change of a steering angle over a step, rad.
+    steering_step_rad: f64,
     pub body: Body,
-    /// Spin of the wheels of either side in the map frame, about the axle, rad/s.
-    pub spin: [f64; 2],
-    /// Angle turned by either side relative to the chassis, rad.
-    angle: [f64; 2],
+    pub joints: Joints,
+    carriers: Vec<Carrier>,
+    /// Spin of the wheels of every channel in the map frame, about their axles, rad/s.
+    pub spin: Vec<f64>,
+    /// The same at the end of the step.
+    spun: Vec<f64>,
+    /// Steering angle of each wheel, and where it is told to go, rad.
+    pub steering: Vec<f64>,
+    pub steering_target: Vec<f64>,
+    /// Angle turned by each wheel relative to its mount, rad.
+    angle: Vec<f64>,
     /// Tread deflection of each wheel, forward and left, m.
     deflections: Vec<[f64; 2]>,
     bristles: Bristles,
     /// The last step of each wheel.
     rolls: Vec<Roll>,
     rim: Vec<Vec3>,
+    steered_rim: Vec<Vec3>,
+    joint_forces: Vec<f64>,
+    /// Force of the ground on the chassis in the last step, N.
+    chassis_force: Vec3,
     /// A contact point met ground without data.
     pub undefined: bool,
 }
@@ -35,46 +53,64 @@ pub(crate) struct Simulation<'a> {
 /// Motion and load of a wheel over a step.
 #[derive(Clone, Copy, Debug, Default)]
 struct Roll {
+    /// In the map frame.
+    axle: Vec3,
+    /// Angular velocity of what holds the wheel, in the map frame, rad/s.
+    mount_rate: Vec3,
+    /// Its part about the axle, rad/s.
+    mount_spin: f64,
     touch: Option<(Touch, Grip)>,
     /// Forward and left, N.
     friction: [f64; 2],
     /// Drive torque, N m.
     torque: f64,
-    /// Speed of the contact point along the rolling direction as part of the chassis, m/s.
+    /// Speed of the contact point along the rolling direction as part of its mount, m/s.
     ground_speed: f64,
 }
 
 impl<'a> Simulation<'a> {
     pub(crate) fn new(ground: &'a Ground, vehicle: &'a Vehicle, settings: &'a TraverseSettings, body: Body) -> Self {
-        let (tyre, surface) = (&vehicle.parameters().tyre, &settings.parameters().surface);
+        let tyre = &vehicle.parameters().tyre;
         let tread = Tread {
             radius_m: vehicle.tyre.radius_m,
             stiffness: tyre.tangential_stiffness_n_m,
             damping: tyre.tangential_damping_n_s_m,
             relaxation_length_m: tyre.relaxation_length_m,
-            friction: surface.wheel_friction,
-            rolling_resistance: surface.rolling_resistance,
             step_s: settings.step_s(),
         };
-        let wheels = vehicle.wheels.len();
+        let (wheels, channels) = (vehicle.wheels.len(), vehicle.channels());
+        let joints = vehicle.linkage.joints(wheels);
+        let steering_rate_deg_s = match &vehicle.parameters().drive {
+            DriveParameters::SkidSteer(_) => 0.0,
+            DriveParameters::Ackermann(drive) => drive.steering_rate_deg_s,
+        };
         Self {
             ground,
             vehicle,
-            belly_friction: surface.belly_friction,
+            friction: settings.parameters().surface.friction(),
             tread,
+            steering_step_rad: steering_rate_deg_s.to_radians() * settings.step_s(),
             body,
-            spin: [0.0; 2],
-            angle: [0.0; 2],
+            carriers: vehicle.linkage.carriers(&vehicle.hubs, &joints),
+            joint_forces: vec![0.0; joints.rate.len()],
+            joints,
+            spin: vec![0.0; channels],
+            spun: vec![0.0; channels],
+            steering: vec![0.0; wheels],
+            steering_target: vec![0.0; wheels],
+            angle: vec![0.0; wheels],
             deflections: vec![[0.0; 2]; wheels],
             bristles: vehicle.belly.at_rest(),
             rolls: vec![Roll::default(); wheels],
             rim: Vec::new(),
+            steered_rim: Vec::new(),
+            chassis_force: [0.0; 3],
             undefined: false,
         }
     }
 
-    /// Advances by one time step.
-    pub(crate) fn step(&mut self, servos: [Servo; 2]) {
+    /// Advances by one time step with a servo for every channel.
+    pub(crate) fn step(&mut self, servos: &[Servo]) {
         let axes = self.body.axes();
         let motion = Motion {
             position: self.body.position,
@@ -82,91 +118,147 @@ impl<'a> Simulation<'a> {
             rate: axes.to_map(self.body.rate),
             axes,
         };
+        self.steer();
         self.find_touches(&motion);
-        let spun = self.spun(servos);
+        self.turn_wheels(servos);
+        self.vehicle.linkage.push(&self.joints, &mut self.joint_forces);
         let belly = self.press_belly(&motion);
-        let (mut force, mut moment) = self.roll(&motion, spun);
-        force = add(force, belly.force);
-        moment = add(moment, belly.moment);
-        let inertia = self.vehicle.side_spin_inertia();
-        let gained = inertia * (spun[0] - self.spin[0] + spun[1] - self.spin[1]) / self.tread.step_s;
-        let momentum = scale(axes.y, inertia * (spun[0] + spun[1]));
-        moment = sub(add_scaled(moment, axes.y, -gained), cross(motion.rate, momentum));
-        self.spin = spun;
-        self.angle = [0, 1].map(|side| self.angle[side] + (spun[side] - self.body.rate[1]) * self.tread.step_s);
-        self.body.step(self.vehicle, &axes, force, moment, self.tread.step_s);
+        let (force, moment) = self.roll(&motion);
+        let (force, moment) = (add(force, belly.force), add(moment, belly.moment));
+        std::mem::swap(&mut self.spin, &mut self.spun);
+        for ((angle, roll), wheel) in self.angle.iter_mut().zip(&self.rolls).zip(&self.vehicle.wheels) {
+            *angle += (self.spin[wheel.channel] - roll.mount_spin) * self.tread.step_s;
+        }
+        self.advance(&axes, force, moment);
+    }
+
+    /// Moves body and joints under a force and a moment about the reference point, both without gravity.
+    fn advance(&mut self, axes: &Axes, force: Vec3, moment: Vec3) {
+        if self.joints.rate.is_empty() {
+            self.body.step(self.vehicle, axes, force, moment, self.tread.step_s);
+            return;
+        }
+        let (force, moment) = (axes.to_body(force), axes.to_body(moment));
+        let loads = articulated::Loads { force, moment, joints: &self.joint_forces };
+        let (body, joints) = (&mut self.body, &mut self.joints);
+        articulated::step(body, joints, self.vehicle, &self.carriers, axes, &loads, self.tread.step_s);
+        self.vehicle.linkage.place(&self.vehicle.hubs, &self.joints, &mut self.carriers);
     }
 
     /// Starts the clock: wheel angles count from here.
     pub(crate) fn zero_angles(&mut self) {
-        self.angle = [0.0; 2];
+        self.angle.fill(0.0);
+    }
+
+    /// True when no joint of the suspension moves faster than 1 mm/s or 1 mrad/s.
+    pub(crate) fn joints_are_still(&self) -> bool {
+        self.joints.rate.iter().all(|rate| rate.abs() < STILL)
+    }
+
+    /// Moves steering angles towards their targets.
+    fn steer(&mut self) {
+        for (angle, target) in self.steering.iter_mut().zip(&self.steering_target) {
+            *angle += (target - *angle).clamp(-self.steering_step_rad, self.steering_step_rad);
+        }
     }
 
     /// Normal forces and friction data of all wheels.
     fn find_touches(&mut self, motion: &Motion) {
         let (tyre, axes) = (&self.vehicle.tyre, &motion.axes);
         tyre.rim(axes, &mut self.rim);
-        for ((wheel, roll), deflection) in self.vehicle.wheels.iter().zip(&mut self.rolls).zip(&mut self.deflections) {
-            let hub = add(motion.position, axes.to_map(wheel.hub));
-            let pressing = tyre.press(self.ground, hub, axes, &self.rim);
+        let damping = self.vehicle.parameters().tyre.damping_n_s_m;
+        for (index, wheel) in self.vehicle.wheels.iter().enumerate() {
+            let carrier = &self.carriers[index];
+            let (frame, rim) = if wheel.steered {
+                let frame = turned_about_z(axes, self.steering[index]);
+                tyre.rim(&frame, &mut self.steered_rim);
+                (frame, &self.steered_rim)
+            } else {
+                (*axes, &self.rim)
+            };
+            let hub = add(motion.position, axes.to_map(carrier.hub));
+            let pressing = tyre.press(self.ground, hub, &frame, rim);
             self.undefined |= pressing.undefined;
-            *roll = Roll::default();
-            let Some(touch) = pressing.touch(hub, axes, tyre.radius_m) else {
-                *deflection = [0.0; 2];
+            let mount_rate = add_scaled(motion.rate, axes.y, carrier.turning(&self.joints.rate));
+            let mount_spin = dot(mount_rate, frame.y);
+            let roll = &mut self.rolls[index];
+            *roll = Roll { axle: frame.y, mount_rate, mount_spin, ..Roll::default() };
+            let Some(touch) = pressing.touch(hub, &frame, tyre.radius_m) else {
+                self.deflections[index] = [0.0; 2];
                 continue;
             };
-            let velocity = add(motion.velocity, cross(motion.rate, sub(touch.point, motion.position)));
-            let damping = self.vehicle.parameters().tyre.damping_n_s_m;
+            let arm = sub(touch.point, motion.position);
+            let mut velocity = add(motion.velocity, cross(motion.rate, arm));
+            if !carrier.levers.is_empty() {
+                let moved = carrier.velocity(axes.to_body(arm), &self.joints.rate);
+                velocity = add(velocity, axes.to_map(moved));
+            }
             let normal_n = (touch.elastic_n - damping * dot(velocity, touch.normal)).max(0.0);
             let [forward, left] = [dot(velocity, touch.forward), dot(velocity, touch.left)];
-            let without_spin = [forward + tyre.radius_m * self.body.rate[1], left];
-            let grip = Grip::new(&self.tread, normal_n, *deflection, without_spin, self.spin[wheel.side]);
-            *roll = Roll { touch: Some((touch, grip)), ground_speed: forward, ..Roll::default() };
+            let without_spin = [forward + tyre.radius_m * mount_spin, left];
+            let friction = self.ground.friction(touch.point[0], touch.point[1]).unwrap_or(self.friction);
+            let spin = self.spin[wheel.channel];
+            let grip = Grip::new(&self.tread, friction, normal_n, self.deflections[index], without_spin, spin);
+            roll.touch = Some((touch, grip));
+            roll.ground_speed = forward;
         }
     }
 
-    /// Spin of both sides at the end of the step.
-    fn spun(&self, servos: [Servo; 2]) -> [f64; 2] {
-        [0, 1].map(|side| {
-            let grips = self.vehicle.wheels.iter().zip(&self.rolls).filter(|(wheel, _)| wheel.side == side);
-            let grips = grips.filter_map(|(_, roll)| roll.touch.as_ref().map(|(_, grip)| grip));
-            let side_of_step = Side {
+    /// Finds the spin of every channel at the end of the step.
+    fn turn_wheels(&mut self, servos: &[Servo]) {
+        for (channel, (spun, servo)) in self.spun.iter_mut().zip(servos).enumerate() {
+            let of_channel = self.vehicle.wheels.iter().zip(&self.rolls).filter(|(wheel, _)| wheel.channel == channel);
+            let mounts = of_channel.clone().map(|(_, roll)| roll.mount_spin);
+            let step = Channel {
                 tread: &self.tread,
-                servo: servos[side],
-                inertia_over_step: self.vehicle.side_spin_inertia() / self.tread.step_s,
-                chassis_spin: self.body.rate[1],
+                servo: *servo,
+                inertia_over_step: self.vehicle.spin_inertia[channel] / self.tread.step_s,
+                mount_spin: mounts.clone().sum::<f64>() / mounts.count() as f64,
             };
-            side_of_step.solve(self.spin[side], grips)
-        })
+            let grips = of_channel.filter_map(|(_, roll)| roll.touch.as_ref().map(|(_, grip)| grip));
+            *spun = step.solve(self.spin[channel], grips);
+        }
     }
 
-    /// Force and moment of all wheels; moves their treads on.
-    fn roll(&mut self, motion: &Motion, spun: [f64; 2]) -> (Vec3, Vec3) {
+    /// Force and moment of all wheels, and what they do along the joints; moves their treads on.
+    fn roll(&mut self, motion: &Motion) -> (Vec3, Vec3) {
         let (mut force, mut moment) = ([0.0; 3], [0.0; 3]);
         let wheel_inertia = self.vehicle.parameters().wheels.spin_inertia_kg_m2;
-        for ((wheel, roll), deflection) in self.vehicle.wheels.iter().zip(&mut self.rolls).zip(&mut self.deflections) {
-            let spin = spun[wheel.side];
-            roll.torque = wheel_inertia * (spin - self.spin[wheel.side]) / self.tread.step_s;
-            let Some((touch, grip)) = &roll.touch else { continue };
-            let ([forward, left], deflected) = grip.settle(&self.tread, spin);
-            *deflection = deflected;
-            roll.friction = [forward, left];
-            let rolling = self.tread.rolling_n_m(grip.normal_n, spin);
-            roll.torque += self.tread.radius_m * forward - rolling;
-            let tangential = add_scaled(scale(touch.forward, forward), touch.left, left);
-            let push = add_scaled(tangential, touch.normal, grip.normal_n);
+        for (index, (wheel, roll)) in self.vehicle.wheels.iter().zip(&mut self.rolls).enumerate() {
+            let spin = self.spun[wheel.channel];
+            let gained = wheel_inertia * (spin - self.spin[wheel.channel]) / self.tread.step_s;
+            roll.torque = gained;
+            let mut couple = scale(cross(roll.mount_rate, roll.axle), -wheel_inertia * spin);
+            couple = add_scaled(couple, roll.axle, -gained);
+            let (mut push, mut arm) = ([0.0; 3], [0.0; 3]);
+            if let Some((touch, grip)) = &roll.touch {
+                let ([forward, left], deflected) = grip.settle(&self.tread, spin);
+                self.deflections[index] = deflected;
+                roll.friction = [forward, left];
+                let rolling = grip.rolling_n_m(spin);
+                roll.torque += self.tread.radius_m * forward - rolling;
+                let tangential = add_scaled(scale(touch.forward, forward), touch.left, left);
+                push = add_scaled(tangential, touch.normal, grip.normal_n);
+                arm = sub(touch.point, motion.position);
+                couple = add_scaled(couple, roll.axle, rolling);
+            }
             force = add(force, push);
-            moment = add(moment, cross(sub(touch.point, motion.position), push));
-            moment = add_scaled(moment, motion.axes.y, rolling);
+            moment = add(add(moment, cross(arm, push)), couple);
+            for (joint, lever) in &self.carriers[index].levers {
+                let along = lever.velocity(motion.axes.to_body(arm));
+                self.joint_forces[*joint] +=
+                    dot(along, motion.axes.to_body(push)) + lever.turning() * dot(motion.axes.y, couple);
+            }
         }
         (force, moment)
     }
 
     fn press_belly(&mut self, motion: &Motion) -> Load {
         let (belly, parameters) = (&self.vehicle.belly, &self.vehicle.parameters().belly);
-        let (friction, step_s) = (self.belly_friction, self.tread.step_s);
-        let load = belly.press(self.ground, motion, parameters, friction, step_s, &mut self.bristles);
+        let here = self.ground.friction(motion.position[0], motion.position[1]).unwrap_or(self.friction);
+        let load = belly.press(self.ground, motion, parameters, here.belly, self.tread.step_s, &mut self.bristles);
         self.undefined |= load.undefined;
+        self.chassis_force = load.force;
         load
     }
 
@@ -177,7 +269,7 @@ impl<'a> Simulation<'a> {
         let mut rim = Vec::new();
         self.vehicle.tyre.rim(&axes, &mut rim);
         let tips =
-            self.vehicle.wheels.iter().flat_map(|wheel| self.vehicle.tyre.tips(axes.to_map(wheel.hub), axes.y, &rim));
+            self.carriers.iter().flat_map(|carrier| self.vehicle.tyre.tips(axes.to_map(carrier.hub), axes.y, &rim));
         let points = self.vehicle.belly.points().iter().map(|&p| axes.to_map(p));
         let overlap = |arm: Vec3| {
             let at = add(self.body.position, arm);
@@ -188,16 +280,22 @@ impl<'a> Simulation<'a> {
             .fold(f64::NEG_INFINITY, |deepest, o| if o > deepest || o.is_nan() { o } else { deepest })
     }
 
-    /// Every wheel as recorded, from the last step.
-    pub(crate) fn wheel_states(&self) -> Vec<WheelState> {
-        self.vehicle.wheels.iter().zip(&self.rolls).map(|(wheel, roll)| self.wheel_state(wheel.side, roll)).collect()
+    /// Size of the force of the ground on the chassis in the last step, N.
+    pub(crate) fn chassis_force_n(&self) -> f64 {
+        norm(self.chassis_force)
     }
 
-    fn wheel_state(&self, side: usize, roll: &Roll) -> WheelState {
-        let spin_rad_s = self.spin[side] - self.body.rate[1];
+    /// Every wheel as recorded, from the last step.
+    pub(crate) fn wheel_states(&self) -> Vec<WheelState> {
+        (0..self.rolls.len()).map(|index| self.wheel_state(index)).collect()
+    }
+
+    fn wheel_state(&self, index: usize) -> WheelState {
+        let roll = &self.rolls[index];
+        let spin_rad_s = self.spin[self.vehicle.wheels[index].channel] - roll.mount_spin;
         let normal_force_n = roll.touch.map_or(0.0, |(_, grip)| grip.normal_n);
         WheelState {
-            angle_rad: self.angle[side],
+            angle_rad: self.angle[index],
             spin_rad_s,
             torque_n_m: roll.torque,
             normal_force_n,
@@ -205,25 +303,42 @@ impl<'a> Simulation<'a> {
             lateral_force_n: roll.friction[1],
             slip_ratio: roll.touch.map_or(0.0, |_| slip_ratio(self.tread.radius_m * spin_rad_s, roll.ground_speed)),
             contact_m: roll.touch.map_or([0.0; 3], |(touch, _)| touch.point),
+            steering_rad: self.steering[index],
+            hub_m: add(self.carriers[index].hub, self.vehicle.centre_of_mass_m),
         }
     }
 }
 
+/// Axes turned about their z.
+fn turned_about_z(axes: &Axes, angle: f64) -> Axes {
+    let (sin, cos) = libm::sincos(angle);
+    Axes { x: add_scaled(scale(axes.x, cos), axes.y, sin), y: add_scaled(scale(axes.y, cos), axes.x, -sin), z: axes.z }
+}
+
 #[cfg(test)]
 impl Simulation<'_> {
-    /// Mechanical energy: motion, height, and what tyres, treads and belly have stored, J.
+    /// Mechanical energy: motion, height, and what tyres, treads, springs and stops have stored, J. Steering stands still.
     pub(crate) fn energy_j(&self) -> f64 {
         let (vehicle, body, axes) = (self.vehicle, &self.body, self.body.axes());
-        let turning: f64 = (0..3).map(|i| vehicle.inertia_kg_m2[i] * body.rate[i] * body.rate[i]).sum();
-        let spinning: f64 = self.spin.iter().map(|w| vehicle.side_spin_inertia() * w * w).sum();
-        let moving = vehicle.mass_kg * dot(body.velocity, body.velocity);
-        let height = vehicle.mass_kg * super::model::GRAVITY_M_S2 * body.position[2];
+        let velocity = axes.to_body(body.velocity);
+        let of_mass = |mass_kg: f64, carrier: &Carrier| {
+            let v = add(add(velocity, cross(body.rate, carrier.hub)), carrier.velocity(carrier.hub, &self.joints.rate));
+            let z = body.position[2] + axes.to_map(carrier.hub)[2];
+            0.5 * mass_kg * dot(v, v) + mass_kg * super::model::GRAVITY_M_S2 * z
+        };
+        let wheel = &vehicle.parameters().wheels;
+        let chassis = of_mass(vehicle.chassis_mass_kg(), &Carrier::fixed(vehicle.chassis_centre_m));
+        let wheels: f64 = self.carriers.iter().map(|carrier| of_mass(wheel.mass_kg, carrier)).sum();
+        let turning: f64 = (0..3).map(|i| vehicle.own_inertia_kg_m2[i] * body.rate[i] * body.rate[i]).sum();
+        let spins = vehicle.wheels.iter().map(|w| self.spin[w.channel]);
+        let spinning: f64 = spins.map(|spin| wheel.spin_inertia_kg_m2 * spin * spin).sum();
         let mut rim = Vec::new();
         vehicle.tyre.rim(&axes, &mut rim);
-        let hubs = vehicle.wheels.iter().map(|w| add(body.position, axes.to_map(w.hub)));
+        let hubs = self.carriers.iter().map(|carrier| add(body.position, axes.to_map(carrier.hub)));
         let tyres: f64 = hubs.map(|hub| vehicle.tyre.stored_j(self.ground, hub, axes.y, &rim)).sum();
         let treads: f64 = self.deflections.iter().map(|s| self.tread.stiffness * (s[0] * s[0] + s[1] * s[1])).sum();
-        0.5 * (moving + turning + spinning + treads) + height + tyres
+        let springs = vehicle.linkage.stored_j(&self.joints);
+        chassis + wheels + 0.5 * (turning + spinning + treads) + tyres + springs
     }
 }
 
@@ -235,3 +350,5 @@ fn slip_ratio(rim_m_s: f64, ground_m_s: f64) -> f64 {
 
 /// Below this speed of rim and ground a wheel counts as at rest, m/s.
 const REST_M_S: f64 = 1e-3;
+/// Slower than this a joint is at rest, m/s or rad/s.
+const STILL: f64 = 1e-3;

@@ -1,5 +1,6 @@
 //! A mission from the settled start to its outcome.
 
+use super::actuation::{self, Limits};
 use super::body::Body;
 use super::controller::{Controller, PlanPose};
 use super::drive::Servo;
@@ -20,6 +21,9 @@ pub enum TraverseError {
         /// Name of the vehicle.
         vehicle: String,
     },
+    /// The surface differs by roughness class, and the ground was prepared without classes.
+    #[error("drive on a surface that differs by roughness class: the ground was prepared without a class map")]
+    NoSurface,
     /// Start or goal is not a point.
     #[error("drive from {start_m:?} to {goal_m:?}: start and goal must be finite and apart")]
     NoLine {
@@ -42,6 +46,9 @@ pub fn drive(
 ) -> Result<Recording, TraverseError> {
     if !ground.carries(vehicle) {
         return Err(TraverseError::OtherVehicle { vehicle: vehicle.name().to_owned() });
+    }
+    if settings.parameters().surface.differs_by_class() && !ground.has_surface() {
+        return Err(TraverseError::NoSurface);
     }
     let (start_m, goal_m) = (mission.start_m, mission.goal_m);
     let length_m = mission.length_m();
@@ -68,13 +75,20 @@ pub(crate) fn settled<'a>(
         return None;
     }
     simulation.body.position[2] += overlap;
-    let steps = (settings.parameters().settle_s / settings.step_s()).ceil() as u64;
-    for _ in 0..steps {
-        simulation.step([Servo::BRAKE; 2]);
+    let brakes = vec![Servo::BRAKE; vehicle.channels()];
+    let least = (settings.parameters().settle_s / settings.step_s()).ceil() as u64;
+    for step in 0..least.saturating_mul(SETTLE_FACTOR) {
+        if step >= least && simulation.joints_are_still() {
+            break;
+        }
+        simulation.step(&brakes);
     }
     simulation.zero_angles();
     (!simulation.undefined).then_some(simulation)
 }
+
+/// A vehicle whose suspension still moves is given this many times `settle_s` to come to rest.
+const SETTLE_FACTOR: u64 = 10;
 
 /// Pose with the base_link origin over the start, tilted as the plane through the ground under the hubs, wheels about on
 /// that plane.
@@ -150,6 +164,8 @@ struct Run<'a> {
     vehicle: &'a Vehicle,
     settings: &'a TraverseSettings,
     controller: Controller,
+    limits: Limits,
+    servos: Vec<Servo>,
     recording: Recording,
     /// Steps since the start.
     steps: u64,
@@ -183,6 +199,8 @@ impl<'a> Run<'a> {
             vehicle,
             settings,
             controller: Controller::new(mission),
+            limits: Limits::of(vehicle),
+            servos: Vec::new(),
             recording,
             steps: 0,
             imu_velocity,
@@ -198,7 +216,9 @@ impl<'a> Run<'a> {
                 self.recording.events.push(Event { time_s: self.time_s(), kind, text });
                 return self.recording;
             }
-            self.simulation.step(self.servos());
+            let (command, steering) = (&self.controller.command, &self.simulation.steering);
+            actuation::servos(self.vehicle, command, steering, &mut self.servos);
+            self.simulation.step(&self.servos);
             self.steps += 1;
         }
     }
@@ -221,7 +241,9 @@ impl<'a> Run<'a> {
         let parameters = self.parameters();
         if self.is_due(parameters.control_rate_hz) {
             let period_s = 1.0 / f64::from(parameters.control_rate_hz);
-            self.controller.update(self.pose(), self.settings, self.vehicle.skid_steer(), period_s);
+            self.controller.update(self.pose(), self.settings, &self.limits, period_s);
+            let targets = &mut self.simulation.steering_target;
+            actuation::steering_angles(self.vehicle, &self.controller.command, targets);
         }
         if self.is_due(parameters.imu_rate_hz) {
             self.record_imu();
@@ -237,18 +259,6 @@ impl<'a> Run<'a> {
         PlanPose { x, y, yaw: libm::atan2(forward[1], forward[0]) }
     }
 
-    /// Wheel speeds of both sides that the commands ask for.
-    fn servos(&self) -> [Servo; 2] {
-        let (drive, wheels) = (self.vehicle.skid_steer(), &self.vehicle.parameters().wheels);
-        let command = &self.controller.command;
-        let half_track = 0.5 * wheels.track_m * drive.track_multiplier;
-        [-1.0, 1.0].map(|side| Servo {
-            target: (command.speed_m_s + side * command.yaw_rate_rad_s * half_track) / wheels.radius_m,
-            gain: drive.servo_gain_n_m_s,
-            limit: drive.torque_limit_n_m,
-        })
-    }
-
     fn record_samples(&mut self) {
         let time_s = self.time_s();
         self.controller.observe(self.pose(), self.settings);
@@ -261,7 +271,11 @@ impl<'a> Run<'a> {
             velocity_m_s,
             angular_velocity_rad_s: body.rate,
         });
-        self.recording.wheels.push(WheelSample { time_s, wheels: self.simulation.wheel_states() });
+        self.recording.wheels.push(WheelSample {
+            time_s,
+            wheels: self.simulation.wheel_states(),
+            chassis_force_n: self.simulation.chassis_force_n(),
+        });
         self.recording.commands.push(CommandSample {
             time_s,
             speed_m_s: command.speed_m_s,

@@ -127,6 +127,8 @@ pub(super) fn wheel_values(names: &[String], sample: &WheelSample) -> Vec<Value>
         contact(0),
         contact(1),
         contact(2),
+        all(FINE, |w| w.steering_rad),
+        Value::Float(in_steps(sample.chassis_force_n, COARSE)),
     ]
 }
 
@@ -149,12 +151,18 @@ fn transforms(
     };
     let mut all = vec![transform(MAP, BASE, state.position_m, state.orientation)];
     for (index, outline) in recording.vehicle.wheels.iter().enumerate() {
-        let angle = wheels.and_then(|sample| sample.wheels.get(index)).map_or(0.0, |w| w.angle_rad);
-        // Forward rolling turns z towards x: a positive turn about y.
-        let (sin, cos) = libm::sincos(0.5 * angle);
-        all.push(transform(BASE, &outline.name, outline.hub_m, [0.0, sin, 0.0, cos]));
+        let wheel = wheels.and_then(|sample| sample.wheels.get(index));
+        let (hub_m, steering, angle) =
+            wheel.map_or((outline.hub_m, 0.0, 0.0), |w| (w.hub_m, w.steering_rad, w.angle_rad));
+        all.push(transform(BASE, &outline.name, hub_m, wheel_rotation(steering, angle)));
     }
     fox::FrameTransforms { transforms: all }
+}
+
+/// Quaternion of a wheel in base_link: steering turns its axle about z, forward rolling turns z towards x about the axle.
+pub(super) fn wheel_rotation(steering_rad: f64, angle_rad: f64) -> [f64; 4] {
+    let ((sin, cos), (steer_sin, steer_cos)) = (libm::sincos(0.5 * angle_rad), libm::sincos(0.5 * steering_rad));
+    [-steer_sin * sin, steer_cos * sin, steer_sin * cos, steer_cos * cos]
 }
 
 fn vehicle_pose(state: &StateSample, time: Timestamp) -> fox::PoseInFrame {
@@ -245,7 +253,7 @@ pub(super) fn corridor(mission: &MissionMcap) -> Vec<Square> {
 }
 
 /// `v` turned by a unit quaternion `[x, y, z, w]`: v + 2 w (q x v) + 2 q x (q x v).
-fn rotated([qx, qy, qz, qw]: [f64; 4], v: [f64; 3]) -> [f64; 3] {
+pub(super) fn rotated([qx, qy, qz, qw]: [f64; 4], v: [f64; 3]) -> [f64; 3] {
     let cross =
         |a: [f64; 3], b: [f64; 3]| [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
     let q = [qx, qy, qz];

@@ -81,6 +81,8 @@ fn drive(dem: &Grid, start: [f64; 2], seconds: usize) -> Recording {
             lateral_force_n: 10.0 * stream.normal(),
             slip_ratio: 0.01 * stream.normal(),
             contact_m: [x, y, dem.height(x, y).unwrap()],
+            steering_rad: 0.0,
+            hub_m: outline.hub_m,
         }
     };
     let wheels = states
@@ -88,6 +90,7 @@ fn drive(dem: &Grid, start: [f64; 2], seconds: usize) -> Recording {
         .map(|s| WheelSample {
             time_s: s.time_s,
             wheels: vehicle.wheels.iter().map(|w| wheel(s, w, &mut stream)).collect(),
+            chassis_force_n: 0.0,
         })
         .collect();
     let imu = (0..=100 * seconds)
@@ -264,6 +267,19 @@ fn off_mesh(triangles: &[[[f64; 3]; 3]], p: [f64; 3]) -> f64 {
         inside.then(|| (0..3).map(|k| shares[k] * t[k][2]).sum::<f64>())
     };
     triangles.iter().find_map(height).map_or(f64::INFINITY, |z| (z - p[2]).abs())
+}
+
+/// The axle of a wheel that is steered to the left points left and back, however far the wheel has rolled; a quarter of a
+/// turn forward brings the top of a straight wheel to the front.
+#[test]
+fn val_wheels_are_steered_and_turned() {
+    let near = |a: [f64; 3], b: [f64; 3]| (0..3).all(|i| (a[i] - b[i]).abs() < 1e-12);
+    let quarter = std::f64::consts::FRAC_PI_2;
+    assert!(near(messages::rotated(messages::wheel_rotation(0.0, quarter), [0.0, 0.0, 1.0]), [1.0, 0.0, 0.0]));
+    let (sin, cos) = libm::sincos(0.3);
+    for angle in [0.0, 1.0, 100.0] {
+        assert!(near(messages::rotated(messages::wheel_rotation(0.3, angle), [0.0, 1.0, 0.0]), [-sin, cos, 0.0]));
+    }
 }
 
 /// A mission of 37 s on a terrain of 1009 x 1009 cells: the size of a file is a stated figure.

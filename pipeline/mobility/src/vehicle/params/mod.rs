@@ -1,10 +1,16 @@
 //! Parameters of a vehicle: the raw form of its data file.
 
+mod drive;
+mod suspension;
+
+pub use drive::{AckermannParameters, DriveParameters, SkidSteerParameters};
+pub use suspension::{IndependentParameters, RockerBogieParameters, SuspensionParameters};
+
 use sastrugi_schemas::ParameterError;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// A wheeled vehicle without suspension. Frame base_link: x forward, y left, z up.
+/// A wheeled vehicle. Frame base_link: x forward, y left, z up.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct VehicleParameters {
@@ -12,6 +18,8 @@ pub struct VehicleParameters {
     pub chassis: ChassisParameters,
     /// Wheels: one on either side of every axle.
     pub wheels: WheelParameters,
+    /// How the wheels hang on the chassis.
+    pub suspension: SuspensionParameters,
     /// Contact of a wheel with the ground.
     pub tyre: TyreParameters,
     /// Contact of the chassis with the ground.
@@ -96,34 +104,6 @@ pub struct BellyParameters {
     pub tangential_damping_n_s_m: f64,
 }
 
-/// Motors and steering.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(tag = "kind", rename_all = "snake_case")]
-pub enum DriveParameters {
-    /// The wheels of one side turn together; the vehicle turns by driving its sides at different speeds.
-    SkidSteer(SkidSteerParameters),
-}
-
-/// Skid steering with one motor channel per side.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct SkidSteerParameters {
-    /// Largest torque of a side, N m.
-    pub torque_limit_n_m: f64,
-    /// Torque of a side per difference between commanded and actual wheel speed, N m s/rad.
-    pub servo_gain_n_m_s: f64,
-    /// Largest commanded speed, m/s.
-    pub speed_limit_m_s: f64,
-    /// Largest change of the commanded speed, m/s2.
-    pub acceleration_limit_m_s2: f64,
-    /// Largest commanded yaw rate, rad/s.
-    pub yaw_rate_limit_rad_s: f64,
-    /// Largest change of the commanded yaw rate, rad/s2.
-    pub yaw_acceleration_limit_rad_s2: f64,
-    /// The wheel speeds are computed for a track wider by this factor, which makes up for the skidding.
-    pub track_multiplier: f64,
-}
-
 impl VehicleParameters {
     /// Checks every number and how they fit together.
     pub(crate) fn check(&self) -> Result<(), ParameterError> {
@@ -131,8 +111,9 @@ impl VehicleParameters {
         self.wheels.check().map_err(|e| e.within("wheels"))?;
         self.tyre.check().map_err(|e| e.within("tyre"))?;
         self.belly.check().map_err(|e| e.within("belly"))?;
-        let DriveParameters::SkidSteer(drive) = &self.drive;
-        drive.check().map_err(|e| e.within("drive"))?;
+        let axles = self.wheels.axles_m.len();
+        self.suspension.check(axles).map_err(|e| e.within("suspension"))?;
+        self.drive.check(axles).map_err(|e| e.within("drive"))?;
         self.check_balance()
     }
 
@@ -155,6 +136,9 @@ impl VehicleParameters {
         Ok(())
     }
 }
+
+/// Most axles of a vehicle.
+pub(crate) const AXLES_MAX: usize = 9;
 
 /// `Ok` when every named value is finite and above 0.
 fn all_positive<const N: usize>(values: [(&str, f64); N]) -> Result<(), ParameterError> {
@@ -202,8 +186,9 @@ impl WheelParameters {
 
     /// No wheel stands inside another.
     fn check_room(&self) -> Result<(), ParameterError> {
-        if self.axles_m.len() < 2 {
-            return Err(ParameterError::new("axles_m", "needs at least 2 axles, front to rear"));
+        if !(2..=AXLES_MAX).contains(&self.axles_m.len()) {
+            let message = format!("lists {} axles; it takes 2 to {AXLES_MAX}, front to rear", self.axles_m.len());
+            return Err(ParameterError::new("axles_m", message));
         }
         let diameter = 2.0 * self.radius_m;
         if let Some(pair) = self.axles_m.windows(2).find(|pair| pair[0] - pair[1] < diameter) {
@@ -246,19 +231,5 @@ impl BellyParameters {
         ParameterError::not_negative("dissipation_s_m", self.dissipation_s_m)?;
         ParameterError::not_negative("tangential_damping_n_s_m", self.tangential_damping_n_s_m)?;
         finite("bumper_z_m", self.bumper_z_m)
-    }
-}
-
-impl SkidSteerParameters {
-    fn check(&self) -> Result<(), ParameterError> {
-        all_positive([
-            ("torque_limit_n_m", self.torque_limit_n_m),
-            ("servo_gain_n_m_s", self.servo_gain_n_m_s),
-            ("speed_limit_m_s", self.speed_limit_m_s),
-            ("acceleration_limit_m_s2", self.acceleration_limit_m_s2),
-            ("yaw_rate_limit_rad_s", self.yaw_rate_limit_rad_s),
-            ("yaw_acceleration_limit_rad_s2", self.yaw_acceleration_limit_rad_s2),
-            ("track_multiplier", self.track_multiplier),
-        ])
     }
 }

@@ -1,0 +1,91 @@
+//! How the wheels hang on the chassis.
+
+use super::{all_positive, finite};
+use sastrugi_schemas::ParameterError;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// How the wheels hang on the chassis.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum SuspensionParameters {
+    /// Axles fixed to the chassis.
+    Rigid,
+    /// Every wheel moves up and down by itself, on a spring and a damper.
+    Independent(IndependentParameters),
+    /// Three axles without springs: on either side a rocker carries the front wheel and, on a bogie, the middle and the rear
+    /// wheel; a differential turns the rockers of both sides by opposite angles.
+    RockerBogie(RockerBogieParameters),
+}
+
+/// Springs and dampers of single wheels. At zero travel every spring carries an equal share of the chassis.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct IndependentParameters {
+    /// Spring stiffness at the wheel, N/m.
+    pub stiffness_n_m: f64,
+    /// Damping at the wheel, N s/m.
+    pub damping_n_s_m: f64,
+    /// Travel of the wheel from zero up to the stop, m.
+    pub bump_m: f64,
+    /// Travel of the wheel from zero down to the stop, m.
+    pub droop_m: f64,
+    /// Stiffness of either stop, N/m.
+    pub stop_stiffness_n_m: f64,
+}
+
+/// Rockers and bogies. Pivots turn about the transverse axis.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RockerBogieParameters {
+    /// Pivot of the rockers on the chassis in base_link, `[x, z]`, m.
+    pub rocker_pivot_m: [f64; 2],
+    /// Pivot of the bogies on the rockers in base_link with all joints at zero, `[x, z]`, m.
+    pub bogie_pivot_m: [f64; 2],
+    /// Largest angle of a rocker to either side, deg, below 90.
+    pub rocker_limit_deg: f64,
+    /// Largest angle of a bogie against its rocker to either side, deg, below 90.
+    pub bogie_limit_deg: f64,
+    /// Friction of a joint as damping, N m s/rad.
+    pub damping_n_m_s: f64,
+    /// Stiffness of the stops, N m/rad.
+    pub stop_stiffness_n_m: f64,
+}
+
+impl SuspensionParameters {
+    /// Checks every number, for a vehicle with that many axles.
+    pub(super) fn check(&self, axles: usize) -> Result<(), ParameterError> {
+        match self {
+            Self::Rigid => Ok(()),
+            Self::Independent(springs) => springs.check(),
+            Self::RockerBogie(_) if axles != 3 => {
+                let message = format!("is `rocker_bogie`, which needs 3 axles; the vehicle has {axles}");
+                Err(ParameterError::new("kind", message))
+            }
+            Self::RockerBogie(linkage) => linkage.check(),
+        }
+    }
+}
+
+impl IndependentParameters {
+    fn check(&self) -> Result<(), ParameterError> {
+        ParameterError::not_negative("damping_n_s_m", self.damping_n_s_m)?;
+        all_positive([
+            ("stiffness_n_m", self.stiffness_n_m),
+            ("bump_m", self.bump_m),
+            ("droop_m", self.droop_m),
+            ("stop_stiffness_n_m", self.stop_stiffness_n_m),
+        ])
+    }
+}
+
+impl RockerBogieParameters {
+    fn check(&self) -> Result<(), ParameterError> {
+        self.rocker_pivot_m.into_iter().try_for_each(|v| finite("rocker_pivot_m", v))?;
+        self.bogie_pivot_m.into_iter().try_for_each(|v| finite("bogie_pivot_m", v))?;
+        ParameterError::between("rocker_limit_deg", self.rocker_limit_deg, 0.0, 90.0)?;
+        ParameterError::between("bogie_limit_deg", self.bogie_limit_deg, 0.0, 90.0)?;
+        ParameterError::not_negative("damping_n_m_s", self.damping_n_m_s)?;
+        ParameterError::positive("stop_stiffness_n_m", self.stop_stiffness_n_m).map(drop)
+    }
+}
