@@ -2,6 +2,8 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may end where it stands")]
 
+mod traverse;
+
 use sastrugi_tests::{area, sastrugi_in, small_study, sums, write};
 use serde_json::Value;
 use std::fs;

@@ -2,6 +2,9 @@
 
 #![allow(clippy::expect_used, reason = "a test may end where it stands")]
 
+use parquet::file::reader::FileReader;
+use parquet::file::serialized_reader::SerializedFileReader;
+use parquet::record::Field;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -132,6 +135,39 @@ missions = "short"
 "#,
         dem.display()
     )
+}
+
+/// One row of a table: values by column; text, numbers, or null.
+pub type Row = BTreeMap<String, serde_json::Value>;
+
+/// The rows of a table of a release, in order; none where it has no file.
+///
+/// # Panics
+/// When a file of the table cannot be read.
+pub fn rows(release: &Path, table: &str) -> Vec<Row> {
+    let Ok(parts) = std::fs::read_dir(release.join("tables").join(table)) else { return Vec::new() };
+    let mut parts: Vec<PathBuf> = parts.map(|e| e.expect("a part").path()).collect();
+    parts.sort();
+    parts.iter().flat_map(|part| rows_of(part)).collect()
+}
+
+fn rows_of(part: &Path) -> Vec<Row> {
+    let file = std::fs::File::open(part).expect("a part can be opened");
+    let reader = SerializedFileReader::new(file).expect("a part is Parquet");
+    let row = |row: parquet::errors::Result<parquet::record::Row>| {
+        let row = row.expect("a row can be read");
+        row.get_column_iter().map(|(name, field)| (name.clone(), value(field))).collect()
+    };
+    reader.get_row_iter(None).expect("a part has rows").map(row).collect()
+}
+
+fn value(field: &Field) -> serde_json::Value {
+    match field {
+        Field::Str(text) => text.as_str().into(),
+        Field::Long(number) => (*number).into(),
+        Field::Double(number) => (*number).into(),
+        _ => serde_json::Value::Null,
+    }
 }
 
 /// Writes a text file.

@@ -74,7 +74,9 @@ pub enum Verb {
     #[command(after_help = "Example:\n  sastrugi roughness terrain.tif --classes classes.tif")]
     Roughness(Roughness),
     /// Drive missions over one DEM, to a release of their own.
-    #[command(after_help = "Example:\n  sastrugi traverse terrain.tif --vehicle husky_a200 --missions 5 -o drive")]
+    #[command(after_help = "Examples:\n  sastrugi traverse terrain.tif --vehicle husky_a200 --missions 5 -o drive\n  \
+        sastrugi traverse bar.tif --set-missions length_m=2 --set-missions border_m=0.5 \\\n    \
+        --set-roughness closing_radius_m=0 --replicates 8 -o drive")]
     Traverse(Traverse),
     /// Write the report of a release: one offline HTML page, figures as SVG, numbers as JSON.
     #[command(after_help = "Example:\n  sastrugi report release -o release-report")]
@@ -373,9 +375,15 @@ pub struct Traverse {
     /// Number of missions.
     #[arg(long, value_name = "N", default_value_t = 20)]
     pub missions: u32,
+    /// Starts driven of each mission: the drawn one and perturbed ones, for a probability of success.
+    #[arg(long, value_name = "N")]
+    pub replicates: Option<u32>,
     /// Seed of the random streams.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
+    /// A setting of `[roughness]` (see `schema`), by which starts and goals are judged, `name=value`.
+    #[arg(long = "set-roughness", value_name = "K=V")]
+    pub set_roughness: Vec<String>,
     /// A rule of the missions (see `kinds`), `name=value`.
     #[arg(long = "set-missions", value_name = "K=V")]
     pub set_missions: Vec<String>,

@@ -3,11 +3,11 @@
 use crate::jobs::{self, ItemRef, Job};
 use crate::runner::graph::{Graph, InputFile, Node};
 use crate::study::{Entry, Study, StudyError};
-use sastrugi_numeric::Streams;
+use sastrugi_numeric::{Geometry, Streams};
 use sastrugi_schemas::Kind;
 use sastrugi_schemas::fit::Source;
 use sastrugi_schemas::kind::schema_of;
-use sastrugi_schemas::study as envelope;
+use sastrugi_schemas::study::{self as envelope, Pairing};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -134,6 +134,10 @@ pub struct Heightfield {
     pub item: ItemRef,
     /// Label for statistics.
     pub group: Option<String>,
+    /// What differs from other heightfields of the group.
+    pub variant: Option<String>,
+    /// Position among the replicates of its item, from 0; measured DEMs have none.
+    pub replicate: Option<u64>,
     /// Generator, method or file format.
     pub kind: String,
     /// Full parameters.
@@ -146,6 +150,8 @@ pub struct Heightfield {
     pub cells: u64,
     /// Smaller side of a cell, m, where it is known before the run.
     pub cell_m: Option<f64>,
+    /// Shape and place, where they are known before the run.
+    pub geometry: Option<Geometry>,
 }
 
 /// A graph under construction, with what later sections refer to.
@@ -158,7 +164,7 @@ pub struct Builder<'a> {
     pub families: BTreeMap<String, Vec<String>>,
     /// Ids of fits.
     pub fits: Vec<String>,
-    /// Missions by id: what was drawn on which heightfields.
+    /// Missions by id: what is drawn on which heightfields.
     pub missions: BTreeMap<String, jobs::missions::Drawn>,
     /// Where each input file goes in the release.
     pub inputs: Vec<InputPlace>,
@@ -200,6 +206,22 @@ impl Builder<'_> {
         match seed {
             Some(seed) => Streams::for_seed(seed.wrapping_add(replicate), stage),
             None => Streams::for_item(self.study.head.seed, stage, id),
+        }
+    }
+
+    /// True when replicates with the same number share their random draws.
+    pub fn is_paired(&self) -> bool {
+        self.study.head.pairing == Pairing::Common
+    }
+
+    /// Names a family of ids, to which references resolve.
+    ///
+    /// # Errors
+    /// When another family has that name.
+    pub fn name_family(&mut self, entry: &Entry<'_>, name: &str, ids: Vec<String>) -> Result<(), StudyError> {
+        match self.families.insert(name.to_owned(), ids) {
+            None => Ok(()),
+            Some(_) => Err(entry.error("id", format!("the id \"{name}\" is taken; ids are unique in a study"))),
         }
     }
 

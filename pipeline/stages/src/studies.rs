@@ -78,6 +78,7 @@ fn released_text(text: &str, study: &Study, plan: &Plan) -> String {
 }
 
 /// A run.
+#[derive(Clone, Copy)]
 pub struct RunRequest<'a> {
     /// Release folder, or folder of the shard.
     pub output: &'a Path,
@@ -85,6 +86,8 @@ pub struct RunRequest<'a> {
     pub work: Option<&'a Path>,
     /// Part of the study to run.
     pub part: Option<Part>,
+    /// The stage whose results are asked for: without any of them there is nothing to release.
+    pub purpose: Option<&'static str>,
     /// Limits.
     pub limits: Limits,
 }
@@ -122,9 +125,7 @@ pub fn run(loaded: &Loaded, request: &RunRequest<'_>, progress: &dyn Progress) -
     let needed = graph.closure(chosen);
     let execution = execute(graph, &cache, &needed, request.limits, progress);
     write_timings(&cache, &execution)?;
-    // Files are only copied: with nothing else there is no release to make.
-    let copies = [original::STAGE, mask::STAGE];
-    let made = execution.done.iter().any(|&p| !copies.contains(&graph.node(p).item.stage.as_str()));
+    let made = execution.done.iter().any(|&p| is_worth_a_release(&graph.node(p).item.stage, request.purpose));
     if !made && !execution.failures.is_empty() {
         return Err(all_failed(&execution.failures));
     }
@@ -140,6 +141,11 @@ pub fn run(loaded: &Loaded, request: &RunRequest<'_>, progress: &dyn Progress) -
     cache.drop_orphans(graph)?;
     let computed = execution.seconds.len() - execution.failures.iter().filter(|f| f.skipped_for.is_none()).count();
     Ok(RunSummary { output: request.output.to_owned(), items: needed.len(), computed, failures: execution.failures })
+}
+
+/// Files are only copied: with nothing else there is no release to make.
+fn is_worth_a_release(stage: &str, purpose: Option<&str>) -> bool {
+    purpose.map_or(![original::STAGE, mask::STAGE].contains(&stage), |purpose| purpose == stage)
 }
 
 /// A folder that is not ours is refused before any work is done.

@@ -128,7 +128,7 @@ fn recompute_all(
 ) -> Result<(), Error> {
     let output = scratch.join("release");
     let work = scratch.join("work");
-    run(loaded, &RunRequest { output: &output, work: Some(&work), part: None, limits }, progress)?;
+    run(loaded, &RunRequest { output: &output, work: Some(&work), part: None, purpose: None, limits }, progress)?;
     let again = Release::open(&output).map_err(release_error)?;
     verification.recomputed = loaded.graph.nodes().iter().map(|n| n.item.to_string()).collect();
     let sums = |r: &Release| -> BTreeMap<String, String> {

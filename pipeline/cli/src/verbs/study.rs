@@ -1,7 +1,7 @@
 //! Verbs on studies and releases.
 
 use crate::Verdict;
-use crate::args::{Common, Merge, Plan, Report, Run, Traverse, Verify};
+use crate::args::{Common, Merge, Place, Plan, Report, Run, Traverse, Verify};
 use crate::failure::{Code, Failure};
 use crate::output::{bytes, columns, print, seconds};
 use crate::progress::Teller;
@@ -31,7 +31,8 @@ pub fn run(args: &Run, common: &Common) -> Verdict {
     let part = args.shard.as_deref().map(Part::parse).transpose()?;
     let limits = limits(args.memory)?;
     let loaded = studies::load(&args.study)?;
-    let request = RunRequest { output: &args.place.output, work: args.place.work.as_deref(), part, limits };
+    let Place { output, work } = &args.place;
+    let request = RunRequest { output, work: work.as_deref(), part, purpose: None, limits };
     finish_run(common, |teller| Ok(studies::run(&loaded, &request, teller)?))
 }
 
@@ -45,11 +46,16 @@ pub fn traverse(args: &Traverse, common: &Common) -> Verdict {
     let mut missions = json!({ "count": args.missions });
     parameters::assign(&mut missions, &args.set_missions)?;
     let mut parameters = json!({ "vehicle": args.vehicle });
+    if let Some(replicates) = args.replicates {
+        parameters["replicates"] = json!(replicates);
+    }
     parameters::assign(&mut parameters, &args.set)?;
-    let request = drive::Request { dem: &args.dem, seed: args.seed, missions, parameters, date: &args.date };
-    let limits = limits(MEMORY_GIB)?;
-    let run = RunRequest { output: &args.place.output, work: args.place.work.as_deref(), part: None, limits };
-    finish_run(common, |teller| Ok(drive::traverse(&request, &run, teller)?))
+    let mut roughness = json!({});
+    parameters::assign(&mut roughness, &args.set_roughness)?;
+    let request = drive::Request { dem: &args.dem, seed: args.seed, roughness, missions, parameters, date: &args.date };
+    let Place { output, work } = &args.place;
+    let place = drive::Place { output, work: work.as_deref(), limits: limits(MEMORY_GIB)? };
+    finish_run(common, |teller| Ok(drive::traverse(&request, &place, teller)?))
 }
 
 /// Runs, says what it came to, and gives the exit code.

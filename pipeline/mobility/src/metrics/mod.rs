@@ -21,7 +21,7 @@ mod rows;
 #[cfg(test)]
 mod tests;
 
-pub use rows::{MissionLabels, mission_row, sample_rows};
+pub use rows::{MissionLabels, mission_row, replicate_row, sample_rows};
 
 use sastrugi_numeric::sums;
 use sastrugi_schemas::topics::StateSample;

@@ -3,7 +3,7 @@
 use super::{Differentiator, EulerAngles, Metrics};
 use crate::missions::{Difficulty, Mission, class_at};
 use sastrugi_numeric::Grid;
-use sastrugi_schemas::tables::{MissionRow, SampleRow};
+use sastrugi_schemas::tables::{MissionRow, ReplicateRow, SampleRow};
 use sastrugi_schemas::topics::{CommandSample, EventKind, Recording, StateSample};
 
 /// What the tables say about a mission beside what happened in it.
@@ -70,6 +70,34 @@ pub fn mission_row(
         samples: recording.states.len() as i64,
         sample_rate_hz: recording.sample_rate_hz,
         path: labels.path.clone(),
+    }
+}
+
+/// The row of one of a mission's starts; `replicate` counts from 1.
+pub fn replicate_row(
+    labels: &MissionLabels,
+    start: &Mission,
+    replicate: i64,
+    recording: &Recording,
+    differentiator: Differentiator,
+) -> ReplicateRow {
+    let metrics = Metrics::of(&recording.states, recording.sample_rate_hz, differentiator);
+    let outcome = recording.events.last();
+    ReplicateRow {
+        terrain_id: labels.terrain_id.clone(),
+        mission_id: start.id(),
+        replicate,
+        group: labels.group.clone(),
+        variant: labels.variant.clone(),
+        start_x_m: start.start_m[0],
+        start_y_m: start.start_m[1],
+        start_heading_deg: start.heading_rad.to_degrees(),
+        outcome: outcome.map_or("", |event| event.kind.name()).to_owned(),
+        time_s: outcome.map_or(f64::NAN, |event| event.time_s),
+        progress_m: progress_m(start, recording),
+        rms_vertical_acceleration_m_s2: metrics.rms_vertical_acceleration_m_s2,
+        rms_pitch_rate_deg_s: metrics.rms_pitch_rate_rad_s.to_degrees(),
+        rms_roll_rate_deg_s: metrics.rms_roll_rate_rad_s.to_degrees(),
     }
 }
 

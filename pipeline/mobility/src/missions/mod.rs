@@ -8,16 +8,21 @@
 //! none of those before. The paper does not say what happens on a terrain that allows no mission: here the draws are
 //! counted and end in an error.
 //!
+//! Terrains that are to be compared line by line share their missions: those are drawn on the [`worst_classes`] of their
+//! maps, so that the rules hold on every one of them. [`ReplicateSettings`] perturbs the start of a drawn mission.
+//!
 //! Cost: one pass over the map and a few draws per mission; memory: four bytes per eligible cell.
 
 mod difficulty;
 mod params;
+mod perturb;
 #[cfg(test)]
 mod tests;
 
 pub use difficulty::Difficulty;
 pub(crate) use difficulty::class_at;
 pub use params::{MissionParameters, MissionSettings};
+pub use perturb::{ReplicateParameters, ReplicateSettings};
 
 use sastrugi_numeric::{Geometry, Grid, Stream, Streams};
 use sastrugi_schemas::RoughnessClass;
@@ -31,7 +36,8 @@ pub struct Mission {
     pub start_m: [f64; 2],
     /// Goal point `[x, y]`, m.
     pub goal_m: [f64; 2],
-    /// Direction from start to goal, counterclockwise from east, rad, in [0, 2 pi).
+    /// Direction in which the vehicle stands at the start, counterclockwise from east, rad, in [0, 2 pi); of a drawn mission
+    /// that from start to goal.
     pub heading_rad: f64,
     /// Draws of start and heading that were needed, at least 1.
     pub draws: u32,
@@ -43,11 +49,10 @@ impl Mission {
         mission_id(self.index)
     }
 
-    /// The straight mission between two points.
+    /// The straight mission between two points, facing the goal.
     pub fn between(index: usize, start_m: [f64; 2], goal_m: [f64; 2]) -> Self {
         let bearing = libm::atan2(goal_m[1] - start_m[1], goal_m[0] - start_m[0]);
-        let heading_rad = if bearing < 0.0 { bearing + std::f64::consts::TAU } else { bearing };
-        Self { index, start_m, goal_m, heading_rad, draws: 1 }
+        Self { index, start_m, goal_m, heading_rad: normalized(bearing), draws: 1 }
     }
 
     /// Distance from start to goal, m.
@@ -111,6 +116,18 @@ pub enum MissionError {
         /// Mission length, m.
         length_m: f64,
     },
+}
+
+/// The worse class of two maps in every cell; a cell without data in either has none in `worst`. False, and no change, where
+/// the maps do not cover the same cells.
+#[must_use]
+pub fn worst_classes(worst: &mut Grid<u8>, other: &Grid<u8>) -> bool {
+    if worst.geometry != other.geometry {
+        return false;
+    }
+    // Codes grow with the roughness, and that for no data is the largest.
+    worst.values.iter_mut().zip(&other.values).for_each(|(worst, other)| *worst = (*worst).max(*other));
+    true
 }
 
 /// Draws the missions of one terrain from its closed class map (codes of [`RoughnessClass`]).
@@ -201,6 +218,16 @@ fn is_inside(geometry: &Geometry, border_m: f64, point_m: [f64; 2]) -> bool {
 /// Centre of the cell with that row-major index.
 fn centre(classes: &Grid<u8>, index: usize) -> [f64; 2] {
     [classes.geometry.x(index % classes.cols()), classes.geometry.y(index / classes.cols())]
+}
+
+/// An angle less than a turn out of [0, 2 pi) brought there, rad.
+fn normalized(angle_rad: f64) -> f64 {
+    let turn = std::f64::consts::TAU;
+    match angle_rad {
+        a if a < 0.0 => a + turn,
+        a if a >= turn => a - turn,
+        a => a,
+    }
 }
 
 fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {

@@ -70,6 +70,28 @@ fn stat_starts_and_headings_are_uniform() {
     assert!((mean(&|m| m.heading_rad) - PI).abs() < five_se(PI * PI / 3.0));
 }
 
+/// What is drawn on the worst of two maps keeps the rules on both.
+#[test]
+fn val_shared_missions_keep_the_rules_on_every_terrain() {
+    let (a, mut b) = (checkerboard(), checkerboard());
+    b.values.iter_mut().for_each(|class| *class = [SEMI, HIGH, LOW][usize::from(*class)]);
+    b.values[..1009 * 300].fill(LOW);
+    let mut worst = a.clone();
+    assert!(worst_classes(&mut worst, &b));
+    let missions = draw_missions(&worst, &settings(|p| p.count = 100), &streams()).unwrap();
+    for m in &missions {
+        for map in [&a, &b] {
+            assert_eq!(class_at(map, m.start_m[0], m.start_m[1]), Some(RoughnessClass::Low));
+            assert!(class_at(map, m.goal_m[0], m.goal_m[1]).unwrap() <= RoughnessClass::Semi);
+        }
+    }
+    let mut holed = a.clone();
+    holed.values[7] = RoughnessClass::NO_DATA;
+    assert!(worst_classes(&mut holed, &b) && holed.values[7] == RoughnessClass::NO_DATA);
+    let other = Grid::filled(Geometry::square(1009, 1009, 0.1), LOW);
+    assert!(!worst_classes(&mut holed, &other), "cells of another size");
+}
+
 #[test]
 fn val_impossible_terrains_are_refused_with_the_reason() {
     let draw = |classes: &Grid<u8>, s: &MissionSettings| draw_missions(classes, s, &streams()).unwrap_err();

@@ -108,12 +108,15 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
         let field = Heightfield {
             item: ItemRef::new(STAGE, &id),
             group: item.group.clone(),
+            variant: None,
+            replicate: None,
             kind: original::extension(&item.file),
             parameters: recipe(&item),
             stream: None,
             release_path: format!("dem/{id}.metric.tif"),
             cells: claimed.cells,
             cell_m: claimed.cell_m,
+            geometry: None,
         };
         let (bytes, release_path, inputs) = (original.bytes(), original.release_path().to_owned(), original.inputs());
         let original = original.node(original::STAGE, &id);
@@ -123,7 +126,7 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
         builder.node(&entry, original)?;
         builder.node(&entry, node)?;
         builder.heightfield(&entry, &id, field)?;
-        builder.families.insert(id.clone(), vec![id]);
+        builder.name_family(&entry, &id, vec![id.clone()])?;
     }
     Ok(())
 }

@@ -15,7 +15,7 @@ pub mod traverse;
 use crate::revision::Room;
 use sastrugi_schemas::tables::{
     CandidateCurveRow, CandidateRow, CovarianceRow, FitRow, HeightDistributionRow, LikelihoodProfileRow, MissionRow,
-    ProfilePsdRow, PsdRow, ScoreCovarianceRow, ScoreRow, StructureRow, SurfaceRow, TerrainRow,
+    ProfilePsdRow, PsdRow, ReplicateRow, ScoreCovarianceRow, ScoreRow, StructureRow, SurfaceRow, TerrainRow,
 };
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -163,6 +163,8 @@ pub struct Rows {
     pub scoreboard_covariance: Vec<ScoreCovarianceRow>,
     /// Table `missions`.
     pub missions: Vec<MissionRow>,
+    /// Table `replicates`.
+    pub replicates: Vec<ReplicateRow>,
 }
 
 /// Why an item has no result.

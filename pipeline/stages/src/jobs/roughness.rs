@@ -40,7 +40,7 @@ impl RoughnessJob {
         TerrainRow {
             terrain_id: self.id.clone(),
             group: self.field.group.clone(),
-            variant: None,
+            variant: self.field.variant.clone(),
             stage: self.field.item.stage.clone(),
             kind: self.field.kind.clone(),
             params: self.field.parameters.to_string(),
@@ -113,6 +113,7 @@ impl Job for RoughnessJob {
         json!({
             "section": self.section,
             "group": self.field.group,
+            "variant": self.field.variant,
             "kind": self.field.kind,
             "params": self.field.parameters,
             "path": self.field.release_path,

@@ -5,12 +5,15 @@ use super::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work};
 use crate::registry::{BuildError, Builder, Heightfield};
 use crate::revision::Room;
 use crate::runner::graph::Node;
+use crate::study::Entry;
+use crate::study::entry::Expanded;
 use sastrugi_numeric::{Grid, Streams};
 use sastrugi_schemas::study::TerrainItem;
 use sastrugi_store::dem::{self, Crs};
 use sastrugi_store::digest;
 use sastrugi_terrain::Generator;
 use serde_json::{Value, json};
+use std::collections::BTreeMap;
 
 /// Name of the stage.
 pub const STAGE: &str = "terrain";
@@ -34,20 +37,24 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
             entry.check_keys::<TerrainItem>(&params, &kind.parameters)?;
         }
         let expanded = entry.expand(&item.id, item.count, &item.sweep, &params)?;
-        let ids = expanded.iter().map(|e| e.id.clone()).collect();
+        name_families(builder, &entry, &item.id, &expanded)?;
         for one in expanded {
             builder.claim(&entry, STAGE, &one.id)?;
             let generator = sastrugi_terrain::prepare(&item.kind, &one.params).map_err(|e| entry.refuse(e))?;
-            let streams = builder.streams(STAGE, &one.id, item.seed, one.replicate);
+            let shared = builder.is_paired().then(|| common(one.replicate));
+            let streams = builder.streams(STAGE, shared.as_ref().unwrap_or(&one.id), item.seed, one.replicate);
             let field = Heightfield {
                 item: ItemRef::new(STAGE, &one.id),
-                group: item.group.clone().or(one.sweep_group),
+                group: item.group.clone().or_else(|| one.sweep.clone()),
+                variant: one.sweep.filter(|_| item.group.is_some()),
+                replicate: Some(one.replicate),
                 kind: item.kind.clone(),
                 parameters: generator.parameters(),
                 stream: Some(streams.label()),
                 release_path: format!("terrain/{}.tif", one.id),
                 cells: generator.geometry().len() as u64,
                 cell_m: Some(generator.geometry().cell.into_iter().fold(f64::INFINITY, f64::min)),
+                geometry: Some(generator.geometry()),
             };
             let job = TerrainJob { id: one.id.clone(), generator, streams, png16: item.png16 };
             let node = Node {
@@ -60,8 +67,28 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
             builder.node(&entry, node)?;
             builder.heightfield(&entry, &one.id, field)?;
         }
-        builder.families.insert(item.id, ids);
     }
+    Ok(())
+}
+
+/// Word of the random streams that replicate `replicate` (from 0) shares with that of other items when they are paired.
+pub fn common(replicate: u64) -> String {
+    format!("common-{:04}", replicate + 1)
+}
+
+/// An item's id stands for all that it expands to, and the id of each of its swept parts for the replicates.
+fn name_families(
+    builder: &mut Builder<'_>,
+    entry: &Entry<'_>,
+    id: &str,
+    expanded: &[Expanded],
+) -> Result<(), BuildError> {
+    let mut parts: BTreeMap<&str, Vec<String>> = BTreeMap::new();
+    for one in expanded {
+        parts.entry(&one.part).or_default().push(one.id.clone());
+    }
+    parts.insert(id, expanded.iter().map(|one| one.id.clone()).collect());
+    parts.into_iter().try_for_each(|(name, ids)| builder.name_family(entry, name, ids))?;
     Ok(())
 }
 

@@ -145,13 +145,16 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
                     if side_by_side { builder.streams(STAGE, &id, item.seed, one.replicate) } else { streams.clone() };
                 let field = Heightfield {
                     item: ItemRef::new(STAGE, &id),
-                    group: item.group.clone().or_else(|| one.sweep_group.clone()),
+                    group: item.group.clone().or_else(|| one.sweep.clone()),
+                    variant: one.sweep.clone().filter(|_| item.group.is_some()),
+                    replicate: Some(one.replicate),
                     kind: method.clone(),
                     parameters: parameters(&item, &matched, draft.as_ref()),
                     stream: Some(streams.label()),
                     release_path: format!("texture/{id}.tif"),
                     cells: base.as_ref().or(fill.as_ref()).map_or(draft.geometry().len() as u64, |(_, cells)| *cells),
                     cell_m: Some(draft.geometry().cell.into_iter().fold(f64::INFINITY, f64::min)),
+                    geometry: None,
                 };
                 let cells = field.cells;
                 let one_of_many = item.count.is_some_and(|count| count > 1);
@@ -196,7 +199,7 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
                 builder.node(&entry, Node { item, parents, inputs: Vec::new(), stream, job: Box::new(job) })?;
             }
         }
-        builder.families.insert(item.id, ids);
+        builder.name_family(&entry, &item.id, ids)?;
     }
     Ok(())
 }

@@ -1,23 +1,28 @@
 //! Stage `traverse`: all missions of one terrain driven and recorded.
 
 use super::dem::{HEIGHTS, input_error};
-use super::{Estimate, ItemRef, Job, JobError, Outcome, Product, Rows, Work, missions, roughness};
+use super::missions::{self, Lines};
+use super::{Estimate, ItemRef, Job, JobError, Outcome, Product, Rows, Work, roughness};
 use crate::registry::{BuildError, Builder, unknown_id};
 use crate::revision::Room;
 use crate::runner::graph::Node;
+use crate::study::entry::joined;
+use crate::study::{Entry, StudyError, keys};
 use rayon::prelude::*;
-use sastrugi_mobility::metrics::{MissionLabels, mission_row, sample_rows};
-use sastrugi_mobility::missions::{Difficulty, Mission};
-use sastrugi_mobility::vehicle::{Ground, TraverseParameters, TraverseSettings, Vehicle, drive};
-use sastrugi_numeric::Grid;
-use sastrugi_schemas::Kind;
+use sastrugi_mobility::metrics::{Differentiator, MissionLabels, mission_row, replicate_row, sample_rows};
+use sastrugi_mobility::missions::{Difficulty, Mission, ReplicateParameters, ReplicateSettings};
+use sastrugi_mobility::vehicle::{Ground, TraverseError, TraverseParameters, TraverseSettings, Vehicle, drive};
+use sastrugi_numeric::{Grid, Streams};
 use sastrugi_schemas::kind::{read_parameters, schema_of};
 use sastrugi_schemas::study::{StudyHead, TraverseItem};
-use sastrugi_schemas::tables::{MissionRow, SampleRow};
+use sastrugi_schemas::tables::{MissionRow, ReplicateRow, SampleRow};
+use sastrugi_schemas::topics::{EventKind, Recording};
+use sastrugi_schemas::{Kind, ParameterError};
 use sastrugi_store::mcap::{MissionMcap, write_mission};
 use sastrugi_store::parquet::{TableMetadata, TableWriter};
 use sastrugi_store::{dem, digest};
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 /// Name of the stage.
@@ -32,26 +37,55 @@ pub fn kinds() -> Vec<Kind> {
         kind: "pure_pursuit",
         summary: "a vehicle follows each mission's line until the goal, tipping over, getting stuck, the edge, or time out",
         source: "Majhor and Bos, sections 2.3 and 2.4; model in docs/traversal.md",
-        parameters: schema_of::<TraverseParameters>(),
+        parameters: schema(),
     }]
 }
 
-struct TraverseJob {
-    traverse: String,
-    terrain: String,
-    group: Option<String>,
-    missions: ItemRef,
-    heightfield: ItemRef,
-    count: usize,
-    seconds_each: f64,
-    vehicle: Vehicle,
-    settings: TraverseSettings,
-    head: StudyHead,
+/// The parameters of the run and of the starts, side by side.
+fn schema() -> Value {
+    let (mut schema, starts) = (schema_of::<TraverseParameters>(), schema_of::<ReplicateParameters>());
+    if let (Some(all), Some(more)) = (schema["properties"].as_object_mut(), starts["properties"].as_object()) {
+        all.extend(more.clone());
+    }
+    schema
 }
 
-/// The item that drives the missions of `traverse` on a heightfield.
-fn item(traverse: &str, heightfield: &str) -> ItemRef {
-    ItemRef::new(STAGE, &format!("{traverse}@{heightfield}"))
+/// Takes the parameters of the starts and those of the run apart.
+fn split(params: &Value) -> Result<(ReplicateParameters, TraverseParameters), ParameterError> {
+    let names = keys::properties(&schema_of::<ReplicateParameters>());
+    let (starts, run): (Map<_, _>, Map<_, _>) =
+        params.as_object().cloned().unwrap_or_default().into_iter().partition(|(key, _)| names.contains(key));
+    Ok((read_parameters(&Value::Object(starts))?, read_parameters(&Value::Object(run))?))
+}
+
+/// What is driven: the same on every terrain.
+#[derive(Clone)]
+struct Drive {
+    /// Id; missions are recorded as `<id>-0001`.
+    id: String,
+    /// Swept parameters.
+    variant: Option<String>,
+    vehicle: Vehicle,
+    settings: TraverseSettings,
+    starts: ReplicateSettings,
+    head: StudyHead,
+    /// Missions on each terrain.
+    count: usize,
+    /// Rough simulated time of a mission, s.
+    seconds_each: f64,
+}
+
+struct TraverseJob {
+    drive: Drive,
+    terrain: String,
+    group: Option<String>,
+    variant: Option<String>,
+    missions: ItemRef,
+    /// Name that the missions' pair ids begin with.
+    pair: String,
+    heightfield: ItemRef,
+    /// Draws the starts beside the first.
+    streams: Streams,
 }
 
 /// The heightfield of an item of this stage.
@@ -66,43 +100,68 @@ pub fn terrain_of(item_id: &str) -> &str {
 pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
     for entry in builder.study.entries(STAGE)? {
         let (envelope, params): (TraverseItem, Value) = entry.read()?;
-        entry.check_keys::<TraverseItem>(&params, &schema_of::<TraverseParameters>())?;
-        builder.claim(&entry, STAGE, &envelope.id)?;
-        let raw: TraverseParameters = read_parameters(&params).map_err(|e| entry.refuse(e))?;
-        let (vehicle, settings) = raw.prepare().map_err(|e| entry.refuse(e))?;
         let Some(drawn) = builder.missions.get(&envelope.missions).cloned() else {
             return Err(unknown_id(&entry, "missions", &envelope.missions, builder.missions.keys()).into());
         };
-        for heightfield in &drawn.heightfields {
-            let Some(field) = builder.heightfields.get(heightfield).cloned() else { continue };
-            let missions = missions::item(&envelope.missions, heightfield);
-            let job = TraverseJob {
-                traverse: envelope.id.clone(),
-                terrain: heightfield.clone(),
-                group: field.group.clone(),
-                missions: missions.clone(),
-                heightfield: field.item.clone(),
+        for one in entry.expand(&envelope.id, None, &envelope.sweep, &params)? {
+            entry.check_keys::<TraverseItem>(&one.params, &schema())?;
+            builder.claim(&entry, STAGE, &one.id)?;
+            let (starts, raw) = split(&one.params).map_err(|e| entry.refuse(e))?;
+            let (vehicle, settings) = raw.prepare().map_err(|e| entry.refuse(e))?;
+            let starts = ReplicateSettings::new(starts, drawn.length_m).map_err(|e| entry.refuse(e))?;
+            let drive = Drive {
+                id: one.id,
+                variant: one.sweep,
+                vehicle,
+                settings,
+                starts,
+                head: builder.study.head.clone(),
                 count: drawn.count,
                 seconds_each: drawn.length_m / raw.speed_m_s,
-                vehicle: vehicle.clone(),
-                settings: settings.clone(),
-                head: builder.study.head.clone(),
             };
-            let parents = vec![field.item.clone(), roughness::item(heightfield), missions];
-            let item = item(&envelope.id, heightfield);
-            builder.node(&entry, Node { item, parents, inputs: Vec::new(), stream: None, job: Box::new(job) })?;
+            drawn.lines.iter().try_for_each(|lines| add_one(builder, &entry, &envelope.id, &drive, lines))?;
         }
     }
     Ok(())
 }
 
-/// One mission driven: its rows and its recording's content hash.
+/// Adds the run over one terrain.
+fn add_one(
+    builder: &mut Builder<'_>,
+    entry: &Entry<'_>,
+    traverse: &str,
+    drive: &Drive,
+    lines: &Lines,
+) -> Result<(), StudyError> {
+    let terrain = lines.heightfield.clone();
+    let Some(field) = builder.heightfields.get(&terrain) else { return Ok(()) };
+    // Named by the table, not by the swept part, so that every value of a sweep has the same starts.
+    let streams = builder.streams(STAGE, &format!("{traverse}@{}", lines.word), None, 0);
+    let stream = (drive.starts.count() > 1).then(|| streams.label());
+    let parents = vec![field.item.clone(), roughness::item(&terrain), lines.item.clone()];
+    let item = ItemRef::new(STAGE, &format!("{}@{terrain}", drive.id));
+    let job = TraverseJob {
+        drive: drive.clone(),
+        group: field.group.clone(),
+        variant: joined(field.variant.as_deref(), drive.variant.as_deref()),
+        missions: lines.item.clone(),
+        pair: lines.pair.clone(),
+        heightfield: field.item.clone(),
+        streams,
+        terrain,
+    };
+    builder.node(entry, Node { item, parents, inputs: Vec::new(), stream, job: Box::new(job) })
+}
+
+/// One mission driven: its rows and the content hash of its recording, which is on disk.
 struct Driven {
     file: String,
     release_path: String,
     content: String,
     messages: u64,
     row: MissionRow,
+    /// One per start, where there are several.
+    replicates: Vec<ReplicateRow>,
     samples: Vec<SampleRow>,
 }
 
@@ -119,28 +178,35 @@ impl TraverseJob {
         let heights = dem::read(&work.parent(&self.heightfield, HEIGHTS)?).map_err(|e| input_error(&e))?;
         let path = work.parent(&roughness::item(&self.terrain), roughness::CLASSES_RAW)?;
         let classes = dem::read_classes(&path).map_err(|e| input_error(&e))?;
-        let ground = Ground::new(&heights.grid, &self.vehicle).map_err(JobError::new)?;
+        let ground =
+            Ground::new(&heights.grid, &self.drive.vehicle).map_err(|e| JobError::input(format!("cannot {e}")))?;
         let heights_sha256 = digest::heights(&heights.grid);
         Ok(Site { ground, heights: heights.grid, heights_sha256, classes })
     }
 
+    /// Drives a mission from all its starts; the first is recorded.
     fn drive(&self, work: &Work<'_>, site: &Site, mission: &Mission) -> Result<Driven, JobError> {
-        let id = format!("{}-{:04}", self.traverse, mission.index + 1);
+        let id = format!("{}-{:04}", self.drive.id, mission.index + 1);
         let fail = |e: &dyn std::fmt::Display| JobError::new(format!("{id}: {e}"));
-        let recording = drive(&site.ground, &self.vehicle, &self.settings, mission).map_err(|e| fail(&e))?;
         let release_path = format!("mcap/{}/{id}.mcap", self.terrain);
         let labels = MissionLabels {
             terrain_id: self.terrain.clone(),
             group: self.group.clone(),
-            variant: None,
-            pair_id: format!("{}-{:04}", self.missions.id, mission.index + 1),
-            traverse_id: self.traverse.clone(),
+            variant: self.variant.clone(),
+            pair_id: format!("{}-{:04}", self.pair, mission.index + 1),
+            traverse_id: self.drive.id.clone(),
             path: release_path.clone(),
         };
-        let differentiator = self.settings.parameters().differentiator;
-        let difficulty = Difficulty::along(&site.heights, &site.classes, mission, self.vehicle.wheelbase_m());
-        let mut row = mission_row(&labels, mission, &difficulty, &recording, differentiator);
+        let recording = self.recording(site, mission).map_err(|e| fail(&e))?;
+        let difficulty = Difficulty::along(&site.heights, &site.classes, mission, self.drive.vehicle.wheelbase_m());
+        let mut row = mission_row(&labels, mission, &difficulty, &recording, self.differentiator());
         row.mission_id.clone_from(&id);
+        let replicates = self.replicates(site, mission, &labels, &recording).map_err(|e| fail(&e))?;
+        if !replicates.is_empty() {
+            let successes = replicates.iter().filter(|r| r.outcome == EventKind::Success.name()).count();
+            row.replicates = replicates.len() as i64;
+            row.success_probability = successes as f64 / replicates.len() as f64;
+        }
         let mut samples = sample_rows(&self.terrain, mission, &recording, &site.classes);
         samples.iter_mut().for_each(|s| s.mission_id.clone_from(&id));
         let metadata = self.metadata(&row, &site.heights_sha256);
@@ -150,17 +216,49 @@ impl TraverseJob {
             classes: Some(&site.classes),
             start_m: mission.start_m,
             goal_m: mission.goal_m,
-            epoch_ns: self.head.epoch_ns,
+            epoch_ns: self.drive.head.epoch_ns,
             metadata: &metadata,
         };
         let file = format!("{id}.mcap");
         let summary = write_mission(&work.output(&file), &mcap).map_err(|e| fail(&e))?;
-        Ok(Driven { file, release_path, content: summary.content_sha256, messages: summary.messages, row, samples })
+        let (content, messages) = (summary.content_sha256, summary.messages);
+        Ok(Driven { file, release_path, content, messages, row, replicates, samples })
+    }
+
+    /// The rows of a mission's starts, where there are several; `first` was recorded from the drawn one.
+    fn replicates(
+        &self,
+        site: &Site,
+        mission: &Mission,
+        labels: &MissionLabels,
+        first: &Recording,
+    ) -> Result<Vec<ReplicateRow>, TraverseError> {
+        if self.drive.starts.count() == 1 {
+            return Ok(Vec::new());
+        }
+        let row = |replicate: usize| {
+            let start = self.drive.starts.start(mission, replicate, &self.streams);
+            let recording = match replicate {
+                0 => Cow::Borrowed(first),
+                _ => Cow::Owned(self.recording(site, &start)?),
+            };
+            let row = replicate_row(labels, &start, replicate as i64 + 1, &recording, self.differentiator());
+            Ok(ReplicateRow { mission_id: format!("{}-{:04}", self.drive.id, mission.index + 1), ..row })
+        };
+        (0..self.drive.starts.count()).into_par_iter().map(row).collect()
+    }
+
+    fn recording(&self, site: &Site, start: &Mission) -> Result<Recording, TraverseError> {
+        drive(&site.ground, &self.drive.vehicle, &self.drive.settings, start)
+    }
+
+    fn differentiator(&self) -> Differentiator {
+        self.drive.settings.parameters().differentiator
     }
 
     /// Records that a viewer of one file needs to know where it came from.
     fn metadata(&self, row: &MissionRow, heights_sha256: &str) -> BTreeMap<String, BTreeMap<String, String>> {
-        let head = &self.head;
+        let head = &self.drive.head;
         let study = [("name", head.name.clone()), ("seed", head.seed.to_string()), ("license", head.license.clone())];
         let terrain = [("id", self.terrain.clone()), ("group", self.group.clone().unwrap_or_default())];
         let mission = [
@@ -168,7 +266,7 @@ impl TraverseJob {
             ("start_m", format!("{} {}", row.start_x_m, row.start_y_m)),
             ("goal_m", format!("{} {}", row.goal_x_m, row.goal_y_m)),
         ];
-        let parameters = serde_json::to_string(self.settings.parameters()).unwrap_or_default();
+        let parameters = serde_json::to_string(self.drive.settings.parameters()).unwrap_or_default();
         let vehicle = [("name", row.vehicle.clone()), ("parameters", parameters)];
         let outcome = [("outcome", row.outcome.clone()), ("time_s", row.time_s.to_string())];
         let map = |pairs: &[(&str, String)]| pairs.iter().map(|(k, v)| ((*k).to_owned(), v.clone())).collect();
@@ -185,7 +283,7 @@ impl TraverseJob {
 
     /// Samples for the assembly, which writes them again with the study's metadata.
     fn write_samples(&self, work: &Work<'_>, driven: &mut [Driven]) -> Result<(), JobError> {
-        let head = &self.head;
+        let head = &self.drive.head;
         let metadata = TableMetadata {
             study_sha256: String::new(),
             seed: head.seed,
@@ -202,12 +300,15 @@ impl TraverseJob {
 
 impl Job for TraverseJob {
     fn recipe(&self) -> Value {
-        let head = &self.head;
+        let head = &self.drive.head;
         json!({
-            "traverse": self.settings.parameters(),
-            "vehicle": self.vehicle.parameters(),
+            "traverse": self.drive.settings.parameters(),
+            "vehicle": self.drive.vehicle.parameters(),
+            "starts": self.drive.starts,
             "terrain": self.terrain,
             "group": self.group,
+            "variant": self.variant,
+            "pair": self.pair,
             "study": { "name": head.name, "seed": head.seed, "license": head.license, "epoch_ns": head.epoch_ns },
         })
     }
@@ -217,13 +318,16 @@ impl Job for TraverseJob {
     }
 
     fn memory_bytes(&self) -> u64 {
-        // Terrain, classes and pyramid once; samples of every mission: 20 Hz, some 300 bytes each.
-        (256 << 20) + (self.count as f64 * self.seconds_each * 20.0 * 300.0) as u64
+        // Terrain, classes and pyramid once; samples of every mission: 20 Hz, some 300 bytes each; rows of the starts.
+        let Drive { count, seconds_each, starts, .. } = &self.drive;
+        let rows = (count * starts.count()) as u64;
+        (256 << 20) + (*count as f64 * seconds_each * 20.0 * 300.0) as u64 + 400 * rows
     }
 
     fn estimate(&self) -> Estimate {
-        let driven_s = self.count as f64 * self.seconds_each;
-        Estimate { seconds: 1e-3 * driven_s, bytes: 8e3 * driven_s }
+        let driven_s = self.drive.count as f64 * self.drive.seconds_each;
+        let other_starts_s = driven_s * (self.drive.starts.count() - 1) as f64;
+        Estimate { seconds: 1e-3 * driven_s + 0.5e-3 * other_starts_s, bytes: 8e3 * driven_s }
     }
 
     fn run(&self, work: &Work<'_>) -> Result<Outcome, JobError> {
@@ -233,13 +337,27 @@ impl Job for TraverseJob {
             missions.par_iter().map(|mission| self.drive(work, &site, mission)).collect();
         let mut driven = driven?;
         self.write_samples(work, &mut driven)?;
+        let notes = site.ground.warnings().iter().cloned().chain(nowhere_note(&driven)).collect();
         let mut products = vec![Product::internal(SAMPLES)];
         let mut rows = Rows::default();
         for d in driven {
             let product = Product::released(&d.file, d.release_path, Some(d.content));
             products.push(Product { records: Some(d.messages), ..product });
             rows.missions.push(d.row);
+            rows.replicates.extend(d.replicates);
         }
-        Ok(Outcome { products, rows, notes: site.ground.warnings().to_vec() })
+        Ok(Outcome { products, rows, notes })
     }
+}
+
+/// The sentence on missions that ended where they began.
+fn nowhere_note(driven: &[Driven]) -> Option<String> {
+    let nowhere = |row: &MissionRow| row.time_s == 0.0 && row.outcome == EventKind::OutOfBounds.name();
+    let count = driven.iter().filter(|d| nowhere(&d.row)).count();
+    (count > 0).then(|| {
+        format!(
+            "{count} of {} missions start where the vehicle stands over cells without data; fill the gaps of the DEM first",
+            driven.len()
+        )
+    })
 }

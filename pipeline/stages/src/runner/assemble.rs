@@ -12,6 +12,7 @@ use sastrugi_schemas::manifest::{FailedItem, ItemNote, Origin};
 use sastrugi_schemas::study::StudyHead;
 use sastrugi_schemas::tables::SampleRow;
 use sastrugi_store::release::{self, Head, Release, ReleaseBuilder, ReleaseError};
+use std::cmp::Ordering;
 use std::collections::BTreeMap;
 use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
@@ -176,15 +177,19 @@ fn add_table<R: Row>(
     stages: &[&str],
     take: impl Fn(Rows) -> Vec<R>,
 ) -> Result<(), Error> {
+    let parts = contents.results(stages).into_iter().map(|(_, folder)| Ok(take(record(folder)?.rows)));
+    write_parts(builder, parts, &stages.join("+"))
+}
+
+/// One table, written as its parts are read; the first part that cannot be read is the error.
+fn write_parts<R: Row>(
+    builder: &mut ReleaseBuilder,
+    mut parts: impl Iterator<Item = Result<Vec<R>, Error>>,
+    stage: &str,
+) -> Result<(), Error> {
     let mut trouble = None;
-    let rows = contents.results(stages).into_iter().map_while(|(_, folder)| match record(folder) {
-        Ok(record) => Some(take(record.rows)),
-        Err(error) => {
-            trouble = Some(error);
-            None
-        }
-    });
-    let written = builder.write_table("0000", rows.flatten(), made_by(&stages.join("+")));
+    let rows = std::iter::from_fn(|| parts.next()?.map_err(|error| trouble = Some(error)).ok());
+    let written = builder.write_table("0000", rows.flatten(), made_by(stage));
     match trouble {
         Some(error) => Err(error),
         None => written.map_err(release_error),
@@ -222,25 +227,46 @@ fn made_by(stage: &str) -> Origin {
     Origin { stage: stage.to_owned(), ..Origin::default() }
 }
 
-/// `missions` and `samples`: all runs on one terrain together, sorted by mission.
+/// `missions`, `replicates` and `samples`: all runs on one terrain together, sorted by key. Only one terrain's rows are held.
 fn add_missions(builder: &mut ReleaseBuilder, contents: &Contents<'_>) -> Result<(), Error> {
-    let mut by_terrain: BTreeMap<String, Vec<&PathBuf>> = BTreeMap::new();
+    let mut terrains: BTreeMap<&str, Vec<&PathBuf>> = BTreeMap::new();
     for (item, folder) in contents.results(&[traverse::STAGE]) {
-        by_terrain.entry(traverse::terrain_of(&item.id).to_owned()).or_default().push(folder);
+        terrains.entry(traverse::terrain_of(&item.id)).or_default().push(folder);
     }
-    let mut missions = Vec::new();
-    for (terrain, folders) in &by_terrain {
+    for (terrain, folders) in &terrains {
         let mut samples: Vec<SampleRow> = Vec::new();
         for folder in folders {
-            missions.extend(record(folder)?.rows.missions);
             let path = folder.join(traverse::SAMPLES);
             samples.extend(sastrugi_store::parquet::read_table::<SampleRow>(&path).map_err(Error::failed)?);
         }
         samples.sort_by(|a, b| (&a.mission_id, a.sample).cmp(&(&b.mission_id, b.sample)));
         builder.write_table(terrain, samples, made_by(traverse::STAGE)).map_err(release_error)?;
     }
-    missions.sort_by(|a, b| (&a.terrain_id, &a.mission_id).cmp(&(&b.terrain_id, &b.mission_id)));
-    builder.write_table("0000", missions, made_by(traverse::STAGE)).map_err(release_error)
+    add_by_terrain(builder, &terrains, |rows| rows.missions, |a, b| a.mission_id.cmp(&b.mission_id))?;
+    add_by_terrain(
+        builder,
+        &terrains,
+        |rows| rows.replicates,
+        |a, b| (&a.mission_id, a.replicate).cmp(&(&b.mission_id, b.replicate)),
+    )
+}
+
+/// One table whose first key is the terrain, its rows taken terrain by terrain and sorted there by the other keys.
+fn add_by_terrain<R: Row>(
+    builder: &mut ReleaseBuilder,
+    terrains: &BTreeMap<&str, Vec<&PathBuf>>,
+    take: impl Fn(Rows) -> Vec<R>,
+    order: impl Fn(&R, &R) -> Ordering,
+) -> Result<(), Error> {
+    let sorted = |folders: &Vec<&PathBuf>| -> Result<Vec<R>, Error> {
+        let mut rows = Vec::new();
+        for folder in folders {
+            rows.extend(take(record(folder)?.rows));
+        }
+        rows.sort_by(&order);
+        Ok(rows)
+    };
+    write_parts(builder, terrains.values().map(sorted), traverse::STAGE)
 }
 
 fn add_documents(builder: &mut ReleaseBuilder, contents: &Contents<'_>) -> Result<(), Error> {

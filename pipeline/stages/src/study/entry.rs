@@ -27,10 +27,12 @@ pub struct Entry<'a> {
 pub struct Expanded {
     /// Full id.
     pub id: String,
+    /// Its id without the number of the replicate.
+    pub part: String,
     /// Position among the replicates, from 0.
     pub replicate: u64,
-    /// Label for statistics that the sweep gives, if there is one.
-    pub sweep_group: Option<String>,
+    /// The swept parameters with their values, if there are any.
+    pub sweep: Option<String>,
     /// Kernel parameters.
     pub params: Value,
 }
@@ -89,7 +91,9 @@ impl<'a> Entry<'a> {
         if total > ITEMS_MAX {
             return Err(self.error("count", format!("this stands for {total} items; at most {ITEMS_MAX} are possible")));
         }
-        let mut items = vec![Expanded { id: id.to_owned(), replicate: 0, sweep_group: None, params: params.clone() }];
+        let plain =
+            Expanded { id: id.to_owned(), part: id.to_owned(), replicate: 0, sweep: None, params: params.clone() };
+        let mut items = vec![plain];
         for (parameter, values) in sweep {
             items = self.sweep(items, parameter, values)?;
         }
@@ -119,13 +123,9 @@ impl<'a> Entry<'a> {
                 }
                 let label =
                     format!("{parameter} = {}", value.as_str().map_or_else(|| value.to_string(), str::to_owned));
-                let group = item.sweep_group.as_ref().map_or(label.clone(), |g| format!("{g}, {label}"));
-                swept.push(Expanded {
-                    id: format!("{}-{word}", item.id),
-                    sweep_group: Some(group),
-                    params,
-                    ..item.clone()
-                });
+                let id = format!("{}-{word}", item.id);
+                let sweep = joined(item.sweep.as_deref(), Some(&label));
+                swept.push(Expanded { part: id.clone(), id, sweep, params, ..item });
             }
         }
         Ok(swept)
@@ -156,6 +156,12 @@ impl<'a> Entry<'a> {
     fn path(&self) -> Vec<String> {
         vec![self.section.to_owned(), self.index.to_string()]
     }
+}
+
+/// Labels of sweeps side by side.
+pub fn joined(first: Option<&str>, second: Option<&str>) -> Option<String> {
+    let labels: Vec<&str> = first.into_iter().chain(second).collect();
+    (!labels.is_empty()).then(|| labels.join(", "))
 }
 
 /// For a schema without properties every key is unknown.
@@ -223,8 +229,8 @@ mod tests {
         let ids: Vec<&str> = items.iter().map(|i| i.id.as_str()).collect();
         assert_eq!(ids, ["a-2.3-0001", "a-2.3-0002", "a-2.6-0001", "a-2.6-0002"]);
         assert_eq!(items[2].params, serde_json::json!({"low": {"s": 1}, "high": {"d": 2.6}}));
-        assert_eq!(items[3].sweep_group.as_deref(), Some("high.d = 2.6"));
-        assert_eq!(items[3].replicate, 1);
+        assert_eq!(items[3].sweep.as_deref(), Some("high.d = 2.6"));
+        assert_eq!((items[3].replicate, items[3].part.as_str()), (1, "a-2.6"));
     }
 
     #[test]

@@ -2,6 +2,8 @@
 
 use super::parameters;
 use crate::error::Error;
+use crate::jobs::traverse::STAGE;
+use crate::runner::execute::Limits;
 use crate::runner::progress::Progress;
 use crate::studies::{RunRequest, RunSummary, run_text};
 use serde_json::{Map, Value, json};
@@ -14,6 +16,8 @@ pub struct Request<'a> {
     pub dem: &'a Path,
     /// Seed of the random streams.
     pub seed: u64,
+    /// Settings of `[roughness]`, by which starts and goals are judged.
+    pub roughness: Value,
     /// Rules of the missions.
     pub missions: Value,
     /// Parameters of the run, vehicle included.
@@ -22,11 +26,21 @@ pub struct Request<'a> {
     pub date: &'a str,
 }
 
+/// Where the release goes.
+pub struct Place<'a> {
+    /// Release folder.
+    pub output: &'a Path,
+    /// Work area; `<output>.work` when absent.
+    pub work: Option<&'a Path>,
+    /// Limits.
+    pub limits: Limits,
+}
+
 /// Drives missions over a DEM and writes a release with recordings, tables and report.
 ///
 /// # Errors
-/// As [`crate::studies::run`].
-pub fn traverse(request: &Request<'_>, run: &RunRequest<'_>, progress: &dyn Progress) -> Result<RunSummary, Error> {
+/// As [`crate::studies::run`]; also a DEM on which nothing can be driven.
+pub fn traverse(request: &Request<'_>, place: &Place<'_>, progress: &dyn Progress) -> Result<RunSummary, Error> {
     let path = std::path::absolute(request.dem).map_err(|e| Error::Input(format!("{}: {e}", request.dem.display())))?;
     if !path.is_file() {
         return Err(Error::Input(format!("{}: no such file", request.dem.display())));
@@ -37,12 +51,15 @@ pub fn traverse(request: &Request<'_>, run: &RunRequest<'_>, progress: &dyn Prog
     let drive = with(json!({ "id": "mission", "missions": "missions" }), &request.parameters)?;
     let mut document = DocumentMut::new();
     document["study"] = Item::Table(table(&study)?);
+    document["roughness"] = Item::Table(table(&request.roughness)?);
     for (section, item) in [("dem", dem), ("missions", missions), ("traverse", drive)] {
         let mut tables = ArrayOfTables::new();
         tables.push(table(&item)?);
         document[section] = Item::ArrayOfTables(tables);
     }
-    run_text(&document.to_string(), Path::new(""), run, progress)
+    let Place { output, work, limits } = *place;
+    let run = RunRequest { output, work, part: None, purpose: Some(STAGE), limits };
+    run_text(&document.to_string(), Path::new(""), &run, progress)
 }
 
 /// An envelope with parameters beside its keys; the envelope's keys are not the caller's to set.
