@@ -94,6 +94,8 @@ pub struct Numbers {
     pub columns: Vec<Heading>,
     /// Rows, each as long as `columns`.
     pub rows: Vec<Vec<Cell>>,
+    /// True where the rows of a column have units of their own: each figure is then set by its own digits.
+    pub mixed: bool,
 }
 
 /// Heading of a column.
@@ -109,7 +111,12 @@ impl Numbers {
     /// No rows yet.
     pub fn new(query: impl Into<String>, columns: &[(&str, &str)]) -> Self {
         let columns = columns.iter().map(|&(name, unit)| Heading { name: name.into(), unit: unit.into() }).collect();
-        Self { query: query.into(), columns, rows: Vec::new() }
+        Self { query: query.into(), columns, rows: Vec::new(), mixed: false }
+    }
+
+    /// The same for rows that have units of their own.
+    pub fn with_mixed_units(self) -> Self {
+        Self { mixed: true, ..self }
     }
 
     /// Columns of table rows, with the names and units of the contract; a name the table lacks is left out.

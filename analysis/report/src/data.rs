@@ -9,7 +9,7 @@ use sastrugi_schemas::fit::FitFile;
 use sastrugi_schemas::manifest::FailedItem;
 use sastrugi_schemas::tables::{
     CandidateCurveRow, CandidateRow, CovarianceRow, FitRow, HeightDistributionRow, LikelihoodProfileRow, MissionRow,
-    ProfilePsdRow, PsdRow, SampleRow, ScoreCovarianceRow, ScoreRow, StructureRow, SurfaceRow, TerrainRow,
+    ProfilePsdRow, PsdRow, ReplicateRow, SampleRow, ScoreCovarianceRow, ScoreRow, StructureRow, SurfaceRow, TerrainRow,
 };
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -93,6 +93,8 @@ pub struct Data {
     pub scoreboard_covariance: Vec<ScoreCovarianceRow>,
     /// Missions.
     pub missions: Vec<MissionRow>,
+    /// Starts of missions that have several.
+    pub replicates: Vec<ReplicateRow>,
     /// Files read on demand.
     pub files: Box<dyn Files>,
 }
@@ -109,16 +111,22 @@ pub struct Group<'a, R> {
 }
 
 impl Data {
-    /// Generated terrains by group, groups in natural order.
+    /// Generated terrains by group, groups in natural order: the plain ones, all where every one is a variant.
     pub fn terrain_groups(&self) -> Vec<Group<'_, TerrainRow>> {
-        self.grouped(self.of_stage("terrain").map(|t| (label(t), t)))
+        let all: Vec<&TerrainRow> = self.of_stage("terrain").collect();
+        self.grouped(plain(all, |t| t.variant.is_none()).into_iter().map(|t| (label(t), t)))
+    }
+
+    /// Missions of the plain run by group, groups in natural order; all missions where every one belongs to a variant.
+    pub fn mission_groups(&self) -> Vec<Group<'_, MissionRow>> {
+        self.groups_of(plain(self.missions.iter().collect(), |m| m.variant.is_none()))
     }
 
     /// Missions by group, groups in natural order.
-    pub fn mission_groups(&self) -> Vec<Group<'_, MissionRow>> {
+    pub fn groups_of<'a>(&'a self, missions: Vec<&'a MissionRow>) -> Vec<Group<'a, MissionRow>> {
         let labels: BTreeMap<&str, &str> = self.terrains.iter().map(|t| (t.terrain_id.as_str(), label(t))).collect();
         let of_terrain = |m: &MissionRow| labels.get(m.terrain_id.as_str()).copied();
-        self.grouped(self.missions.iter().map(|m| (m.group.as_deref().or(of_terrain(m)).unwrap_or("all"), m)))
+        self.grouped(missions.into_iter().map(|m| (m.group.as_deref().or(of_terrain(m)).unwrap_or("all"), m)))
     }
 
     /// Rows by label; a label has the same number whatever is grouped.
@@ -141,9 +149,15 @@ impl Data {
         self.terrains.iter().find(|t| t.terrain_id == id)
     }
 
-    /// Missions on a terrain.
-    pub fn missions_on(&self, terrain_id: &str) -> &[MissionRow] {
-        of_key(&self.missions, |m| &m.terrain_id, terrain_id)
+    /// Missions of the plain run on a terrain; all where every one belongs to a variant.
+    pub fn missions_on(&self, terrain_id: &str) -> Vec<&MissionRow> {
+        plain(of_key(&self.missions, |m| &m.terrain_id, terrain_id).iter().collect(), |m| m.variant.is_none())
+    }
+
+    /// Starts of a mission, the drawn one first; none where it has only that.
+    pub fn starts_of(&self, mission: &MissionRow) -> &[ReplicateRow] {
+        let on_terrain = of_key(&self.replicates, |r| &r.terrain_id, &mission.terrain_id);
+        of_key(on_terrain, |r| &r.mission_id, &mission.mission_id)
     }
 
     /// Spectrum of a heightfield: bins with a positive frequency and density.
@@ -190,6 +204,14 @@ impl Data {
     pub fn histogram(&self, id: &str) -> Vec<&HeightDistributionRow> {
         of_key(&self.heights, |r| &r.terrain_id, id).iter().filter(|r| r.density_per_m.is_finite()).collect()
     }
+}
+
+/// The plain ones among rows; all of them when there is none.
+fn plain<R>(mut rows: Vec<&R>, is_plain: impl Fn(&R) -> bool) -> Vec<&R> {
+    if rows.iter().any(|r| is_plain(r)) {
+        rows.retain(|r| is_plain(r));
+    }
+    rows
 }
 
 /// The rows of one key in a table that is sorted by it.

@@ -51,6 +51,7 @@ impl Data {
             scoreboard: release.rows()?,
             scoreboard_covariance: release.rows()?,
             missions: release.rows()?,
+            replicates: release.rows()?,
             files: Box::new(release),
         })
     }

@@ -16,6 +16,59 @@ pub struct Interval {
     pub level: f64,
 }
 
+impl Interval {
+    /// Percentile interval (Davison and Hinkley, 1997, section 5.3.1) from bootstrap values of a statistic. Values that are
+    /// not finite (a redraw without what the statistic needs) are left out; `None` when that is more than half of them.
+    pub fn percentile(estimate: f64, replicates: &[f64], level: f64) -> Option<Self> {
+        let mut sorted = sums::finite(replicates);
+        if sorted.is_empty() || 2 * sorted.len() < replicates.len() {
+            return None;
+        }
+        sorted.sort_by(f64::total_cmp);
+        let tail = 0.5 * (1.0 - level);
+        let [low, high] = [tail, 1.0 - tail].map(|q| sums::quantile_sorted(&sorted, q));
+        Some(Self { estimate, low, high, level })
+    }
+
+    /// True when the value lies in the interval, ends included.
+    pub fn holds(&self, value: f64) -> bool {
+        self.low <= value && value <= self.high
+    }
+}
+
+/// Any statistic of samples that consist of clusters, on `replicates` redraws: for each of the independent samples, whose
+/// numbers of clusters are given, as many cluster numbers as it has, drawn with replacement. A sample without clusters
+/// draws none.
+pub fn redraw<T>(
+    samples: &[usize],
+    replicates: usize,
+    stream: &mut Stream,
+    mut statistic: impl FnMut(&[Vec<usize>]) -> T,
+) -> Vec<T> {
+    let mut draw = |n: &usize| (0..*n).map(|_| stream.below(*n as u64) as usize).collect();
+    let mut once = || {
+        let drawn: Vec<Vec<usize>> = samples.iter().map(&mut draw).collect();
+        statistic(&drawn)
+    };
+    (0..replicates).map(|_| once()).collect()
+}
+
+/// Percentile cluster-bootstrap interval of a statistic of the numbers of the clusters in each sample (each number once: the
+/// estimate). `None` when any sample has fewer than two clusters, or by [`Interval::percentile`].
+pub fn cluster_interval(
+    samples: &[usize],
+    replicates: usize,
+    level: f64,
+    stream: &mut Stream,
+    statistic: impl Fn(&[Vec<usize>]) -> f64,
+) -> Option<Interval> {
+    if samples.iter().any(|n| *n < 2) {
+        return None;
+    }
+    let once: Vec<Vec<usize>> = samples.iter().map(|n| (0..*n).collect()).collect();
+    Interval::percentile(statistic(&once), &redraw(samples, replicates, stream, &statistic), level)
+}
+
 /// Median of all values with a percentile cluster-bootstrap interval (Davison and Hinkley, 1997, section 3.8): as many
 /// clusters as there are, drawn with replacement, whole, `replicates` times. Fewer than about ten clusters give
 /// intervals that are too short; one cluster gives none (`None`), as do no values.
@@ -23,23 +76,9 @@ pub struct Interval {
 /// Values that are not finite are left out. Cost: `replicates` medians of the whole sample.
 pub fn cluster_median(clusters: &[Vec<f64>], replicates: usize, level: f64, stream: &mut Stream) -> Option<Interval> {
     let clusters: Vec<Vec<f64>> = clusters.iter().map(|c| sums::finite(c)).filter(|c| !c.is_empty()).collect();
-    if clusters.len() < 2 || replicates == 0 {
-        return None;
-    }
-    let mut medians: Vec<f64> = (0..replicates).map(|_| sums::median(&redrawn(&clusters, stream))).collect();
-    medians.sort_by(f64::total_cmp);
-    let tail = 0.5 * (1.0 - level);
-    Some(Interval {
-        estimate: sums::median(&clusters.concat()),
-        low: sums::quantile_sorted(&medians, tail),
-        high: sums::quantile_sorted(&medians, 1.0 - tail),
-        level,
+    cluster_interval(&[clusters.len()], replicates, level, stream, |drawn| {
+        sums::median(&drawn[0].iter().flat_map(|&c| clusters[c].iter().copied()).collect::<Vec<_>>())
     })
-}
-
-fn redrawn(clusters: &[Vec<f64>], stream: &mut Stream) -> Vec<f64> {
-    let n = clusters.len() as u64;
-    clusters.iter().flat_map(|_| clusters[stream.below(n) as usize].iter().copied()).collect()
 }
 
 #[cfg(test)]
@@ -62,6 +101,29 @@ mod tests {
     fn val_no_interval_without_clusters() {
         assert_eq!(cluster_median(&[vec![1.0, 2.0]], 100, 0.95, &mut stream("one")), None);
         assert_eq!(cluster_median(&[vec![], vec![f64::NAN], vec![1.0]], 100, 0.95, &mut stream("empty")), None);
+    }
+
+    /// By hand: 0..=100 leaves 2.5 % outside of 2.5 and 97.5; of NaN and 1, half is enough, of NaN, NaN and 1 it is not.
+    #[test]
+    fn val_percentiles_and_missing_values() {
+        let values: Vec<f64> = (0..=100).map(f64::from).collect();
+        let i = Interval::percentile(50.0, &values, 0.95).unwrap();
+        assert!((i.low - 2.5).abs() < 1e-12 && (i.high - 97.5).abs() < 1e-12, "{i:?}");
+        assert!(i.holds(i.low) && !i.holds(97.6) && !i.holds(f64::NAN));
+        assert!(Interval::percentile(1.0, &[f64::NAN, 1.0], 0.9).is_some());
+        assert_eq!(Interval::percentile(1.0, &[f64::NAN, f64::NAN, 1.0], 0.9), None);
+        assert_eq!(Interval::percentile(1.0, &[], 0.9), None);
+    }
+
+    /// Two samples are drawn apart from each other, each with its own number of clusters.
+    #[test]
+    fn prop_samples_keep_their_sizes() {
+        let sizes = |drawn: &[Vec<usize>]| {
+            assert!(drawn[0].iter().all(|c| *c < 3) && drawn[1].iter().all(|c| *c < 5));
+            (drawn[0].len(), drawn[1].len(), drawn[2].len())
+        };
+        assert!(redraw(&[3, 5, 0], 50, &mut stream("sizes"), sizes).iter().all(|s| *s == (3, 5, 0)));
+        assert_eq!(cluster_interval(&[3, 1], 9, 0.9, &mut stream("few"), |_| 1.0), None);
     }
 
     /// Null: 20 clusters of 10, cluster means N(0, 1), values N(mean, 1); true median 0. 300 samples, 200 replicates.

@@ -2,6 +2,7 @@
 
 use crate::data::Data;
 use serde::Deserialize;
+use std::collections::BTreeMap;
 
 /// Figures of one publication, by group.
 #[derive(Clone, Debug, Deserialize)]
@@ -17,6 +18,8 @@ pub struct Paper {
     pub terrains_per_group: usize,
     /// Missions on each terrain.
     pub missions_per_terrain: usize,
+    /// Its drawings, by the name of the figure of this report that shows the same.
+    pub figures: BTreeMap<String, String>,
     /// A figure for each group.
     pub values: Vec<Published>,
     /// A change from each group to the next.
@@ -27,7 +30,8 @@ pub struct Paper {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Published {
-    /// What it is: a column of the tables `missions` or `terrains`, or `success`.
+    /// What it is: a column of the tables `missions` (median over successful missions) or `terrains` (median over terrains),
+    /// or `success` (median over terrains, %), `success_percent` (of all missions), `time_outliers` (a count).
     pub figure: String,
     /// Words.
     pub name: String,
@@ -35,6 +39,11 @@ pub struct Published {
     pub unit: String,
     /// By group, or from group to group.
     pub values: Vec<f64>,
+    /// How far the true figure may lie from each printed one: half its last digit, more where it was derived.
+    pub rounding: Vec<f64>,
+    /// True for a change in per cent of where it starts.
+    #[serde(default)]
+    pub relative: bool,
     /// Where it is printed, and how it was derived where it is not.
     pub origin: String,
 }
@@ -55,10 +64,43 @@ pub fn same(label: &str, group: f64) -> bool {
 }
 
 impl Paper {
-    /// The published median of a figure in the group of that label.
-    pub fn value(&self, figure: &str, label: &str) -> Option<f64> {
-        let group = self.groups.iter().position(|g| same(label, *g))?;
-        self.values.iter().find(|p| p.figure == figure)?.values.get(group).copied()
+    /// Where the paper's figures lie beside our medians, given by label. Where it prints changes alone: our median of its first
+    /// group plus the changes up to each other group; that first group itself has no mark.
+    pub fn marks(&self, figure: &str, ours: &[(&str, f64)]) -> Vec<Option<f64>> {
+        let group = |label: &str| self.groups.iter().position(|g| same(label, *g));
+        if let Some(printed) = self.values.iter().find(|p| p.figure == figure) {
+            return ours.iter().map(|o| printed.values.get(group(o.0)?).copied()).collect();
+        }
+        let steps = self.steps.iter().find(|p| p.figure == figure && !p.relative);
+        let first = ours.iter().find(|o| group(o.0) == Some(0)).map(|o| o.1);
+        let mark = |label: &str| {
+            let changes = steps?.values.get(..group(label)?).filter(|c| !c.is_empty())?;
+            Some(first? + changes.iter().sum::<f64>())
+        };
+        ours.iter().map(|o| mark(o.0)).collect()
+    }
+
+    /// True for a figure of which the paper prints changes alone.
+    pub fn prints_changes_only(&self, figure: &str) -> bool {
+        !self.values.iter().any(|p| p.figure == figure) && self.steps.iter().any(|p| p.figure == figure)
+    }
+}
+
+/// Title of a figure: that of the paper's drawing where the release holds the paper's groups.
+pub fn title(data: &Data, id: &str, plain: &str) -> String {
+    let of_paper = |paper: Paper| {
+        let drawing = paper.figures.get(id)?;
+        Some(format!("{plain} {drawing} of {}, redrawn.", paper.authors))
+    };
+    applicable(data).and_then(of_paper).unwrap_or_else(|| plain.to_owned())
+}
+
+/// What the mark of the paper means, for a legend.
+pub fn mark_in_words(paper: &Paper, figure: &str) -> String {
+    if paper.prints_changes_only(figure) {
+        "paper: its steps from our first median".into()
+    } else {
+        "paper's median".into()
     }
 }
 
@@ -70,15 +112,28 @@ mod tests {
     fn val_the_data_are_complete_and_agree_with_the_printed_steps() {
         let paper: Paper = serde_json::from_str(MAJHOR).unwrap();
         let n = paper.groups.len();
-        assert!(paper.values.iter().all(|p| p.values.len() == n));
-        assert!(paper.steps.iter().all(|p| p.values.len() == n - 1));
-        // Printed steps of the medians: 0.397 and 0.281 m/s2, 5.29 and 2.13 deg/s, 3.5 and 2.02 deg/s; two digits.
-        let printed = [[0.397, 0.281], [5.29, 2.13], [3.5, 2.02]];
-        let columns = ["rms_vertical_acceleration_m_s2", "rms_pitch_rate_deg_s", "rms_roll_rate_deg_s"];
-        for (column, steps) in columns.iter().zip(printed) {
-            let v = &paper.values.iter().find(|p| p.figure == *column).unwrap().values;
-            assert!((v[1] - v[0] - steps[0]).abs() < 0.01 && (v[2] - v[1] - steps[1]).abs() < 0.01, "{column}");
+        assert!(paper.values.iter().all(|p| p.values.len() == n && p.rounding.len() == n));
+        assert!(paper.steps.iter().all(|p| p.values.len() == n - 1 && p.rounding.len() == n - 1));
+        for steps in paper.steps.iter().filter(|p| paper.values.iter().any(|v| v.figure == p.figure)) {
+            let of = |p: &&Published| p.figure == steps.figure;
+            let v = paper.values.iter().find(of).unwrap();
+            for (k, printed) in steps.values.iter().enumerate() {
+                let scale = if steps.relative { v.values[k] / 100.0 } else { 1.0 };
+                let room = v.rounding[k] + v.rounding[k + 1] + scale * steps.rounding[k] + 1e-9;
+                let step = v.values[k + 1] - v.values[k];
+                assert!((step - scale * printed).abs() <= room, "{} {}: {step}", steps.name, steps.unit);
+            }
         }
+    }
+
+    #[test]
+    fn val_marks() {
+        let paper: Paper = serde_json::from_str(MAJHOR).unwrap();
+        let ours = [("2.30", 95.0), ("2.6", 60.0), ("other", 1.0)];
+        assert_eq!(paper.marks("success", &ours), [None, Some(47.5), None]);
+        assert_eq!(paper.marks("time_s", &ours), [Some(36.0), Some(37.0), None]);
+        assert_eq!(paper.marks("nothing", &ours), [None, None, None]);
+        assert!(paper.prints_changes_only("success") && !paper.prints_changes_only("time_s"));
     }
 
     #[test]

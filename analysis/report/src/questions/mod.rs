@@ -1,13 +1,16 @@
 //! The questions a report answers. Adding one is a folder and a line in [`ALL`].
 
+mod clusters;
 pub mod covariance;
 mod curves;
 pub mod failures;
 pub mod missions;
 mod outcome;
+pub mod probability;
 pub mod published;
 mod relief;
 pub mod scoreboard;
+pub mod sensitivity;
 pub mod terrain;
 pub mod texture;
 
@@ -29,7 +32,7 @@ pub struct Question {
 }
 
 /// All questions, in the order of the page.
-pub const ALL: [Question; 7] = [
+pub const ALL: [Question; 9] = [
     failures::QUESTION,
     terrain::QUESTION,
     covariance::QUESTION,
@@ -37,6 +40,8 @@ pub const ALL: [Question; 7] = [
     scoreboard::QUESTION,
     missions::QUESTION,
     published::QUESTION,
+    probability::QUESTION,
+    sensitivity::QUESTION,
 ];
 
 impl Question {

@@ -8,6 +8,8 @@ use sastrugi_statistics::BoxPlot;
 pub const WIDTH: f64 = 400.0;
 /// Free space at the right of every frame, px.
 const RIGHT: f64 = 16.0;
+/// Room for ticks and title of a horizontal axis, px.
+const BELOW: f64 = 44.0;
 /// Height of one row of a legend, px.
 const LEGEND_ROW: f64 = 20.0;
 
@@ -48,11 +50,22 @@ impl Plot {
         (y, y_title): (Axis, &str),
         legend: &[Entry],
     ) -> Self {
+        let room = axis_room(&y, height - legend_height(legend, width));
+        Self::with_room((width, height), (x, x_title), (y, y_title), legend, room)
+    }
+
+    /// The same with that much room (px) for the vertical axis, so that frames below each other share their left edge.
+    pub fn with_room(
+        (width, height): (f64, f64),
+        (x, x_title): (Axis, &str),
+        (y, y_title): (Axis, &str),
+        legend: &[Entry],
+        left: f64,
+    ) -> Self {
         let top = 8.0 + legend_height(legend, width);
-        let bottom = height - 44.0;
+        let bottom = height - BELOW;
         let y = y.over(bottom, top);
-        let y_ticks = fitting(&y, bottom - top, |_| TEXT + 12.0);
-        let left = 30.0 + y_ticks.iter().map(|t| text_width(&t.label, TEXT)).fold(0.0, f64::max);
+        let y_ticks = y_ticks(&y, bottom - top);
         let x = x.over(left, width - RIGHT);
         let mut svg = Svg::new(width, height);
         draw_legend(&mut svg, legend, (0.0, 4.0), width);
@@ -102,6 +115,16 @@ impl Plot {
         let at = (self.corner.0 + self.size.0 - 8.0, self.corner.1 + 18.0 + 17.0 * row as f64);
         self.svg.text(at, Anchor::End, Paint::Ink, text);
     }
+}
+
+/// Room that a vertical axis needs at the left of a frame of that height without its legend, px.
+pub fn axis_room(y: &Axis, height: f64) -> f64 {
+    let length = height - BELOW - 8.0;
+    30.0 + y_ticks(&y.over(length, 0.0), length).iter().map(|t| text_width(&t.label, TEXT)).fold(0.0, f64::max)
+}
+
+fn y_ticks(y: &Axis, length: f64) -> Vec<Tick> {
+    fitting(y, length, |_| TEXT + 12.0)
 }
 
 /// A row of a [`Rows`] frame.
@@ -158,6 +181,14 @@ impl Rows {
         self.svg.text((x, y + shift), Anchor::End, Paint::Ink, &name);
         if !detail.is_empty() {
             self.svg.text_sized((x, y + 12.0), Anchor::End, Paint::Muted, 11.0, &detail);
+        }
+    }
+
+    /// A line through all rows at a value.
+    pub fn vertical(&mut self, value: f64, rows: usize) {
+        if let Some(x) = self.x.at(value) {
+            let bottom = self.top + self.row_height * rows as f64;
+            self.svg.segment((x, self.top), (x, bottom), Stroke::new(Paint::Muted, 1.4));
         }
     }
 

@@ -146,8 +146,11 @@ fn numeric(numbers: &Numbers, column: usize) -> bool {
 }
 
 /// Decimals of a column: four digits of its largest figure, two of its smallest. `None` where that takes more than five
-/// digits, or where the figures are very large or small.
+/// digits, where the figures are very large or small, or where each has a unit of its own.
 fn decimals(numbers: &Numbers, column: usize) -> Option<usize> {
+    if numbers.mixed {
+        return None;
+    }
     let magnitude = |row: &Vec<Cell>| match row.get(column) {
         Some(Cell::F64(v)) if *v != 0.0 => Some(v.abs()),
         _ => None,

@@ -206,6 +206,20 @@ impl Svg {
         }
     }
 
+    /// Filled polygon that shows what is below it.
+    pub fn area(&mut self, points: &[(f64, f64)], fill: Paint, opaque: f64) {
+        if points.len() > 2 {
+            let (fill, opacity) = (fill.attributes("fill"), opacity("fill-opacity", opaque));
+            self.push(format!("<path d=\"{}Z\"{fill}{opacity}/>", path_data(points)));
+        }
+    }
+
+    /// Another figure with its upper left corner there.
+    pub fn inset(&mut self, corner: (f64, f64), other: &Svg) {
+        let [x, y] = [corner.0, corner.1].map(px);
+        self.push(format!("<g transform=\"translate({x} {y})\">\n{}</g>", other.body));
+    }
+
     /// A mark of about `radius` px.
     pub fn symbol(&mut self, symbol: Symbol, (x, y): (f64, f64), radius: f64, paint: Paint) {
         let r = radius;

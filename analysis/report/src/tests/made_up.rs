@@ -6,7 +6,7 @@ use sastrugi_numeric::{Geometry, Grid, Stream, Streams, sums};
 use sastrugi_schemas::fit::FitFile;
 use sastrugi_schemas::tables::{
     CandidateCurveRow, CandidateRow, CovarianceRow, FitRow, HeightDistributionRow, LikelihoodProfileRow, MissionRow,
-    ProfilePsdRow, PsdRow, SampleRow, StructureRow, SurfaceRow, TerrainRow,
+    ProfilePsdRow, PsdRow, ReplicateRow, SampleRow, StructureRow, SurfaceRow, TerrainRow,
 };
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
@@ -64,6 +64,7 @@ pub fn empty() -> Data {
         scoreboard: Vec::new(),
         scoreboard_covariance: Vec::new(),
         missions: Vec::new(),
+        replicates: Vec::new(),
         files: Box::new(Shelf::default()),
     }
 }
@@ -85,8 +86,75 @@ pub fn parts(per_group: usize, side: usize) -> (Data, Shelf) {
             terrain(&mut data, &mut shelf, name, g, k, side);
         }
     }
+    variants(&mut data);
+    replicates(&mut data);
     measured(&mut data, &mut shelf);
     (data, shelf)
+}
+
+/// Variants of every mission: two of the vehicle on the same terrains, one of the terrain in the first group.
+fn variants(data: &mut Data) {
+    let plain = data.missions.clone();
+    for (name, word, spoilt, rougher) in
+        [("wheel_friction = 0.7", "friction", 5, 0.97), ("tyre_damping_n_s_m = 250.0", "soft", 900, 1.2)]
+    {
+        data.missions.extend(plain.iter().enumerate().map(|(i, m)| MissionRow {
+            mission_id: m.mission_id.replace("straight", word),
+            variant: Some(name.into()),
+            outcome: if i % spoilt == 0 { "stuck".into() } else { m.outcome.clone() },
+            rms_vertical_acceleration_m_s2: rougher * m.rms_vertical_acceleration_m_s2,
+            ..m.clone()
+        }));
+    }
+    let steep = |t: &TerrainRow| t.group.as_deref() == Some("2.30");
+    let variant = Some("z_scale_percent = 1.0".to_owned());
+    for terrain in data.terrains.clone().into_iter().filter(steep) {
+        let terrain_id = format!("{}.steep", terrain.terrain_id);
+        let on = plain.iter().filter(|m| m.terrain_id == terrain.terrain_id);
+        data.missions.extend(on.map(|m| MissionRow {
+            terrain_id: terrain_id.clone(),
+            pair_id: format!("steep-{}", m.pair_id),
+            variant: variant.clone(),
+            outcome: "out_of_bounds".into(),
+            ..m.clone()
+        }));
+        data.terrains.push(TerrainRow { terrain_id, variant: variant.clone(), ..terrain });
+    }
+    data.missions.sort_by(|a, b| (&a.terrain_id, &a.mission_id).cmp(&(&b.terrain_id, &b.mission_id)));
+    data.terrains.sort_by(|a, b| a.terrain_id.cmp(&b.terrain_id));
+}
+
+/// Five starts of every plain mission.
+fn replicates(data: &mut Data) {
+    let mut s = stream("replicates");
+    for m in data.missions.iter_mut().filter(|m| m.variant.is_none()) {
+        m.replicates = 5;
+        let certain = s.uniform() < 0.5;
+        for replicate in 1..=5 {
+            let flipped = !certain && s.uniform() < 0.3;
+            let outcome = match (replicate > 1 && flipped, m.outcome == "success") {
+                (false, _) => m.outcome.clone(),
+                (true, true) => "tipped".into(),
+                (true, false) => "success".into(),
+            };
+            data.replicates.push(ReplicateRow {
+                terrain_id: m.terrain_id.clone(),
+                mission_id: m.mission_id.clone(),
+                replicate,
+                group: None,
+                variant: None,
+                start_x_m: m.start_x_m,
+                start_y_m: m.start_y_m,
+                start_heading_deg: m.heading_deg,
+                outcome,
+                time_s: m.time_s,
+                progress_m: m.progress_m,
+                rms_vertical_acceleration_m_s2: m.rms_vertical_acceleration_m_s2,
+                rms_pitch_rate_deg_s: m.rms_pitch_rate_deg_s,
+                rms_roll_rate_deg_s: m.rms_roll_rate_deg_s,
+            });
+        }
+    }
 }
 
 fn stream(item: &str) -> Stream {
@@ -165,7 +233,7 @@ fn terrain(data: &mut Data, shelf: &mut Shelf, group: &str, g: usize, k: usize, 
     let code = |v: &f64| u8::from(v.abs() > 1.1 * step) + u8::from(v.abs() > 2.0 * step);
     shelf.classes.insert(format!("classes/{id}.tif"), Grid::new(geometry, fine.values.iter().map(code).collect()));
     shelf.grids.insert(path, grid);
-    missions(data, shelf, &id, g);
+    missions(data, shelf, &id, g, k);
 }
 
 fn curves(data: &mut Data, id: &str, slope: f64, width_m: f64) {
@@ -190,12 +258,12 @@ fn curves(data: &mut Data, id: &str, slope: f64, width_m: f64) {
     }
 }
 
-fn missions(data: &mut Data, shelf: &mut Shelf, terrain_id: &str, g: usize) {
+fn missions(data: &mut Data, shelf: &mut Shelf, terrain_id: &str, g: usize, terrain: usize) {
     let mut s = stream(&format!("{terrain_id}-missions"));
     let mut samples = Vec::new();
     for k in 0..8 {
         let mission_id = format!("straight-{:04}", k + 1);
-        let words = ["success", "success", "stuck", "success", "tipped", "success", "timeout", "success"];
+        let words = ["success", "success", "stuck", "success", "tipped", "success", "timeout", "out_of_bounds"];
         let outcome = if g == 0 && k > 2 { "success" } else { words[(k + g) % 8] };
         let (x, y) = (s.uniform_in(8.0, 20.0), s.uniform_in(8.0, 42.0));
         let heading = s.uniform_in(-0.5, 0.5);
@@ -210,7 +278,7 @@ fn missions(data: &mut Data, shelf: &mut Shelf, terrain_id: &str, g: usize) {
             mission_id: mission_id.clone(),
             group: None,
             variant: None,
-            pair_id: format!("{terrain_id}-{mission_id}"),
+            pair_id: format!("straight-{terrain:04}-{:04}", k + 1),
             traverse_id: "drive".into(),
             vehicle: "husky_a200".into(),
             start_x_m: x,
@@ -253,7 +321,7 @@ fn missions(data: &mut Data, shelf: &mut Shelf, terrain_id: &str, g: usize) {
                 time_s: t * time_s,
                 x_m: x + reached * t * cos - wiggle * sin,
                 y_m: y + reached * t * sin + wiggle * cos,
-                z_m: 0.0,
+                z_m: 0.02 * libm::sin(41.0 * t) + 0.1 * libm::sin(7.0 * t),
                 qx: 0.0,
                 qy: 0.0,
                 qz: 0.0,

@@ -43,7 +43,7 @@ fn prop_a_full_report_is_sound() {
     let (files, summary) = report(&made_up::full(3, 48));
     assert_sound(&files);
     let page = &files["index.html"];
-    for section in ["terrain", "covariance", "texture", "missions", "published"] {
+    for section in ["terrain", "covariance", "texture", "missions", "published", "probability", "sensitivity"] {
         assert!(page.contains(&format!("<section id=\"{section}\">")), "{section}");
     }
     for figure in &summary.figures {
@@ -102,8 +102,13 @@ fn prop_an_empty_release_has_a_page_without_empty_boxes() {
 #[test]
 fn prop_any_part_may_be_absent() {
     type Take = (&'static str, fn(&mut Data));
-    let takes: [Take; 15] = [
+    let takes: [Take; 20] = [
         ("missions", |d| d.missions.clear()),
+        ("replicates", |d| d.replicates.clear()),
+        ("plain missions", |d| d.missions.retain(|m| m.variant.is_some())),
+        ("variants", |d| d.missions.retain(|m| m.variant.is_none())),
+        ("pairs", |d| d.missions.iter_mut().for_each(|m| m.pair_id = format!("{}-{}", m.terrain_id, m.mission_id))),
+        ("lines", |d| d.missions.iter_mut().for_each(|m| (m.goal_x_m, m.progress_m) = (f64::NAN, f64::NAN))),
         ("fits", |d| d.fits.clear()),
         ("covariance", |d| d.covariance.clear()),
         ("psd", |d| d.psd.clear()),

@@ -47,6 +47,7 @@ fn assembled(dest: &Path) -> ReleaseBuilder {
     builder.write_table("0000", data.psd, Origin::default()).unwrap();
     builder.write_table("0000", data.heights, Origin::default()).unwrap();
     builder.write_table("0000", data.missions, Origin::default()).unwrap();
+    builder.write_table("0000", data.replicates, Origin::default()).unwrap();
     for (terrain, samples) in shelf.samples {
         builder.write_table(&terrain, samples, Origin::default()).unwrap();
     }

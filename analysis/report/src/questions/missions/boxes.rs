@@ -1,9 +1,10 @@
-//! Box plots by group, with intervals of the medians and published medians where there are any.
+//! Box plots by group, with sampling bands of the medians and the paper's figures where there are any.
 
-use super::{METRICS, Metric, interval};
+use super::{METRICS, Metric};
 use crate::content::{Figure, Numbers, Size, TableBlock, count, number, slug, text};
 use crate::data::{Data, Group};
 use crate::papers;
+use crate::questions::clusters::band;
 use crate::questions::outcome;
 use crate::render::axis::Axis;
 use crate::render::chart::{Beside, Entry, Mark, RowLabel, Rows};
@@ -23,7 +24,7 @@ pub struct Sample<'a> {
     /// Terrain and value.
     values: Vec<(&'a str, f64)>,
     plot: BoxPlot,
-    interval: Option<Interval>,
+    band: Option<Interval>,
     published: Option<f64>,
 }
 
@@ -33,61 +34,61 @@ impl Sample<'_> {
     }
 }
 
-/// Shares of successful missions, one value per terrain.
-pub fn success(data: &Data, groups: &[Group<MissionRow>]) -> Option<Figure> {
-    let samples = samples(data, groups, "success", success_shares);
-    let several = samples.iter().any(|s| s.values.len() > 1);
-    let words = Words {
-        id: "success-by-terrain".into(),
-        title: "Success on each terrain.".into(),
-        axis: "successful missions, %".into(),
+/// A figure that is compared between groups, and its values.
+pub struct Compared<'a> {
+    name: &'static str,
+    unit: &'static str,
+    /// Name in the papers and of the stream of its band.
+    figure: &'static str,
+    n_is: &'static str,
+    query: String,
+    samples: Vec<Sample<'a>>,
+}
+
+/// Success on each terrain, then every figure of the successful missions.
+pub fn compared<'a>(data: &Data, groups: &[Group<'a, MissionRow>]) -> Vec<Compared<'a>> {
+    let success = Compared {
+        name: "success on a terrain",
+        unit: "%",
+        figure: "success",
         n_is: "terrains",
         query: "tables/missions, share of outcome = 'success' by terrain".into(),
-        value: ("success_percent", "%"),
+        samples: samples(data, groups, "success", success_shares),
     };
-    several.then(|| figure(&samples, words))
-}
-
-/// Samples of every figure that is compared between groups.
-pub fn measured<'a>(data: &Data, groups: &[Group<'a, MissionRow>]) -> Vec<(&'static Metric, Vec<Sample<'a>>)> {
-    METRICS.iter().map(|m| (m, samples(data, groups, m.column, |g| successful(g, m)))).collect()
-}
-
-/// One figure of the successful missions; `None` when no mission has it.
-pub fn metric((metric, samples): &(&Metric, Vec<Sample>)) -> Option<Figure> {
-    let words = Words {
-        id: slug(metric.column),
-        title: format!("{}.", capital(metric.name)),
-        axis: format!("{}, {}", metric.name, metric.unit),
+    let metric = |m: &'static Metric| Compared {
+        name: m.name,
+        unit: m.unit,
+        figure: m.column,
         n_is: "successful missions",
-        query: format!("tables/missions where outcome = 'success', column {}", metric.column),
-        value: (metric.column, metric.unit),
+        query: format!("tables/missions where outcome = 'success', column {}", m.column),
+        samples: samples(data, groups, m.column, |g| successful(g, m)),
     };
-    (!samples.is_empty()).then(|| figure(samples, words))
+    std::iter::once(success).chain(METRICS.iter().map(metric)).collect()
 }
 
-/// Medians, quartiles and intervals of every figure and group.
-pub fn medians(measured: &[(&Metric, Vec<Sample>)]) -> TableBlock {
+/// Medians, quartiles and sampling bands of every figure and group.
+pub fn medians(compared: &[Compared]) -> TableBlock {
     let columns = [
         ("figure", ""),
         ("unit", ""),
         ("group", ""),
-        ("missions", ""),
+        ("values", ""),
         ("terrains", ""),
         ("first quartile", ""),
         ("median", ""),
         ("third quartile", ""),
-        ("interval, low", ""),
-        ("interval, high", ""),
+        ("band, 5 %", ""),
+        ("band, 95 %", ""),
         ("outliers", ""),
     ];
-    let mut numbers = Numbers::new("tables/missions where outcome = 'success', by group", &columns);
-    for (metric, samples) in measured {
-        for s in samples {
-            let end = |f: fn(&Interval) -> f64| s.interval.as_ref().map_or(f64::NAN, f);
+    let query = "tables/missions where outcome = 'success', by group";
+    let mut numbers = Numbers::new(query, &columns).with_mixed_units();
+    for figure in compared {
+        for s in &figure.samples {
+            let end = |f: fn(&Interval) -> f64| s.band.as_ref().map_or(f64::NAN, f);
             numbers.row([
-                text(metric.name),
-                text(metric.unit),
+                text(figure.name),
+                text(figure.unit),
                 text(&s.group),
                 count(s.plot.count),
                 count(s.terrains()),
@@ -100,7 +101,8 @@ pub fn medians(measured: &[(&Metric, Vec<Sample>)]) -> TableBlock {
             ]);
         }
     }
-    TableBlock { id: "mission-medians".into(), caption: "Successful missions by group".into(), numbers }
+    let caption = "Success on terrains, and successful missions, by group".into();
+    TableBlock { id: "mission-medians".into(), caption, numbers }
 }
 
 fn samples<'a>(
@@ -109,23 +111,29 @@ fn samples<'a>(
     figure: &str,
     values: impl Fn(&Group<'a, MissionRow>) -> Vec<(&'a str, f64)>,
 ) -> Vec<Sample<'a>> {
-    let published = papers::applicable(data);
     let sample = |g: &Group<'a, MissionRow>| {
         let values = values(g);
         let plot = BoxPlot::of(&values.iter().map(|v| v.1).collect::<Vec<_>>())?;
-        let interval = interval(data, &g.name, figure, &values);
-        let published = published.as_ref().and_then(|p| p.value(figure, &g.name));
-        Some(Sample { group: g.name.clone(), index: g.index, values, plot, interval, published })
+        let band = band(data, &g.name, figure, &values);
+        Some(Sample { group: g.name.clone(), index: g.index, values, plot, band, published: None })
     };
-    groups.iter().filter_map(sample).collect()
+    let mut samples: Vec<Sample<'a>> = groups.iter().filter_map(sample).collect();
+    if let Some(paper) = papers::applicable(data) {
+        let medians: Vec<(&str, f64)> = samples.iter().map(|s| (s.group.as_str(), s.plot.median)).collect();
+        let marks = paper.marks(figure, &medians);
+        samples.iter_mut().zip(marks).for_each(|(s, mark)| s.published = mark);
+    }
+    samples
 }
 
-fn successful<'a>(group: &Group<'a, MissionRow>, metric: &Metric) -> Vec<(&'a str, f64)> {
+/// Values of the successful missions of a group, with their terrains.
+pub fn successful<'a>(group: &Group<'a, MissionRow>, metric: &Metric) -> Vec<(&'a str, f64)> {
     let goals = group.rows.iter().filter(|m| outcome::successful(m));
     goals.map(|m| (m.terrain_id.as_str(), (metric.of)(m))).filter(|v| v.1.is_finite()).collect()
 }
 
-fn success_shares<'a>(group: &Group<'a, MissionRow>) -> Vec<(&'a str, f64)> {
+/// Share of successful missions on each terrain of a group, %.
+pub fn success_shares<'a>(group: &Group<'a, MissionRow>) -> Vec<(&'a str, f64)> {
     let mut terrains: BTreeMap<&str, (usize, usize)> = BTreeMap::new();
     for mission in &group.rows {
         let (goals, all) = terrains.entry(&mission.terrain_id).or_default();
@@ -135,17 +143,12 @@ fn success_shares<'a>(group: &Group<'a, MissionRow>) -> Vec<(&'a str, f64)> {
     terrains.into_iter().map(|(id, (goals, all))| (id, 100.0 * goals as f64 / all as f64)).collect()
 }
 
-/// The words around a box plot.
-struct Words {
-    id: String,
-    title: String,
-    axis: String,
-    n_is: &'static str,
-    query: String,
-    value: (&'static str, &'static str),
-}
-
-fn figure(samples: &[Sample], words: Words) -> Figure {
+/// Box plots of a figure; `None` when no mission has it, or when success is known on one terrain a group alone.
+pub fn figure(data: &Data, compared: &Compared) -> Option<Figure> {
+    let samples = &compared.samples;
+    if samples.is_empty() || compared.figure == "success" && samples.iter().all(|s| s.values.len() < 2) {
+        return None;
+    }
     let label = |s: &Sample| RowLabel { name: s.group.clone(), detail: format!("n = {}", s.plot.count) };
     let labels: Vec<RowLabel> = samples.iter().map(label).collect();
     let axis = axis(samples);
@@ -153,24 +156,33 @@ fn figure(samples: &[Sample], words: Words) -> Figure {
         0 => String::new(),
         n => format!(" {} beyond the axis: triangles at its edge.", set::counted(n, "value")),
     };
-    let mut rows = Rows::new(&labels, 54.0, (axis, &words.axis), &legend(samples));
+    let axis_title = format!("{}, {}", compared.name, compared.unit);
+    let mut rows = Rows::new(&labels, 54.0, (axis, &axis_title), &legend(data, compared));
     for (row, s) in samples.iter().enumerate() {
-        let beside = Beside { interval: s.interval.map(|i| (i.low, i.high)), published: s.published };
+        let beside = Beside { interval: s.band.map(|i| (i.low, i.high)), published: s.published };
         rows.box_plot(row, &s.plot, beside, Paint::Series(s.index));
     }
-    let mut numbers = Numbers::new(words.query, &[("group", ""), ("terrain_id", ""), words.value]);
-    for s in samples {
-        s.values.iter().for_each(|v| numbers.row([text(&s.group), text(v.0), number(v.1)]));
-    }
-    Figure {
-        id: words.id,
-        title: words.title,
-        caption: format!("n counts {}.{beyond}", words.n_is),
-        description: describe(samples, &words.axis),
+    let id = if compared.figure == "success" { "success-by-terrain".into() } else { slug(compared.figure) };
+    let title = papers::title(data, &id, &format!("{}.", capital(compared.name)));
+    Some(Figure {
+        title,
+        caption: format!("n counts {}.{beyond}", compared.n_is),
+        description: describe(samples, &axis_title),
         svg: rows.svg,
         size: Size::Column,
-        numbers,
+        numbers: numbers(compared),
+        id,
+    })
+}
+
+fn numbers(compared: &Compared) -> Numbers {
+    let column = if compared.figure == "success" { "success_percent" } else { compared.figure };
+    let mut numbers =
+        Numbers::new(compared.query.clone(), &[("group", ""), ("terrain_id", ""), (column, compared.unit)]);
+    for s in &compared.samples {
+        s.values.iter().for_each(|v| numbers.row([text(&s.group), text(v.0), number(v.1)]));
     }
+    numbers
 }
 
 /// The axis holds all boxes, whiskers and published medians; outliers widen it by no more than [`OUTLIERS_WIDEN`].
@@ -193,23 +205,25 @@ fn beyond(samples: &[Sample], axis: &Axis) -> usize {
     samples.iter().flat_map(|s| &s.plot.outliers).filter(|v| **v < low || **v > high).count()
 }
 
-fn legend(samples: &[Sample]) -> Vec<Entry> {
+fn legend(data: &Data, compared: &Compared) -> Vec<Entry> {
     let mut entries = Vec::new();
-    if samples.iter().any(|s| s.interval.is_some()) {
-        entries.push((Mark::Line(Stroke::new(Paint::Ink, 2.2)), "95 % interval of the median".into()));
+    if compared.samples.iter().any(|s| s.band.is_some()) {
+        entries.push((Mark::Line(Stroke::new(Paint::Ink, 2.2)), "sampling band of the median".into()));
     }
-    if samples.iter().any(|s| s.published.is_some()) {
-        entries.push((Mark::Symbol(Symbol::Diamond, Paint::Ink), "published median".into()));
+    let marked = compared.samples.iter().any(|s| s.published.is_some());
+    if let Some(paper) = papers::applicable(data).filter(|_| marked) {
+        entries.push((Mark::Symbol(Symbol::Diamond, Paint::Ink), papers::mark_in_words(&paper, compared.figure)));
     }
     entries
 }
 
 fn describe(samples: &[Sample], axis: &str) -> String {
     let group = |s: &Sample| {
-        let interval = s.interval.map_or_else(String::new, |i| {
-            format!(", 95 % interval {} to {}", set::significant(i.low, 3), set::significant(i.high, 3))
+        let band = s.band.map_or_else(String::new, |i| {
+            format!(", sampling band {} to {}", set::significant(i.low, 3), set::significant(i.high, 3))
         });
-        format!("group {}: median {}{interval}, n = {}", s.group, set::significant(s.plot.median, 3), s.plot.count)
+        let paper = s.published.map_or_else(String::new, |p| format!(", paper {}", set::significant(p, 3)));
+        format!("group {}: median {}{band}{paper}, n = {}", s.group, set::significant(s.plot.median, 3), s.plot.count)
     };
     format!("Box plots of {axis}. {}.", samples.iter().map(group).collect::<Vec<_>>().join("; "))
 }

@@ -1,26 +1,22 @@
-//! How the missions went, by group: outcomes, figures of the successful ones, one mission in detail.
+//! How the missions went, by group: outcomes and how far they came, figures of the successful ones, maps, missions in detail.
 
-mod boxes;
+pub mod boxes;
+mod incidence;
+mod maps;
 mod outcomes;
 mod strip;
+mod survivors;
 
+use super::clusters::{Pairing, REPLICATES, in_words};
 use super::{Question, outcome};
 use crate::ReportError;
-use crate::content::{Block, Figure, Numbers, TableBlock};
+use crate::content::{Block, Numbers, TableBlock};
 use crate::data::{Data, Group};
 use crate::render::number as set;
-use sastrugi_numeric::Streams;
 use sastrugi_schemas::tables::MissionRow;
-use sastrugi_statistics::{Interval, cluster_median};
-use std::collections::BTreeMap;
 
 /// Registry entry.
 pub const QUESTION: Question = Question { id: "missions", name: "Missions", title: "How did the missions go?", answer };
-
-/// Bootstrap samples behind an interval.
-const REPLICATES: usize = 1000;
-/// Nominal coverage of an interval.
-const LEVEL: f64 = 0.95;
 
 /// A figure of a mission.
 #[derive(Clone, Copy, Debug)]
@@ -53,44 +49,55 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     if groups.is_empty() {
         return Ok(Vec::new());
     }
+    let pairing = Pairing::of(data);
+    let compared = boxes::compared(data, &groups);
     let mut figures = vec![outcomes::stacked(&groups)];
-    figures.extend(boxes::success(data, &groups));
-    let measured = boxes::measured(data, &groups);
-    figures.extend(measured.iter().filter_map(boxes::metric));
-    let mut blocks =
-        vec![Block::Text(introduction(&groups)), Block::Figures(figures), Block::Table(boxes::medians(&measured))];
-    let strip: Vec<Figure> = strip::figure(data)?.into_iter().collect();
-    if !strip.is_empty() {
-        blocks.extend([Block::Heading("One mission in detail".into()), Block::Figures(strip)]);
-    }
+    figures.extend(compared.iter().filter_map(|c| boxes::figure(data, c)));
+    let mut blocks = vec![
+        Block::Text(introduction(data, &groups, &pairing)),
+        Block::Figures(figures),
+        Block::Table(boxes::medians(&compared)),
+    ];
+    blocks.extend(incidence::blocks(data, &groups));
+    blocks.extend(survivors::blocks(data, &groups));
+    let drawn = maps::drawn(data, &groups)?;
+    section(&mut blocks, "Where they drove", MAPS, maps::figures(data, &drawn)?);
+    section(&mut blocks, "Missions in detail", STRIPS, strip::figures(data, &groups, &drawn)?);
     blocks.push(Block::FoldedTable(all(data)));
     Ok(blocks)
 }
 
-fn introduction(groups: &[Group<MissionRow>]) -> String {
+const MAPS: &str = "One terrain of each group: the one whose share of successful missions is in the middle (the lower middle of \
+an even number, the first of equals). Paths are those recorded; where none was, the line that was asked for.";
+const STRIPS: &str = "One mission of each kind of outcome: the one whose vertical acceleration is in the middle among those on \
+the terrains above (on all terrains where there is none). Acceleration is the second difference of the recorded height.";
+
+fn section(blocks: &mut Vec<Block>, heading: &str, words: &str, figures: Vec<crate::content::Figure>) {
+    if !figures.is_empty() {
+        blocks.extend([Block::Heading(heading.into()), Block::Text(words.into()), Block::Figures(figures)]);
+    }
+}
+
+fn introduction(data: &Data, groups: &[Group<MissionRow>], pairing: &Pairing) -> String {
     let missions: usize = groups.iter().map(|g| g.rows.len()).sum();
     let goals: usize = groups.iter().map(|g| g.rows.iter().filter(|m| outcome::successful(m)).count()).sum();
     let vehicles: std::collections::BTreeSet<&str> =
         groups.iter().flat_map(|g| g.rows.iter().map(|m| m.vehicle.as_str())).collect();
+    let variants = match data.missions.len() - missions {
+        0 => String::new(),
+        n => format!(" {} more belong to variants and are compared further below.", set::count(n)),
+    };
     format!(
-        "{} missions driven by {}; {} reached their goal. Missions on one terrain resemble each other, so intervals of \
-         medians draw whole terrains anew (percentile bootstrap, {} %, {REPLICATES} samples); with fewer than about ten \
-         terrains in a group they are too short. Boxes are quartiles (linear between order statistics), whiskers reach the \
-         last value within 1.5 interquartile ranges, circles lie beyond. Everything here is exploratory.",
+        "{} missions driven by {}; {} reached their goal.{variants} Missions on one terrain resemble each other: intervals draw \
+         whole {} anew ({REPLICATES} samples, percentiles); with fewer than about ten in a group they are too short. The \
+         sampling band of a figure holds 5 to 95 % of what such redraws give. Boxes are quartiles (linear between order \
+         statistics), whiskers reach the last value within 1.5 interquartile ranges, circles lie beyond. Everything here is \
+         exploratory.",
         set::count(missions),
         vehicles.into_iter().collect::<Vec<_>>().join(", "),
         set::count(goals),
-        set::fixed(100.0 * LEVEL, 0)
+        in_words(pairing),
     )
-}
-
-/// Median over missions with an interval over terrains; the stream is named by group and figure.
-pub fn interval(data: &Data, group: &str, figure: &str, values: &[(&str, f64)]) -> Option<Interval> {
-    let mut clusters: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
-    values.iter().for_each(|&(terrain, value)| clusters.entry(terrain).or_default().push(value));
-    let clusters: Vec<Vec<f64>> = clusters.into_values().collect();
-    let mut stream = Streams::for_item(data.study.seed, "report", group).stream(figure);
-    cluster_median(&clusters, REPLICATES, LEVEL, &mut stream)
 }
 
 fn all(data: &Data) -> TableBlock {
@@ -98,10 +105,12 @@ fn all(data: &Data) -> TableBlock {
         "terrain_id",
         "mission_id",
         "group",
+        "variant",
         "vehicle",
         "outcome",
         "time_s",
         "path_length_m",
+        "progress_m",
         "efficiency",
         "rms_vertical_acceleration_m_s2",
         "rms_pitch_rate_deg_s",

@@ -1,14 +1,14 @@
-//! One mission against time: pitch, roll, and the roughness class under the vehicle.
+//! Missions against time: pitch and roll, vertical acceleration, and the roughness class under the vehicle.
 
+use super::maps::{Drawn, of_mission};
 use crate::ReportError;
-use crate::content::{Figure, Numbers, Size, slug};
-use crate::data::Data;
-use crate::questions::outcome;
+use crate::content::{Figure, Heading, Numbers, Size, number, slug};
+use crate::data::{Data, Group};
+use crate::questions::outcome::{self, ALL};
 use crate::render::axis::Axis;
-use crate::render::chart::{Entry, Mark, Plot};
-use crate::render::svg::{Paint, Stroke};
+use crate::render::chart::{Entry, Mark, Plot, axis_room};
+use crate::render::svg::{Anchor, Paint, Stroke, Svg};
 use crate::render::{number as set, thin};
-use sastrugi_numeric::sums;
 use sastrugi_schemas::RoughnessClass;
 use sastrugi_schemas::tables::{MissionRow, SampleRow};
 
@@ -17,65 +17,135 @@ type Angle = fn(&SampleRow) -> f64;
 
 const PITCH: Stroke = Stroke { paint: Paint::Series(0), width: 1.6, dash: "", opacity: 1.0 };
 const ROLL: Stroke = Stroke { paint: Paint::Series(1), width: 1.6, dash: "5 2.5", opacity: 1.0 };
-/// Height of the band of classes, in the units of the axis's length.
-const BAND: f64 = 0.05;
+const HEAVE: Stroke = Stroke { paint: Paint::Series(2), width: 1.1, dash: "", opacity: 1.0 };
+/// Height of the band of classes, px.
+const BAND: f64 = 12.0;
+const WIDTH: f64 = 900.0;
+const ANGLES: f64 = 270.0;
+const HEAVES: f64 = 190.0;
+/// Outcomes that are shown, by their numbers: success, tipped, stuck.
+const SHOWN: [usize; 3] = [0, 2, 1];
 
-/// The successful mission whose vertical acceleration is nearest to the median of all successful ones (the first mission
-/// when none succeeded); `None` without its samples.
-pub fn figure(data: &Data) -> Result<Option<Figure>, ReportError> {
-    let Some(mission) = typical(data) else { return Ok(None) };
-    let mut samples = data.files.samples(&mission.terrain_id)?;
-    samples.retain(|s| s.mission_id == mission.mission_id);
-    Ok((samples.len() > 1).then(|| draw(mission, &samples)))
+/// One figure for each kind of outcome with a mission whose samples are known.
+pub fn figures(data: &Data, groups: &[Group<MissionRow>], drawn: &[Drawn]) -> Result<Vec<Figure>, ReportError> {
+    let mut figures = Vec::new();
+    for kind in SHOWN {
+        let of_kind = |m: &&&MissionRow| outcome::index(m) == kind;
+        let mapped: Vec<&MissionRow> = drawn.iter().flat_map(|d| d.missions.iter().filter(of_kind).copied()).collect();
+        let all = || groups.iter().flat_map(|g| g.rows.iter().filter(of_kind).copied()).collect();
+        let Some(mission) = middle(if mapped.is_empty() { all() } else { mapped }) else { continue };
+        let read = drawn.iter().find(|d| d.samples.first().is_some_and(|s| s.terrain_id == mission.terrain_id));
+        let samples = match read {
+            Some(drawn) => of_mission(&drawn.samples, mission).to_vec(),
+            None => of_mission(&data.files.samples(&mission.terrain_id)?, mission).to_vec(),
+        };
+        figures.extend((samples.len() > 2).then(|| draw(mission, &samples)));
+    }
+    Ok(figures)
 }
 
-fn typical(data: &Data) -> Option<&MissionRow> {
-    let figure = |m: &MissionRow| m.rms_vertical_acceleration_m_s2;
-    let goals: Vec<&MissionRow> =
-        data.missions.iter().filter(|m| outcome::successful(m) && figure(m).is_finite()).collect();
-    let middle = sums::median(&goals.iter().map(|m| figure(m)).collect::<Vec<_>>());
-    let distance = |m: &MissionRow| (figure(m) - middle).abs();
-    goals.into_iter().min_by(|a, b| distance(a).total_cmp(&distance(b))).or(data.missions.first())
+/// The mission with the middle vertical acceleration; those without one come last.
+fn middle(mut missions: Vec<&MissionRow>) -> Option<&MissionRow> {
+    // Without a sign, what is not a number sorts behind all numbers.
+    let figure = |m: &MissionRow| m.rms_vertical_acceleration_m_s2.abs();
+    missions.sort_by(|a, b| figure(a).total_cmp(&figure(b)));
+    let known = missions.iter().filter(|m| figure(m).is_finite()).count();
+    missions.get(known.max(1).saturating_sub(1) / 2).copied()
+}
+
+/// Second difference of the height over the squared interval, m/s2: NaN at both ends and where the clock stands.
+fn heaves(samples: &[SampleRow]) -> Vec<f64> {
+    let mut all = vec![f64::NAN; samples.len()];
+    for (i, w) in samples.windows(3).enumerate() {
+        let step = 0.5 * (w[2].time_s - w[0].time_s);
+        all[i + 1] = if step > 0.0 { (w[2].z_m - 2.0 * w[1].z_m + w[0].z_m) / (step * step) } else { f64::NAN };
+    }
+    all
+}
+
+/// An axis that holds the values and zero over at least `least`, with room below and above in shares of its length.
+fn axis(values: impl Iterator<Item = f64> + Clone, least: f64, (below, above): (f64, f64)) -> Axis {
+    let finite = values.filter(|v| v.is_finite());
+    let (low, high) = (finite.clone().fold(0.0, f64::min), finite.fold(0.0, f64::max));
+    let length = (high - low).max(least);
+    Axis::linear(low - below * length, high + above * length)
 }
 
 fn draw(mission: &MissionRow, samples: &[SampleRow]) -> Figure {
     let id = slug(&format!("mission-{}-{}", mission.terrain_id, mission.mission_id));
-    let angles = || samples.iter().flat_map(|s| [s.pitch_deg, s.roll_deg]).filter(|v| v.is_finite());
-    let (low, high) = (angles().fold(0.0, f64::min), angles().fold(0.0, f64::max));
-    let room = (high - low).max(1.0);
-    let y = Axis::linear(low - 0.16 * room, high + 0.06 * room);
-    let end = samples.last().map_or(0.0, |s| s.time_s);
-    let mut plot = Plot::new((900.0, 320.0), (Axis::linear(0.0, end), "time, s"), (y, "angle, °"), &legend(samples));
-    plot.clip(&format!("{id}-clip"));
-    draw_classes(&mut plot, samples);
+    let heaves = heaves(samples);
+    let angle_axis = axis(samples.iter().flat_map(|s| [s.pitch_deg, s.roll_deg]), 1.0, (0.06, 0.18));
+    let heave_axis = axis(heaves.iter().copied(), 0.1, (0.2, 0.06));
+    let room = axis_room(&angle_axis, ANGLES).max(axis_room(&heave_axis, HEAVES));
+    let mut svg = Svg::new(WIDTH, ANGLES + HEAVES);
+    svg.inset((0.0, 0.0), &angles(&id, mission, samples, angle_axis, room).svg);
+    svg.inset((0.0, ANGLES), &vertical(&id, samples, &heaves, heave_axis, room).svg);
+    finish(id, mission, samples, &heaves, svg)
+}
+
+fn time_axis(samples: &[SampleRow]) -> Axis {
+    Axis::linear(0.0, samples.last().map_or(0.0, |s| s.time_s))
+}
+
+fn angles(id: &str, mission: &MissionRow, samples: &[SampleRow], y: Axis, room: f64) -> Plot {
+    let entries: [Entry; 2] =
+        [(Mark::Line(PITCH), "pitch (nose down positive)".into()), (Mark::Line(ROLL), "roll".into())];
+    let x = (time_axis(samples), "");
+    let mut plot = Plot::with_room((WIDTH, ANGLES), x, (y, "angle, °"), &entries, room);
+    plot.clip(&format!("{id}-angles"));
+    let end = plot.x.range().1;
     plot.line([(0.0, 0.0), (end, 0.0)], Stroke::new(Paint::Muted, 1.0));
-    let angles: [(Angle, Stroke); 2] = [(|s| s.pitch_deg, PITCH), (|s| s.roll_deg, ROLL)];
-    for (angle, stroke) in angles {
+    let curves: [(Angle, Stroke); 2] = [(|s| s.pitch_deg, PITCH), (|s| s.roll_deg, ROLL)];
+    for (angle, stroke) in curves {
         let placed = plot.place(samples.iter().map(|s| (s.time_s, angle(s))));
         plot.svg.polyline(&thin::line(&placed, 0.7), stroke);
     }
     plot.svg.close();
-    finish(id, mission, samples, plot)
+    mark_end(&mut plot, mission, samples);
+    plot
+}
+
+/// The mark of the outcome at the last sample, on the line of zero, with its words.
+fn mark_end(plot: &mut Plot, mission: &MissionRow, samples: &[SampleRow]) {
+    let kind = outcome::index(mission);
+    let end = samples.last().map_or(0.0, |s| s.time_s);
+    let Some(&(x, y)) = plot.place([(end, 0.0)]).first() else { return };
+    plot.svg.symbol(ALL[kind].symbol, (x, y), 8.0, Paint::Paper);
+    plot.svg.symbol(ALL[kind].symbol, (x, y), 6.0, Paint::Outcome(kind));
+    let top = plot.place([(end, plot.y.range().1)]).first().map_or(y, |p| p.1);
+    let words = format!("{} after {}", ALL[kind].name, set::with_unit(mission.time_s, 3, "s"));
+    plot.svg.text((x - 8.0, top + 17.0), Anchor::End, Paint::Outcome(kind), &words);
+}
+
+fn vertical(id: &str, samples: &[SampleRow], heaves: &[f64], y: Axis, room: f64) -> Plot {
+    let axes = ((time_axis(samples), "time, s"), (y, "m/s²"));
+    let mut plot = Plot::with_room((WIDTH, HEAVES), axes.0, axes.1, &legend(samples), room);
+    plot.clip(&format!("{id}-heaves"));
+    let end = plot.x.range().1;
+    plot.line([(0.0, 0.0), (end, 0.0)], Stroke::new(Paint::Muted, 1.0));
+    plot.line(samples.iter().zip(heaves).map(|(s, a)| (s.time_s, *a)), HEAVE);
+    draw_classes(&mut plot, samples);
+    plot.svg.close();
+    plot
 }
 
 fn legend(samples: &[SampleRow]) -> Vec<Entry> {
-    let mut entries: Vec<Entry> =
-        vec![(Mark::Line(PITCH), "pitch (nose down positive)".into()), (Mark::Line(ROLL), "roll".into())];
+    let mut entries: Vec<Entry> = vec![(Mark::Line(HEAVE), "vertical acceleration".into())];
     let occurs = |class: &RoughnessClass| samples.iter().any(|s| s.class == Some(*class as i64));
-    let classes = RoughnessClass::ALL.into_iter().filter(occurs);
-    entries.extend(classes.map(|c| (Mark::Fill(Paint::Fixed(c.colour())), c.name().to_owned())));
+    let entry = |c: RoughnessClass| (Mark::Fill(Paint::Fixed(c.colour())), format!("class {}", c.name()));
+    entries.extend(RoughnessClass::ALL.into_iter().filter(occurs).map(entry));
     entries
 }
 
 /// A band along the bottom of the frame, one box per run of one class.
 fn draw_classes(plot: &mut Plot, samples: &[SampleRow]) {
-    let (low, high) = plot.y.range();
+    let low = plot.y.range().0;
     for run in samples.chunk_by(|a, b| a.class == b.class) {
         let class = run[0].class.and_then(|c| u8::try_from(c).ok()).and_then(RoughnessClass::from_code);
         let times = [run[0].time_s, run[run.len() - 1].time_s + spacing(samples)];
-        let corners = plot.place([(times[0], low + BAND * (high - low)), (times[1], low)]);
+        let corners = plot.place(times.map(|t| (t, low)));
         if let (Some(class), [from, to]) = (class, corners.as_slice()) {
-            plot.svg.rect(*from, (to.0 - from.0, to.1 - from.1), Paint::Fixed(class.colour()), 1.0);
+            plot.svg.rect((from.0, from.1 - BAND), (to.0 - from.0, BAND), Paint::Fixed(class.colour()), 1.0);
         }
     }
 }
@@ -85,29 +155,35 @@ fn spacing(samples: &[SampleRow]) -> f64 {
     samples.get(1).map_or(0.0, |s| s.time_s - samples[0].time_s)
 }
 
-fn finish(id: String, mission: &MissionRow, samples: &[SampleRow], plot: Plot) -> Figure {
-    let outcome = outcome::ALL[outcome::index(mission)].name;
-    let which = if outcome::successful(mission) {
-        "the successful mission with the middle vertical acceleration"
-    } else {
-        "the first mission"
-    };
+fn finish(id: String, mission: &MissionRow, samples: &[SampleRow], heaves: &[f64], svg: Svg) -> Figure {
+    let outcome = ALL[outcome::index(mission)].name;
     let caption = format!(
-        "Mission {} on {} ({outcome}, {}), {which}. The band at the foot is the roughness class under the vehicle. \
-         Recording: {}.",
-        mission.mission_id,
-        mission.terrain_id,
-        set::with_unit(mission.time_s, 3, "s"),
-        mission.path
+        "{} on {}. Pitch and roll above; vertical acceleration below, with the roughness class under the vehicle along its \
+         foot. Recording: {}.",
+        mission.mission_id, mission.terrain_id, mission.path
     );
+    let largest = heaves.iter().filter(|v| v.is_finite()).fold(0.0, |a: f64, v| a.max(v.abs()));
     let description = format!(
-        "Pitch and roll over {}; largest pitch {}, largest roll {}.",
+        "Pitch, roll and vertical acceleration over {} until {outcome}; largest pitch {}, largest roll {}, largest vertical \
+         acceleration {}.",
         set::with_unit(mission.time_s, 3, "s"),
         set::with_unit(mission.max_pitch_deg, 3, "°"),
-        set::with_unit(mission.max_roll_deg, 3, "°")
+        set::with_unit(mission.max_roll_deg, 3, "°"),
+        set::with_unit(largest, 3, "m/s²"),
     );
     let query =
         format!("tables/samples where terrain_id = '{}' and mission_id = '{}'", mission.terrain_id, mission.mission_id);
-    let numbers = Numbers::select(query, samples, &["sample", "time_s", "pitch_deg", "roll_deg", "class"]);
-    Figure { id, title: "Pitch and roll.".into(), caption, description, svg: plot.svg, size: Size::Wide, numbers }
+    let columns = ["sample", "time_s", "pitch_deg", "roll_deg", "z_m", "class"];
+    let mut numbers = Numbers::select(query, samples, &columns);
+    numbers.columns.push(Heading { name: "vertical_acceleration_m_s2".into(), unit: "m/s2".into() });
+    numbers.rows.iter_mut().zip(heaves).for_each(|(row, a)| row.push(number(*a)));
+    Figure {
+        id,
+        title: format!("A mission with outcome: {outcome}."),
+        caption,
+        description,
+        svg,
+        size: Size::Wide,
+        numbers,
+    }
 }

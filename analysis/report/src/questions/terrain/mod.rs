@@ -123,6 +123,7 @@ fn all(data: &Data) -> TableBlock {
     let names = [
         "terrain_id",
         "group",
+        "variant",
         "kind",
         "rows",
         "cols",

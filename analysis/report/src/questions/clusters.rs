@@ -1,0 +1,144 @@
+//! What is drawn anew when an interval is made: whole terrains, because missions on one terrain resemble each other; where
+//! groups share their random draws (common pairs), whole blocks of paired terrains, because those resemble each other too.
+
+use crate::data::{Data, Group};
+use sastrugi_numeric::{Stream, Streams, sums};
+use sastrugi_schemas::tables::MissionRow;
+use sastrugi_statistics::{Interval, cluster_interval};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Bootstrap samples behind an interval.
+pub const REPLICATES: usize = 1000;
+/// Nominal coverage of an interval of an estimate.
+pub const LEVEL: f64 = 0.95;
+/// Coverage of a sampling band, 5 to 95 %.
+pub const BAND: f64 = 0.9;
+
+/// The stream of a bootstrap: named by what is drawn (a group) and by the figure.
+pub fn stream(data: &Data, item: &str, figure: &str) -> Stream {
+    Streams::for_item(data.study.seed, "report", item).stream(figure)
+}
+
+/// Median of a group's values, given with their terrains, and its sampling band.
+pub fn band(data: &Data, group: &str, figure: &str, values: &[(&str, f64)]) -> Option<Interval> {
+    let clusters = Clusters::new(&[values.iter().copied().filter(|v| v.1.is_finite()).collect()]);
+    clusters.interval(&mut stream(data, group, figure), BAND, |pooled| sums::median(&pooled[0]))
+}
+
+/// The block of a pair: its id without the number of the mission.
+pub fn block(pair_id: &str) -> &str {
+    pair_id.rsplit_once('-').map_or(pair_id, |(block, _)| block)
+}
+
+/// True when missions of at least two groups have a `pair_id` in common.
+pub fn paired(groups: &[Group<MissionRow>]) -> bool {
+    let sets: Vec<BTreeSet<&str>> =
+        groups.iter().map(|g| g.rows.iter().map(|m| m.pair_id.as_str()).collect()).collect();
+    sets.iter().enumerate().any(|(i, a)| sets[..i].iter().any(|b| !a.is_disjoint(b)))
+}
+
+/// Which cluster each terrain of a comparison belongs to.
+#[derive(Clone, Debug)]
+pub struct Pairing<'a> {
+    blocks: BTreeMap<&'a str, &'a str>,
+}
+
+impl<'a> Pairing<'a> {
+    /// The pairing of the release's plain groups.
+    pub fn of(data: &'a Data) -> Self {
+        Self::among(&data.mission_groups())
+    }
+
+    /// The pairing of groups: blocks where groups share pairs, terrains elsewhere.
+    pub fn among(groups: &[Group<'a, MissionRow>]) -> Self {
+        let missions = groups.iter().flat_map(|g| g.rows.iter().copied());
+        let entry = |m: &'a MissionRow| (m.terrain_id.as_str(), block(&m.pair_id));
+        Self { blocks: if paired(groups) { missions.map(entry).collect() } else { BTreeMap::new() } }
+    }
+
+    /// True when groups share pairs.
+    pub fn is_common(&self) -> bool {
+        !self.blocks.is_empty()
+    }
+
+    /// The cluster of a terrain.
+    pub fn cluster(&self, terrain_id: &'a str) -> &'a str {
+        self.blocks.get(terrain_id).copied().unwrap_or(terrain_id)
+    }
+}
+
+/// Items of several groups by cluster. Groups that have a cluster in common are drawn together.
+#[derive(Clone, Debug)]
+pub struct Clusters<T> {
+    /// Clusters in each independent sample.
+    samples: Vec<usize>,
+    /// For each group its sample, and its items by cluster of that sample.
+    groups: Vec<(usize, Vec<Vec<T>>)>,
+}
+
+impl<T: Copy> Clusters<T> {
+    /// From the clusters and items of each group.
+    pub fn new(groups: &[Vec<(&str, T)>]) -> Self {
+        let names: Vec<BTreeSet<&str>> = groups.iter().map(|g| g.iter().map(|v| v.0).collect()).collect();
+        let common = names.iter().enumerate().any(|(i, a)| names[..i].iter().any(|b| !a.is_disjoint(b)));
+        let samples: Vec<BTreeSet<&str>> = if common { vec![names.into_iter().flatten().collect()] } else { names };
+        let of_group = |(g, items): (usize, &Vec<(&str, T)>)| {
+            let sample = if common { 0 } else { g };
+            let numbers: BTreeMap<&str, usize> = samples[sample].iter().enumerate().map(|(i, n)| (*n, i)).collect();
+            let mut clusters = vec![Vec::new(); numbers.len()];
+            items.iter().for_each(|(name, item)| clusters[numbers[name]].push(*item));
+            (sample, clusters)
+        };
+        let groups = groups.iter().enumerate().map(of_group).collect();
+        Self { samples: samples.iter().map(BTreeSet::len).collect(), groups }
+    }
+
+    /// Clusters in each independent sample.
+    pub fn samples(&self) -> &[usize] {
+        &self.samples
+    }
+
+    /// The items of every group when these clusters are drawn.
+    pub fn pooled(&self, drawn: &[Vec<usize>]) -> Vec<Vec<T>> {
+        let group = |(sample, clusters): &(usize, Vec<Vec<T>>)| {
+            drawn[*sample].iter().flat_map(|&c| clusters[c].iter().copied()).collect()
+        };
+        self.groups.iter().map(group).collect()
+    }
+
+    /// Percentile interval of a statistic of the items of every group; `None` with fewer than two clusters.
+    pub fn interval(&self, stream: &mut Stream, level: f64, statistic: impl Fn(&[Vec<T>]) -> f64) -> Option<Interval> {
+        cluster_interval(&self.samples, REPLICATES, level, stream, |drawn| statistic(&self.pooled(drawn)))
+    }
+}
+
+/// What intervals draw anew, in words.
+pub fn in_words(pairing: &Pairing) -> &'static str {
+    if pairing.is_common() { "blocks of paired terrains" } else { "terrains" }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn val_blocks() {
+        assert_eq!(block("straight-0003-0017"), "straight-0003");
+        assert_eq!(block("alone"), "alone");
+    }
+
+    /// Groups with a common cluster are drawn together: the difference of equal groups has no scatter. Apart it has.
+    #[test]
+    fn val_common_clusters_are_drawn_together() {
+        let group = |names: &'static str| names.split(' ').zip((0..9).map(f64::from)).collect::<Vec<_>>();
+        let (a, b) = (group("a b c d e f g h i"), group("j k l m n o p q r"));
+        let difference = |v: &[Vec<f64>]| v[1].iter().sum::<f64>() - v[0].iter().sum::<f64>();
+        let mut s = Streams::for_seed(1, "clusters-test").stream("pairs");
+        let together = Clusters::new(&[a.clone(), a.clone()]);
+        let i = together.interval(&mut s, 0.9, difference).unwrap();
+        assert_eq!((together.samples(), i.low, i.high), (&[9][..], 0.0, 0.0));
+        let apart = Clusters::new(&[a, b]);
+        let i = apart.interval(&mut s, 0.9, difference).unwrap();
+        assert!(apart.samples() == [9, 9] && i.low < -5.0 && i.high > 5.0, "{i:?}");
+    }
+}

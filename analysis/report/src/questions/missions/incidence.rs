@@ -1,0 +1,181 @@
+//! How far missions came: cumulative incidence of the ways to fail, over the distance along the line.
+
+use crate::content::{Block, Figure, Numbers, Size, count, number, slug, text};
+use crate::data::{Data, Group};
+use crate::questions::clusters::{Clusters, LEVEL, REPLICATES, stream};
+use crate::questions::outcome;
+use crate::render::axis::Axis;
+use crate::render::chart::{Entry, Mark, Plot, WIDTH};
+use crate::render::number as set;
+use crate::render::svg::{Paint, Stroke};
+use sastrugi_schemas::tables::MissionRow;
+use sastrugi_statistics::{Ending, Incidence, Interval, bootstrap};
+
+/// Ways to fail, in the order of their numbers: name, and the outcome whose colour and dashes it has.
+const CAUSES: [(&str, usize); 3] = [("stuck", 1), ("tipped", 2), ("other failure", 5)];
+/// Distances at which bands are known.
+const STEPS: usize = 70;
+/// Largest number of groups that are drawn.
+const GROUPS_MAX: usize = 12;
+const HEIGHT: f64 = 260.0;
+
+/// Curves of a group.
+struct Curves<'a> {
+    group: &'a Group<'a, MissionRow>,
+    incidence: Incidence,
+    /// Interval of every cause at each of the [`STEPS`] + 1 distances; `None` where there are fewer than two clusters.
+    bands: Vec<Vec<Option<Interval>>>,
+}
+
+/// Words and one figure per group; nothing when no mission failed or no distance is known.
+pub fn blocks(data: &Data, groups: &[Group<MissionRow>]) -> Vec<Block> {
+    let lengths = groups.iter().flat_map(|g| g.rows.iter().map(|m| length(m))).filter(|l| l.is_finite());
+    let length = lengths.fold(0.0, f64::max);
+    let drawn = &groups[..groups.len().min(GROUPS_MAX)];
+    let all: Vec<Curves> = drawn.iter().map(|g| curves(data, g, length)).collect();
+    let top = all.iter().flat_map(tops).fold(0.0, f64::max);
+    if length <= 0.0 || top <= 0.0 {
+        return Vec::new();
+    }
+    let words = format!(
+        "The share of missions that have failed in each way up to a distance along their line: competing risks, by Aalen and \
+         Johansen (1978). A mission that reached its goal counts as not watched beyond its line. A goal is reached by those \
+         that met nothing bad on the way, so figures of successful missions describe the ground that lets vehicles pass. \
+         Bands are {} % at each distance, from {REPLICATES} redraws of whole terrains.",
+        set::fixed(100.0 * LEVEL, 0)
+    );
+    let figures = all.iter().map(|c| figure(c, length, top)).collect();
+    vec![Block::Heading("How far they came".into()), Block::Text(words), Block::Figures(figures)]
+}
+
+/// Length of a mission's line, m.
+fn length(mission: &MissionRow) -> f64 {
+    libm::hypot(mission.goal_x_m - mission.start_x_m, mission.goal_y_m - mission.start_y_m)
+}
+
+fn ending(mission: &MissionRow) -> Ending {
+    let kind = outcome::index(mission);
+    let own = CAUSES.iter().position(|c| c.1 == kind).unwrap_or(CAUSES.len() - 1);
+    match kind {
+        0 => Ending { at: length(mission), cause: None },
+        _ => Ending { at: mission.progress_m, cause: Some(own) },
+    }
+}
+
+fn curves<'a>(data: &Data, group: &'a Group<'a, MissionRow>, length: f64) -> Curves<'a> {
+    let items: Vec<(&str, Ending)> = group.rows.iter().map(|m| (m.terrain_id.as_str(), ending(m))).collect();
+    let incidence = Incidence::of(&items.iter().map(|i| i.1).collect::<Vec<_>>(), CAUSES.len());
+    let clusters = Clusters::new(&[items]);
+    let mut stream = stream(data, &group.name, "progress_m");
+    let several = clusters.samples().iter().all(|n| *n > 1);
+    let redrawn = bootstrap::redraw(clusters.samples(), if several { REPLICATES } else { 0 }, &mut stream, |drawn| {
+        Incidence::of(&clusters.pooled(drawn)[0], CAUSES.len())
+    });
+    let band = |cause: usize, at: f64| {
+        let values: Vec<f64> = redrawn.iter().map(|i| i.share(cause, at)).collect();
+        Interval::percentile(incidence.share(cause, at), &values, LEVEL)
+    };
+    let bands = (0..CAUSES.len()).map(|k| distances(length).map(|at| band(k, at)).collect()).collect();
+    Curves { group, incidence, bands }
+}
+
+fn distances(length: f64) -> impl Iterator<Item = f64> {
+    (0..=STEPS).map(move |i| length * i as f64 / STEPS as f64)
+}
+
+/// The largest shares that are drawn.
+fn tops(curves: &Curves) -> Vec<f64> {
+    let ends = curves.bands.iter().flatten().flatten().map(|b| b.high);
+    let curve = curves.incidence.shares.iter().filter_map(|s| s.last().copied());
+    ends.chain(curve).collect()
+}
+
+fn figure(curves: &Curves, length: f64, top: f64) -> Figure {
+    let id = slug(&format!("incidence-{}", curves.group.name));
+    let occurs = |k: &usize| curves.incidence.shares[*k].last().is_some_and(|s| *s > 0.0);
+    let causes: Vec<usize> = (0..CAUSES.len()).filter(occurs).collect();
+    let legend: Vec<Entry> = causes.iter().map(|&k| (Mark::Line(stroke(k)), CAUSES[k].0.to_owned())).collect();
+    let x = (Axis::linear(0.0, length), "distance along the line, m");
+    let y = (Axis::linear(0.0, 105.0 * top), "failed so far, %");
+    let mut plot = Plot::new((WIDTH, HEIGHT), x, y, &legend);
+    plot.clip(&format!("{id}-clip"));
+    causes.iter().for_each(|&k| draw_band(&mut plot, &curves.bands[k], length, CAUSES[k].1));
+    causes.iter().for_each(|&k| plot.line(steps(&curves.incidence, k, length), stroke(k)));
+    plot.svg.close();
+    let rows = curves.group.rows.len();
+    Figure {
+        id,
+        title: format!("Group {}.", curves.group.name),
+        caption: format!("Missions that failed, by distance; {} in all.", set::count(rows)),
+        description: describe(curves, &causes, length),
+        svg: plot.svg,
+        size: Size::Column,
+        numbers: numbers(curves, length),
+    }
+}
+
+fn stroke(cause: usize) -> Stroke {
+    let kind = CAUSES[cause].1;
+    // Long dashes where the track of a map has short ones: a step curve is short of room for either.
+    let dash = ["", "7 3", "2 3"][cause];
+    Stroke::new(Paint::Outcome(kind), 2.0).dashed(dash)
+}
+
+/// The corners of a step curve, in per cent.
+fn steps(incidence: &Incidence, cause: usize, length: f64) -> Vec<(f64, f64)> {
+    let mut points = vec![(0.0, 0.0)];
+    let mut before = 0.0;
+    for (&at, &share) in incidence.at.iter().zip(&incidence.shares[cause]) {
+        if share > before {
+            points.extend([(at, 100.0 * before), (at, 100.0 * share)]);
+            before = share;
+        }
+    }
+    points.push((length, 100.0 * before));
+    points
+}
+
+fn draw_band(plot: &mut Plot, bands: &[Option<Interval>], length: f64, kind: usize) {
+    let known: Vec<(f64, Interval)> = distances(length).zip(bands).filter_map(|(x, b)| Some((x, (*b)?))).collect();
+    let upper = known.iter().map(|(x, b)| (*x, 100.0 * b.high));
+    let lower = known.iter().rev().map(|(x, b)| (*x, 100.0 * b.low));
+    let outline = plot.place(upper.chain(lower));
+    plot.svg.area(&outline, Paint::Outcome(kind), 0.16);
+}
+
+fn describe(curves: &Curves, causes: &[usize], length: f64) -> String {
+    let part = |&k: &usize| {
+        let share = |at: f64| set::percent(curves.incidence.share(k, at), 1);
+        format!("{} {} half way and {} at the end", CAUSES[k].0, share(0.5 * length), share(length))
+    };
+    let parts: Vec<String> = causes.iter().map(part).collect();
+    let parts = if parts.is_empty() { "none".into() } else { parts.join("; ") };
+    format!("Cumulative incidence of failures over the distance, group {}: {parts}.", curves.group.name)
+}
+
+fn numbers(curves: &Curves, length: f64) -> Numbers {
+    let columns = [
+        ("group", ""),
+        ("failure", ""),
+        ("distance_m", "m"),
+        ("share", "1"),
+        ("low", "1"),
+        ("high", "1"),
+        ("missions", "1"),
+    ];
+    let mut numbers = Numbers::new("tables/missions: outcome over progress_m", &columns);
+    for (k, bands) in curves.bands.iter().enumerate() {
+        for (at, band) in distances(length).zip(bands) {
+            numbers.row([
+                text(&curves.group.name),
+                text(CAUSES[k].0),
+                number(at),
+                number(curves.incidence.share(k, at)),
+                number(band.map_or(f64::NAN, |b| b.low)),
+                number(band.map_or(f64::NAN, |b| b.high)),
+                count(curves.group.rows.len()),
+            ]);
+        }
+    }
+    numbers
+}

@@ -1,0 +1,145 @@
+//! Missions on the class map of one terrain of each group.
+
+use crate::ReportError;
+use crate::content::{Figure, Numbers, Size, slug};
+use crate::data::{Data, Group};
+use crate::questions::outcome;
+use crate::questions::relief::{MAP_WIDTH, exaggeration, extent};
+use crate::render::chart::{Entry, Mark};
+use crate::render::map::{Key, Map};
+use crate::render::svg::{Paint, Stroke, Symbol};
+use crate::render::{number as set, picture, thin};
+use sastrugi_schemas::RoughnessClass;
+use sastrugi_schemas::tables::{MissionRow, SampleRow, TerrainRow};
+use std::collections::BTreeMap;
+
+/// Largest number of rows or columns of a class map.
+const PIXELS: usize = 420;
+/// Largest number of groups that are drawn.
+const GROUPS_MAX: usize = 12;
+/// Marks on maps do not follow the theme.
+const DARK: Paint = Paint::Fixed([0x1b, 0x20, 0x26]);
+const LIGHT: Paint = Paint::Fixed([0xff, 0xff, 0xff]);
+
+/// The terrain of a group that is drawn, with its missions and their samples.
+pub struct Drawn<'a> {
+    group: String,
+    terrain: &'a TerrainRow,
+    /// Its missions.
+    pub missions: Vec<&'a MissionRow>,
+    /// Their samples, by mission.
+    pub samples: Vec<SampleRow>,
+}
+
+/// The terrain of each group whose share of successful missions is in the middle.
+pub fn drawn<'a>(data: &'a Data, groups: &[Group<'a, MissionRow>]) -> Result<Vec<Drawn<'a>>, ReportError> {
+    let mut all = Vec::new();
+    for group in groups.iter().take(GROUPS_MAX) {
+        let Some(terrain) = middle(group).and_then(|id| data.terrain(id)) else { continue };
+        let samples = data.files.samples(&terrain.terrain_id)?;
+        let missions = group.rows.iter().copied().filter(|m| m.terrain_id == terrain.terrain_id).collect();
+        all.push(Drawn { group: group.name.clone(), terrain, missions, samples });
+    }
+    Ok(all)
+}
+
+/// Id of the terrain with the middle share of successes: the lower middle of an even number, the first of equals.
+fn middle<'a>(group: &Group<'a, MissionRow>) -> Option<&'a str> {
+    let mut terrains: BTreeMap<&str, Vec<&MissionRow>> = BTreeMap::new();
+    group.rows.iter().for_each(|m| terrains.entry(&m.terrain_id).or_default().push(m));
+    let share = |missions: &[&MissionRow]| outcome::counts(missions.iter().copied())[0] as f64 / missions.len() as f64;
+    let mut ranked: Vec<(f64, &str)> = terrains.iter().map(|(id, missions)| (share(missions), *id)).collect();
+    ranked.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(b.1)));
+    let value = ranked.get(ranked.len().saturating_sub(1) / 2)?.0;
+    ranked.iter().find(|r| r.0 == value).map(|r| r.1)
+}
+
+/// Samples of one mission among those of a terrain, which are sorted by mission.
+pub fn of_mission<'a>(samples: &'a [SampleRow], mission: &MissionRow) -> &'a [SampleRow] {
+    let id = mission.mission_id.as_str();
+    let from = samples.partition_point(|s| s.mission_id.as_str() < id);
+    &samples[from..][..samples[from..].partition_point(|s| s.mission_id.as_str() <= id)]
+}
+
+/// One map for each terrain whose class map the release holds.
+pub fn figures(data: &Data, drawn: &[Drawn]) -> Result<Vec<Figure>, ReportError> {
+    let mut figures = Vec::new();
+    for one in drawn {
+        figures.extend(figure(data, one)?);
+    }
+    Ok(figures)
+}
+
+fn figure(data: &Data, drawn: &Drawn) -> Result<Option<Figure>, ReportError> {
+    let Drawn { group, terrain, missions, samples } = drawn;
+    let Some(codes) = data.files.classes(&format!("classes/{}.tif", terrain.terrain_id))? else { return Ok(None) };
+    let heights = data.files.grid(&terrain.path)?;
+    let picture = picture::classes(&codes, heights.as_ref(), exaggeration(terrain.rms_slope), PIXELS)?;
+    let id = slug(&format!("missions-{}", terrain.terrain_id));
+    let mut map = Map::new(&picture, MAP_WIDTH, &Key::Entries(&entries(missions)));
+    map.clip(&format!("{id}-clip"));
+    missions.iter().for_each(|m| draw_mission(&mut map, m, &track_of(samples, m)));
+    map.svg.close();
+    let counts = outcome::counts(missions.iter().copied());
+    let occurred = outcome::ALL.iter().zip(counts).filter(|(_, n)| *n > 0);
+    let outcomes: Vec<String> = occurred.map(|(o, n)| format!("{} {n}", o.name)).collect();
+    let columns = ["mission_id", "outcome", "start_x_m", "start_y_m", "goal_x_m", "goal_y_m", "time_s", "path"];
+    let query = format!("tables/missions where terrain_id = '{}'", terrain.terrain_id);
+    Ok(Some(Figure {
+        id,
+        title: format!("Missions, group {group}."),
+        caption: format!(
+            "{}: {} of {} reached their goal. Closed class map over the relief.",
+            terrain.terrain_id,
+            set::count(counts[0]),
+            set::count(missions.len())
+        ),
+        description: format!("Map of missions, {}; missions by outcome: {}.", extent(&codes), outcomes.join(", ")),
+        svg: map.svg,
+        size: Size::Column,
+        numbers: Numbers::select(query, missions.iter().copied(), &columns),
+    }))
+}
+
+/// Classes, then the outcomes that occur, then start and goal.
+fn entries(missions: &[&MissionRow]) -> Vec<Entry> {
+    let class = |c| (Mark::Fill(Paint::Fixed(picture::class_colour(c))), RoughnessClass::name(c).to_owned());
+    let mut entries: Vec<Entry> = RoughnessClass::ALL.map(class).into();
+    let counts = outcome::counts(missions.iter().copied());
+    for (i, n) in counts.into_iter().enumerate().filter(|(_, n)| *n > 0) {
+        // The ink of a legend must show on the page in either theme.
+        let stroke = Stroke { paint: Paint::Outcome(i), ..outcome::track(i) };
+        entries.push((Mark::Track(stroke, outcome::ALL[i].symbol), format!("{} ({n})", outcome::ALL[i].name)));
+    }
+    entries.push((Mark::Symbol(Symbol::Ring, Paint::Ink), "start".into()));
+    if counts[0] < missions.len() {
+        entries.push((Mark::Symbol(Symbol::Frame, Paint::Ink), "goal not reached".into()));
+    }
+    entries
+}
+
+/// The path driven where it was recorded, else the straight line that was asked for.
+fn track_of(samples: &[SampleRow], mission: &MissionRow) -> Vec<(f64, f64)> {
+    let path: Vec<(f64, f64)> = of_mission(samples, mission).iter().map(|s| (s.x_m, s.y_m)).collect();
+    match path.len() {
+        0 | 1 => vec![(mission.start_x_m, mission.start_y_m), (mission.goal_x_m, mission.goal_y_m)],
+        _ => thin::every(&path, 80),
+    }
+}
+
+fn draw_mission(map: &mut Map, mission: &MissionRow, path: &[(f64, f64)]) {
+    let placed: Vec<(f64, f64)> = path.iter().filter_map(|&(x, y)| map.at(x, y)).collect();
+    let (Some(&start), Some(&end)) = (placed.first(), placed.last()) else { return };
+    let kind = outcome::index(mission);
+    let stroke = outcome::track(kind);
+    map.svg.polyline(&placed, Stroke::new(LIGHT, 3.4).faint(0.75));
+    map.svg.polyline(&placed, stroke);
+    map.svg.disc(start, 3.6, LIGHT, 1.0);
+    map.svg.symbol(Symbol::Ring, start, 3.4, DARK);
+    if let Some(goal) = map.at(mission.goal_x_m, mission.goal_y_m).filter(|_| !outcome::successful(mission)) {
+        map.svg.rect((goal.0 - 3.2, goal.1 - 3.2), (6.4, 6.4), LIGHT, 0.9);
+        map.svg.symbol(Symbol::Frame, goal, 3.0, DARK);
+    }
+    map.svg.symbol(outcome::ALL[kind].symbol, end, 5.4, LIGHT);
+    map.svg.symbol(outcome::ALL[kind].symbol, end, 4.2, stroke.paint);
+}

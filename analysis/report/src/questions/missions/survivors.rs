@@ -1,0 +1,97 @@
+//! The same missions in every group: figures of survivors are not figures of terrains.
+
+use super::METRICS;
+use crate::content::{Block, Numbers, TableBlock, count, number, text};
+use crate::data::{Data, Group};
+use crate::questions::clusters::{Clusters, LEVEL, block, paired, stream};
+use crate::questions::outcome::successful;
+use crate::render::number as set;
+use sastrugi_numeric::sums;
+use sastrugi_schemas::tables::MissionRow;
+use std::collections::BTreeMap;
+
+/// The table and what it is for; nothing where groups share no pairs.
+pub fn blocks(data: &Data, groups: &[Group<MissionRow>]) -> Vec<Block> {
+    if groups.len() < 2 || !paired(groups) {
+        return Vec::new();
+    }
+    let pairs = common(groups);
+    let table = table(data, groups, &pairs);
+    vec![
+        Block::Heading("The same missions in every group".into()),
+        Block::Text(format!(
+            "Medians over successful missions compare different missions: in a harder group only the easier ones are left. {} \
+             led from the same start to the same goal in every group and succeeded in all of them. Below are their medians, \
+             and the median of the change of each from one group to the next ({} % interval, blocks of paired terrains drawn \
+             anew).",
+            set::counted(pairs.len(), "mission"),
+            set::fixed(100.0 * LEVEL, 0)
+        )),
+        Block::Table(table),
+    ]
+}
+
+/// Missions of every pair that succeeds in every group, in the order of the groups.
+fn common<'a>(groups: &[Group<'a, MissionRow>]) -> Vec<(&'a str, Vec<&'a MissionRow>)> {
+    let mut pairs: BTreeMap<&str, Vec<&MissionRow>> = BTreeMap::new();
+    for (before, group) in groups.iter().enumerate() {
+        for mission in group.rows.iter().filter(|m| successful(m)) {
+            let members = pairs.entry(&mission.pair_id).or_default();
+            // A second mission of the pair in one group would shift the order.
+            if members.len() == before {
+                members.push(mission);
+            }
+        }
+    }
+    pairs.into_iter().filter(|(_, members)| members.len() == groups.len()).collect()
+}
+
+fn table(data: &Data, groups: &[Group<MissionRow>], pairs: &[(&str, Vec<&MissionRow>)]) -> TableBlock {
+    let columns = [
+        ("figure", ""),
+        ("unit", ""),
+        ("group", ""),
+        ("successful", ""),
+        ("median", ""),
+        ("of these in all groups", ""),
+        ("their median", ""),
+        ("change", ""),
+        ("low", ""),
+        ("high", ""),
+    ];
+    let query = "tables/missions where outcome = 'success'; pair_id with success in every group";
+    let mut numbers = Numbers::new(query, &columns).with_mixed_units();
+    for metric in &METRICS {
+        for (g, group) in groups.iter().enumerate() {
+            let all: Vec<f64> = group.rows.iter().filter(|m| successful(m)).map(|m| (metric.of)(m)).collect();
+            let of =
+                |k: usize| pairs.iter().map(move |p| (block(p.0), (metric.of)(p.1[k]))).filter(|v| v.1.is_finite());
+            let here: Vec<(&str, f64)> = of(g).collect();
+            let change = |before: usize| {
+                let difference = |p: &(&'_ str, Vec<&MissionRow>)| (metric.of)(p.1[g]) - (metric.of)(p.1[before]);
+                let values: Vec<(String, f64)> = pairs.iter().map(|p| (block(p.0).to_owned(), difference(p))).collect();
+                values.into_iter().filter(|v| v.1.is_finite()).collect::<Vec<_>>()
+            };
+            let changes = g.checked_sub(1).map(change).unwrap_or_default();
+            let interval = Clusters::new(&[changes.iter().map(|c| (c.0.as_str(), c.1)).collect()]).interval(
+                &mut stream(data, &group.name, &format!("paired {}", metric.column)),
+                LEVEL,
+                |pooled| sums::median(&pooled[0]),
+            );
+            let (low, high) = interval.map_or((f64::NAN, f64::NAN), |i| (i.low, i.high));
+            numbers.row([
+                text(metric.name),
+                text(metric.unit),
+                text(&group.name),
+                count(all.len()),
+                number(sums::median(&sums::finite(&all))),
+                count(here.len()),
+                number(sums::median(&here.iter().map(|v| v.1).collect::<Vec<_>>())),
+                number(sums::median(&changes.iter().map(|c| c.1).collect::<Vec<_>>())),
+                number(low),
+                number(high),
+            ]);
+        }
+    }
+    TableBlock { id: "survivors".into(), caption: "All successful missions, and those of every group".into(), numbers }
+}

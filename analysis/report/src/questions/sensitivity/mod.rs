@@ -1,0 +1,274 @@
+//! What changes when a parameter does: every variant of the study beside its plain run.
+
+use super::Question;
+use super::clusters::{Clusters, LEVEL, block, stream};
+use super::missions::METRICS;
+use super::outcome::successful;
+use crate::ReportError;
+use crate::content::{Block, Figure, Numbers, Size, TableBlock, count, number, text};
+use crate::data::{Data, Group};
+use crate::render::axis::Axis;
+use crate::render::chart::{Entry, Mark, RowLabel, Rows};
+use crate::render::number as set;
+use crate::render::svg::{Paint, Stroke, Symbol};
+use sastrugi_numeric::sums;
+use sastrugi_schemas::tables::MissionRow;
+use sastrugi_statistics::Interval;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Registry entry.
+pub const QUESTION: Question =
+    Question { id: "sensitivity", name: "Sensitivity", title: "What do the assumed parameters move?", answer };
+
+/// Variants that are drawn; all are in the table.
+const DRAWN_MAX: usize = 24;
+/// Figures whose medians are compared: the three root mean squares.
+const RMS: usize = 3;
+
+/// A variant in one group.
+struct Effect {
+    variant: String,
+    group: String,
+    index: usize,
+    missions: usize,
+    successes: usize,
+    /// Missions that both runs drove; `None` where they share none and the runs are compared whole.
+    pairs: Option<usize>,
+    /// Change of the share of successes from the plain run, points, and its interval.
+    change: f64,
+    interval: Option<Interval>,
+    /// Medians of [`RMS`] figures and their changes, %.
+    medians: Vec<(f64, f64)>,
+}
+
+impl Effect {
+    /// What rows are sorted by: the largest change in points or per cent.
+    fn size(&self) -> f64 {
+        self.medians.iter().map(|m| m.1.abs()).chain([self.change.abs()]).filter(|v| v.is_finite()).fold(0.0, f64::max)
+    }
+}
+
+fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
+    if !data.missions.iter().any(|m| m.variant.is_none()) {
+        return Ok(Vec::new());
+    }
+    let effects = effects(data);
+    if effects.is_empty() {
+        return Ok(Vec::new());
+    }
+    let introduction = format!(
+        "One parameter is changed at a time; all else is the plain run of the same group. The change of success counts points of \
+         the missions that both runs drove between the same points, and of all missions where there are none; {} % intervals \
+         draw whole blocks of paired terrains (or terrains) anew. Changes of medians are over the successful missions of \
+         either run. The largest changes, in points or per cent, stand first.",
+        set::fixed(100.0 * LEVEL, 0)
+    );
+    Ok(vec![Block::Text(introduction), Block::Figures(vec![figure(&effects)]), Block::Table(table(data, &effects))])
+}
+
+/// Every variant in every group that has a plain run, the largest effect first.
+fn effects(data: &Data) -> Vec<Effect> {
+    let names: BTreeSet<&str> = data.missions.iter().filter_map(|m| m.variant.as_deref()).collect();
+    let plain = data.mission_groups();
+    let mut effects = Vec::new();
+    for name in names {
+        let missions = data.missions.iter().filter(|m| m.variant.as_deref() == Some(name)).collect();
+        for group in data.groups_of(missions) {
+            let reference = plain.iter().find(|g| g.name == group.name);
+            effects.extend(reference.map(|plain| effect(data, name, &group, plain)));
+        }
+    }
+    effects
+        .sort_by(|a, b| b.size().total_cmp(&a.size()).then_with(|| (&a.variant, a.index).cmp(&(&b.variant, b.index))));
+    effects
+}
+
+fn effect(data: &Data, variant: &str, group: &Group<MissionRow>, plain: &Group<MissionRow>) -> Effect {
+    let pairs = pairs(group, plain);
+    let item = format!("{variant} in {}", group.name);
+    let mut stream = stream(data, &item, "success");
+    let (change, interval) = if pairs.is_empty() {
+        let items =
+            |g: &Group<'_, MissionRow>| g.rows.iter().map(|m| (m.terrain_id.clone(), success(m))).collect::<Vec<_>>();
+        let difference = |v: &[Vec<f64>]| sums::mean(&v[1]) - sums::mean(&v[0]);
+        let all = [items(plain), items(group)];
+        let borrowed = all.each_ref().map(|g| g.iter().map(|(t, v)| (t.as_str(), *v)).collect::<Vec<_>>());
+        let values = borrowed.each_ref().map(|g| g.iter().map(|v| v.1).collect());
+        (difference(&values), Clusters::new(&borrowed).interval(&mut stream, LEVEL, difference))
+    } else {
+        let changes: Vec<(&str, f64)> =
+            pairs.iter().map(|(plain, changed)| (block(&plain.pair_id), success(changed) - success(plain))).collect();
+        let all: Vec<f64> = changes.iter().map(|c| c.1).collect();
+        let interval = Clusters::new(&[changes]).interval(&mut stream, LEVEL, |v| sums::mean(&v[0]));
+        (sums::mean(&all), interval)
+    };
+    let medians = METRICS[..RMS].iter().map(|m| {
+        let median = |g: &Group<MissionRow>| {
+            let goals = g.rows.iter().filter(|m| successful(m));
+            sums::median(&sums::finite(&goals.map(|row| (m.of)(row)).collect::<Vec<_>>()))
+        };
+        (median(group), 100.0 * (median(group) / median(plain) - 1.0))
+    });
+    Effect {
+        variant: variant.into(),
+        group: group.name.clone(),
+        index: group.index,
+        missions: group.rows.len(),
+        successes: group.rows.iter().filter(|m| successful(m)).count(),
+        pairs: (!pairs.is_empty()).then_some(pairs.len()),
+        change,
+        interval,
+        medians: medians.collect(),
+    }
+}
+
+/// Success in per cent.
+fn success(mission: &MissionRow) -> f64 {
+    if successful(mission) { 100.0 } else { 0.0 }
+}
+
+/// Missions of the plain run and of the variant with a `pair_id` in common.
+fn pairs<'a>(group: &Group<'a, MissionRow>, plain: &Group<'a, MissionRow>) -> Vec<(&'a MissionRow, &'a MissionRow)> {
+    let by_pair: BTreeMap<&str, &'a MissionRow> = plain.rows.iter().map(|m| (m.pair_id.as_str(), *m)).collect();
+    group.rows.iter().filter_map(|m| Some((*by_pair.get(m.pair_id.as_str())?, *m))).collect()
+}
+
+/// Changes of success with their intervals: a row for each variant, a mark for each group.
+fn figure(effects: &[Effect]) -> Figure {
+    let mut variants: Vec<&str> = Vec::new();
+    effects.iter().for_each(|e| {
+        if !variants.contains(&e.variant.as_str()) {
+            variants.push(&e.variant)
+        }
+    });
+    let left_out = variants.len().saturating_sub(DRAWN_MAX);
+    variants.truncate(DRAWN_MAX);
+    let groups: BTreeMap<usize, &str> = effects.iter().map(|e| (e.index, e.group.as_str())).collect();
+    let drawn = || effects.iter().filter(|e| variants.contains(&e.variant.as_str()));
+    let ends = drawn().flat_map(|e| e.interval.map_or([e.change; 2], |i| [i.low, i.high])).filter(|v| v.is_finite());
+    let (low, high) = ends.fold((-1.0, 1.0), |(a, b): (f64, f64), v| (a.min(v), b.max(v)));
+    let margin = 0.05 * (high - low);
+    let axis = Axis::linear(low - margin, high + margin);
+    let labels: Vec<RowLabel> = variants.iter().map(|v| label(v)).collect();
+    let entry =
+        |(index, name): (&usize, &&str)| (Mark::Symbol(symbol(*index), Paint::Series(*index)), format!("group {name}"));
+    let legend: Vec<Entry> = groups.iter().map(entry).collect();
+    let height = 26.0 + 9.0 * groups.len() as f64;
+    let mut rows = Rows::new(&labels, height, (axis, "change of success, points"), &legend);
+    rows.vertical(0.0, variants.len());
+    for effect in drawn() {
+        let place = groups.keys().position(|g| *g == effect.index).unwrap_or(0) as f64;
+        let row = variants.iter().position(|v| *v == effect.variant).unwrap_or(0);
+        draw(&mut rows, row, 9.0 * (place - 0.5 * (groups.len() - 1) as f64), effect);
+    }
+    let more = if left_out > 0 {
+        format!(" {left_out} variants of smaller effect are in the table only.")
+    } else {
+        String::new()
+    };
+    Figure {
+        id: "sensitivity-of-success".into(),
+        title: "Change of success.".into(),
+        caption: format!("Marks are changes from the plain run, lines their 95 % intervals.{more}"),
+        description: describe(effects),
+        svg: rows.svg,
+        size: Size::Column,
+        numbers: numbers(effects),
+    }
+}
+
+/// A variant as two lines: the parameter without the table it stands in, and its value.
+fn label(variant: &str) -> RowLabel {
+    let (path, value) = variant.split_once(" = ").unwrap_or((variant, ""));
+    let name = path.rsplit('.').next().unwrap_or(path);
+    RowLabel { name: name.replace('_', " "), detail: value.to_owned() }
+}
+
+fn symbol(index: usize) -> Symbol {
+    [Symbol::Disc, Symbol::Square, Symbol::Triangle, Symbol::Diamond][index % 4]
+}
+
+fn draw(rows: &mut Rows, row: usize, shift: f64, effect: &Effect) {
+    let y = rows.centre(row) + shift;
+    let ends = effect.interval.and_then(|i| Some((rows.x.clamped(i.low)?, rows.x.clamped(i.high)?)));
+    if let Some((from, to)) = ends {
+        rows.svg.segment((from, y), (to, y), Stroke::new(Paint::Series(effect.index), 1.8));
+    }
+    if let Some(x) = rows.x.at(effect.change) {
+        rows.svg.symbol(symbol(effect.index), (x, y), 3.4, Paint::Series(effect.index));
+    }
+}
+
+fn describe(effects: &[Effect]) -> String {
+    let part = |e: &Effect| format!("{} in group {}: {} points", e.variant, e.group, set::fixed(e.change, 1));
+    let parts: Vec<String> = effects.iter().take(6).map(part).collect();
+    format!(
+        "Changes of the share of successful missions from the plain run. The largest effects: {}.",
+        parts.join("; ")
+    )
+}
+
+fn numbers(effects: &[Effect]) -> Numbers {
+    let columns = [("variant", ""), ("group", ""), ("change", "points"), ("low", "points"), ("high", "points")];
+    let mut numbers = Numbers::new("tables/missions by variant and group", &columns);
+    for e in effects {
+        numbers.row([
+            text(&e.variant),
+            text(&e.group),
+            number(e.change),
+            number(e.interval.map_or(f64::NAN, |i| i.low)),
+            number(e.interval.map_or(f64::NAN, |i| i.high)),
+        ]);
+    }
+    numbers
+}
+
+fn table(data: &Data, effects: &[Effect]) -> TableBlock {
+    let columns = [
+        ("variant", ""),
+        ("group", ""),
+        ("successes", "1"),
+        ("missions", "1"),
+        ("pairs", "1"),
+        ("change of success", "points"),
+        ("low", "points"),
+        ("high", "points"),
+        ("acceleration", "m/s2"),
+        ("its change", "%"),
+        ("pitch rate", "deg/s"),
+        ("its change", "%"),
+        ("roll rate", "deg/s"),
+        ("its change", "%"),
+    ];
+    let mut numbers = Numbers::new("tables/missions by variant and group; medians where outcome = 'success'", &columns);
+    for e in effects {
+        let head = [
+            text(&e.variant),
+            text(&e.group),
+            count(e.successes),
+            count(e.missions),
+            e.pairs.map_or(sastrugi_schemas::Cell::Null, count),
+            number(e.change),
+            number(e.interval.map_or(f64::NAN, |i| i.low)),
+            number(e.interval.map_or(f64::NAN, |i| i.high)),
+        ];
+        numbers.row(head.into_iter().chain(e.medians.iter().flat_map(|m| [number(m.0), number(m.1)])));
+    }
+    for group in data.mission_groups() {
+        numbers.rows.push(plain(&group));
+    }
+    TableBlock { id: "sensitivity".into(), caption: "Variants beside the plain run (last)".into(), numbers }
+}
+
+/// The row of a group's plain run.
+fn plain(group: &Group<MissionRow>) -> Vec<sastrugi_schemas::Cell> {
+    let none = || number(f64::NAN);
+    let goals: Vec<&&MissionRow> = group.rows.iter().filter(|m| successful(m)).collect();
+    let head =
+        [text("none"), text(&group.name), count(goals.len()), count(group.rows.len()), none(), none(), none(), none()];
+    let median = |k: usize| {
+        let values: Vec<f64> = goals.iter().map(|m| (METRICS[k].of)(m)).collect();
+        [number(sums::median(&sums::finite(&values))), none()]
+    };
+    head.into_iter().chain((0..RMS).flat_map(median)).collect()
+}
