@@ -1,23 +1,42 @@
 //! The Husky over the published terrains (1009^2 cells of 5 cm), on one core, beside the floor: the height lookups of its
 //! wheel rays alone.
 //!
-//! Items are time steps of 1/500 s, settling included: the real-time factor is items per second over 500. Target: 500 000
-//! steps per second and core. Run: `cargo bench -p sastrugi-benches --bench traverse`.
+//! Items are time steps of 1/500 s, settling included: the real-time factor is items per second over 500. Targets: 500 000
+//! steps per second and core; 40 times the real-time factor of MuJoCo, which drives the same missions on the same terrains in
+//! the same run (`floors/traverse.py`, printed before the table with ours; its processor time is set against our elapsed
+//! time, the fastest of three, so other work on the machine only lowers the ratio). It needs the environment that
+//! `./test --full` or `tests/readers/set_up peer` makes. Run: `cargo bench -p sastrugi-benches --bench traverse`.
 
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
+use sastrugi_benches::floor_in;
 use sastrugi_mobility::missions::{Mission, MissionParameters, MissionSettings, draw_missions};
 use sastrugi_mobility::vehicle::{Ground, TraverseParameters, TraverseSettings, Vehicle, drive};
 use sastrugi_numeric::{Grid, Streams, Surface};
 use sastrugi_roughness::{ClassThresholds, classify, close_disk, moore_gradient};
 use serde_json::json;
+use std::time::Instant;
 
 /// Missions of one terrain in a sample.
 const MISSIONS: u32 = 5;
 /// Rays of four wheels: three discs of thirteen.
 const RAYS: usize = 4 * 3 * 13;
 
+/// Fractal dimensions of the published terrains.
+const DIMENSIONS: [f64; 3] = [2.3, 2.45, 2.6];
+
 fn main() {
+    for dimension in DIMENSIONS {
+        let course = Course::new(dimension);
+        let ours = course.real_time_factor();
+        match course.peer().as_deref() {
+            Some(&[theirs, steps]) => println!(
+                "D = {dimension}: {ours:.0} times real time; MuJoCo {theirs:.1} ({steps:.0} steps/s); ratio {:.0}",
+                ours / theirs
+            ),
+            _ => println!("D = {dimension}: {ours:.0} times real time; no Python with MuJoCo"),
+        }
+    }
     divan::main();
 }
 
@@ -42,6 +61,39 @@ impl Course {
         Self { vehicle, settings, dem, missions }
     }
 
+    /// Simulated over elapsed seconds, the faster of three runs.
+    fn real_time_factor(&self) -> f64 {
+        let ground = Ground::new(&self.dem, &self.vehicle).expect("cells finer than the vehicle");
+        let run = || {
+            let start = Instant::now();
+            let steps = self.steps(&ground);
+            steps as f64 / f64::from(self.settings.parameters().step_rate_hz) / start.elapsed().as_secs_f64()
+        };
+        (0..3).map(|_| run()).fold(0.0, f64::max)
+    }
+
+    /// MuJoCo's real-time factor and steps per second on the same missions.
+    fn peer(&self) -> Option<Vec<f64>> {
+        let folder = tempfile::tempdir().ok()?;
+        let [heights, given] = ["heights", "given.json"].map(|name| folder.path().join(name));
+        std::fs::write(&heights, self.dem.values.iter().flat_map(|z| z.to_le_bytes()).collect::<Vec<u8>>()).ok()?;
+        let row = |mission: &Mission| {
+            json!({
+                "start_x_m": mission.start_m[0], "start_y_m": mission.start_m[1],
+                "goal_x_m": mission.goal_m[0], "goal_y_m": mission.goal_m[1],
+                "heading_deg": mission.heading_rad.to_degrees(),
+            })
+        };
+        let geometry = self.dem.geometry;
+        let text = json!({
+            "rows": geometry.rows, "cols": geometry.cols, "cell_m": geometry.cell[0], "x0_m": geometry.x(0), "y0_m": geometry.y(geometry.rows - 1),
+            "rules": self.settings.parameters(), "vehicle": self.vehicle.parameters(),
+            "missions": self.missions.iter().map(row).collect::<Vec<_>>(),
+        });
+        std::fs::write(&given, text.to_string()).ok()?;
+        floor_in("peer", "traverse.py", &[heights.to_str()?, given.to_str()?])
+    }
+
     /// Time steps of all missions.
     fn steps(&self, ground: &Ground) -> usize {
         let parameters = self.settings.parameters();
@@ -55,7 +107,7 @@ impl Course {
     }
 }
 
-#[divan::bench(sample_count = 10, args = [2.3, 2.45, 2.6])]
+#[divan::bench(sample_count = 10, args = DIMENSIONS)]
 fn husky_steps(bencher: Bencher, fractal_dimension: f64) {
     let course = Course::new(fractal_dimension);
     let ground = Ground::new(&course.dem, &course.vehicle).expect("cells finer than the vehicle");

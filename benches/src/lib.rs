@@ -3,14 +3,21 @@
 use std::path::Path;
 use std::process::Command;
 
-/// Seconds that a script of `floors/` prints, measured in a process of its own with one thread; `None` where Python lacks
+/// Figures that a script of `floors/` prints, measured in a process of its own with one thread; `None` where Python lacks
 /// what it needs. The checkout's own Python is used where `./test` has made one.
 pub fn floor(script: &str, arguments: &[&str]) -> Option<Vec<f64>> {
+    floor_in("readers", script, arguments)
+}
+
+/// As [`floor`], with the Python of another environment of `.cache`.
+pub fn floor_in(environment: &str, script: &str, arguments: &[&str]) -> Option<Vec<f64>> {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let own = here.join("../.cache/readers/bin/python");
+    let own = here.join("../.cache").join(environment).join("bin/python");
     let python = if own.exists() { own.as_path() } else { Path::new("python3") };
     let script = here.join("floors").join(script);
-    let run = Command::new(python).arg(script).args(arguments).env("OMP_NUM_THREADS", "1").output().ok()?;
+    let mut command = Command::new(python);
+    command.arg(script).args(arguments).env("OMP_NUM_THREADS", "1").env("PYTHONDONTWRITEBYTECODE", "1");
+    let run = command.output().ok()?;
     let words = String::from_utf8(run.stdout).ok().filter(|_| run.status.success())?;
     words.split_whitespace().map(|w| w.parse().ok()).collect()
 }
