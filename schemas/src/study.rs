@@ -296,6 +296,13 @@ pub struct TraverseItem {
     pub id: String,
     /// Id of the missions to drive.
     pub missions: String,
+    /// Id of a raster (a DEM or terrain) of friction coefficients between tyre and ground, in the terrain's coordinates; where
+    /// it holds no data the surface's own counts.
+    #[serde(default)]
+    pub wheel_friction_raster: Option<String>,
+    /// As `wheel_friction_raster`, of rolling resistance over normal force.
+    #[serde(default)]
+    pub rolling_resistance_raster: Option<String>,
     /// One run per value of a parameter: `sweep.<parameter> = [...]`.
     #[serde(default)]
     pub sweep: BTreeMap<String, Vec<serde_json::Value>>,

@@ -46,6 +46,14 @@ impl Geometry {
         [self.cols as f64 * self.cell[0], self.rows as f64 * self.cell[1]]
     }
 
+    /// True when the two grids have ground in common.
+    pub fn overlaps(&self, other: &Self) -> bool {
+        let (size, others) = (self.size(), other.size());
+        (0..2).all(|axis| {
+            self.origin[axis] < other.origin[axis] + others[axis] && other.origin[axis] < self.origin[axis] + size[axis]
+        })
+    }
+
     /// The cell that contains the point, or `None` outside of the grid (or for a point that is not finite).
     pub fn cell_at(&self, x: f64, y: f64) -> Option<(usize, usize)> {
         let col = (x - self.origin[0]) / self.cell[0];
@@ -161,6 +169,14 @@ impl Grid<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn val_grids_overlap_where_they_share_ground() {
+        let a = Geometry::square(10, 20, 0.5);
+        let at = |origin: [f64; 2]| Geometry { origin, ..Geometry::square(4, 4, 1.0) };
+        assert!(a.overlaps(&at([9.5, 4.5])) && at([-3.5, -3.5]).overlaps(&a) && a.overlaps(&a));
+        assert!(!a.overlaps(&at([10.0, 0.0])) && !a.overlaps(&at([0.0, -4.0])));
+    }
 
     #[test]
     fn val_cell_centres_follow_the_convention() {

@@ -203,6 +203,13 @@ pub struct SurfaceLayers {
     pub rolling_resistance: Option<Grid>,
 }
 
+impl SurfaceLayers {
+    /// True when the surface is the same everywhere.
+    pub fn is_empty(&self) -> bool {
+        self.classes.is_none() && self.wheel_friction.is_none() && self.rolling_resistance.is_none()
+    }
+}
+
 /// A raster that is no surface.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("take {value} at ({x_m:.2}, {y_m:.2}) m for {what}: it must be 0 or above, or no data")]

@@ -11,7 +11,9 @@ use crate::study::{Entry, StudyError, keys};
 use rayon::prelude::*;
 use sastrugi_mobility::metrics::{Differentiator, MissionLabels, mission_row, replicate_row, sample_rows};
 use sastrugi_mobility::missions::{Difficulty, Mission, ReplicateParameters, ReplicateSettings};
-use sastrugi_mobility::vehicle::{Ground, TraverseError, TraverseParameters, TraverseSettings, Vehicle, drive};
+use sastrugi_mobility::vehicle::{
+    Ground, SurfaceLayers, SurfaceMap, TraverseError, TraverseParameters, TraverseSettings, Vehicle, drive,
+};
 use sastrugi_numeric::{Grid, Streams};
 use sastrugi_schemas::kind::{read_parameters, schema_of};
 use sastrugi_schemas::study::{StudyHead, TraverseItem};
@@ -68,6 +70,8 @@ struct Drive {
     vehicle: Vehicle,
     settings: TraverseSettings,
     starts: ReplicateSettings,
+    /// Rasters of wheel friction and rolling resistance.
+    rasters: [Option<ItemRef>; 2],
     head: StudyHead,
     /// Missions on each terrain.
     count: usize,
@@ -103,6 +107,10 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
         let Some(drawn) = builder.missions.get(&envelope.missions).cloned() else {
             return Err(unknown_id(&entry, "missions", &envelope.missions, builder.missions.keys()).into());
         };
+        let rasters = [
+            raster(builder, &entry, "wheel_friction_raster", envelope.wheel_friction_raster.as_deref())?,
+            raster(builder, &entry, "rolling_resistance_raster", envelope.rolling_resistance_raster.as_deref())?,
+        ];
         for one in entry.expand(&envelope.id, None, &envelope.sweep, &params)? {
             entry.check_keys::<TraverseItem>(&one.params, &schema())?;
             builder.claim(&entry, STAGE, &one.id)?;
@@ -115,6 +123,7 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
                 vehicle,
                 settings,
                 starts,
+                rasters: rasters.clone(),
                 head: builder.study.head.clone(),
                 count: drawn.count,
                 seconds_each: drawn.length_m / raw.speed_m_s,
@@ -123,6 +132,18 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
         }
     }
     Ok(())
+}
+
+/// The item that makes a raster of the surface.
+fn raster(
+    builder: &Builder<'_>,
+    entry: &Entry<'_>,
+    key: &str,
+    id: Option<&str>,
+) -> Result<Option<ItemRef>, StudyError> {
+    let Some(id) = id else { return Ok(None) };
+    let field = builder.heightfields.get(id);
+    field.map(|f| Some(f.item.clone())).ok_or_else(|| unknown_id(entry, key, id, builder.heightfields.keys()))
 }
 
 /// Adds the run over one terrain.
@@ -138,7 +159,8 @@ fn add_one(
     // Named by the table, not by the swept part, so that every value of a sweep has the same starts.
     let streams = builder.streams(STAGE, &format!("{traverse}@{}", lines.word), None, 0);
     let stream = (drive.starts.count() > 1).then(|| streams.label());
-    let parents = vec![field.item.clone(), roughness::item(&terrain), lines.item.clone()];
+    let own = [field.item.clone(), roughness::item(&terrain), lines.item.clone()];
+    let parents = own.into_iter().chain(drive.rasters.iter().flatten().cloned()).collect();
     let item = ItemRef::new(STAGE, &format!("{}@{terrain}", drive.id));
     let job = TraverseJob {
         drive: drive.clone(),
@@ -180,8 +202,32 @@ impl TraverseJob {
         let classes = dem::read_classes(&path).map_err(|e| input_error(&e))?;
         let ground =
             Ground::new(&heights.grid, &self.drive.vehicle).map_err(|e| JobError::input(format!("cannot {e}")))?;
+        let ground = self.with_surface(ground, work, &heights.grid, &classes)?;
         let heights_sha256 = digest::heights(&heights.grid);
         Ok(Site { ground, heights: heights.grid, heights_sha256, classes })
+    }
+
+    /// The ground with its surface, where that changes from place to place.
+    fn with_surface(
+        &self,
+        ground: Ground,
+        work: &Work<'_>,
+        heights: &Grid,
+        classes: &Grid<u8>,
+    ) -> Result<Ground, JobError> {
+        let parameters = &self.drive.settings.parameters().surface;
+        let [wheel_friction, rolling_resistance] =
+            [0, 1].map(|i| self.drive.rasters[i].as_ref().map(|item| read_raster(work, item, heights)).transpose());
+        let layers = SurfaceLayers {
+            classes: parameters.differs_by_class().then(|| classes.clone()),
+            wheel_friction: wheel_friction?,
+            rolling_resistance: rolling_resistance?,
+        };
+        if layers.is_empty() {
+            return Ok(ground);
+        }
+        let surface = SurfaceMap::new(parameters, layers).map_err(|e| JobError::input(format!("cannot {e}")))?;
+        Ok(ground.with_surface(surface))
     }
 
     /// Drives a mission from all its starts; the first is recorded.
@@ -298,6 +344,20 @@ impl TraverseJob {
     }
 }
 
+/// A raster of the surface, which must share ground with the terrain.
+fn read_raster(work: &Work<'_>, item: &ItemRef, terrain: &Grid) -> Result<Grid, JobError> {
+    let raster = dem::read(&work.parent(item, HEIGHTS)?).map_err(|e| input_error(&e))?.grid;
+    if terrain.geometry.overlaps(&raster.geometry) {
+        return Ok(raster);
+    }
+    let ([x, y], [tx, ty]) = (raster.geometry.origin, terrain.geometry.origin);
+    Err(JobError::input(format!(
+        "the raster {} begins at ({x:.2}, {y:.2}) m and shares no ground with the terrain, which begins at ({tx:.2}, {ty:.2}) \
+         m; it must lie in the terrain's coordinates",
+        item.id
+    )))
+}
+
 impl Job for TraverseJob {
     fn recipe(&self) -> Value {
         let head = &self.drive.head;
@@ -305,6 +365,7 @@ impl Job for TraverseJob {
             "traverse": self.drive.settings.parameters(),
             "vehicle": self.drive.vehicle.parameters(),
             "starts": self.drive.starts,
+            "rasters": self.drive.rasters,
             "terrain": self.terrain,
             "group": self.group,
             "variant": self.variant,
