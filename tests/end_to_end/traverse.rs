@@ -306,7 +306,7 @@ fn val_a_gap_ends_a_mission() {
         let expected = if crosses(row) { "out_of_bounds" } else { "success" };
         let [start, goal] = ["start_x_m", "goal_x_m"].map(|column| row[column].as_f64().unwrap());
         // The vehicle is a metre long: it touches the gap before its centre comes there.
-        let clear = |x: f64| x < 3.6 || x > 6.0;
+        let clear = |x: f64| !(3.6..=6.0).contains(&x);
         assert!(text(row, "outcome") == expected || !(clear(start) && clear(goal)), "{row:?}");
     }
     assert!(missions.iter().any(crosses) && !missions.iter().all(crosses));

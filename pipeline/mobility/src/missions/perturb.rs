@@ -112,11 +112,11 @@ mod tests {
         Mission { draws: 3, ..Mission::between(4, [20.0, 30.0], [55.0, 30.0]) }
     }
 
-    /// Offset from the drawn start, m, and from the drawn heading, rad in (-pi, pi).
-    fn offset(start: &Mission) -> ([f64; 2], f64) {
+    /// East and north of the drawn start, m, and left of the drawn heading, rad in (-pi, pi).
+    fn offset(start: &Mission) -> [f64; 3] {
         let turn = start.heading_rad - mission().heading_rad;
         let turn = if turn > 0.5 * TAU { turn - TAU } else { turn };
-        ([0, 1].map(|axis| start.start_m[axis] - mission().start_m[axis]), turn)
+        [start.start_m[0] - mission().start_m[0], start.start_m[1] - mission().start_m[1], turn]
     }
 
     #[test]
@@ -151,17 +151,17 @@ mod tests {
             let (settings, streams) = (&settings, &streams);
             (1..1000).map(move |k| settings.start(&Mission { index, ..mission() }, k, streams))
         });
-        let offsets: Vec<([f64; 2], f64)> = starts.map(|start| offset(&start)).collect();
+        let offsets: Vec<[f64; 3]> = starts.map(|start| offset(&start)).collect();
         let n = offsets.len() as f64;
         let (r, t) = (0.3, 10.0_f64.to_radians());
-        let mean = |f: &dyn Fn(&([f64; 2], f64)) -> f64| offsets.iter().map(f).sum::<f64>() / n;
+        let mean = |f: &dyn Fn(&[f64; 3]) -> f64| offsets.iter().map(f).sum::<f64>() / n;
         let five_se = |variance: f64| 5.0 * (variance / n).sqrt();
-        let squared = |o: &([f64; 2], f64)| o.0[0] * o.0[0] + o.0[1] * o.0[1];
-        assert!(offsets.iter().all(|o| squared(o) <= r * r * (1.0 + 1e-12) && o.1.abs() <= t * (1.0 + 1e-12)));
-        assert!(mean(&|o| o.0[0]).abs() < five_se(r * r / 4.0));
-        assert!(mean(&|o| o.0[1]).abs() < five_se(r * r / 4.0));
+        let squared = |o: &[f64; 3]| o[0] * o[0] + o[1] * o[1];
+        assert!(offsets.iter().all(|o| squared(o) <= r * r * (1.0 + 1e-12) && o[2].abs() <= t * (1.0 + 1e-12)));
+        assert!(mean(&|o| o[0]).abs() < five_se(r * r / 4.0));
+        assert!(mean(&|o| o[1]).abs() < five_se(r * r / 4.0));
         assert!((mean(&squared) - 0.5 * r * r).abs() < five_se(r * r * r * r / 12.0));
-        assert!(mean(&|o| o.1).abs() < five_se(t * t / 3.0));
+        assert!(mean(&|o| o[2]).abs() < five_se(t * t / 3.0));
     }
 
     #[test]
