@@ -288,6 +288,46 @@ fn val_traverse_says_why_it_refuses() {
     }
 }
 
+/// A belt of ice across a slope of 8 deg, as a raster of friction: no mission up across it arrives, all do without it. A raster
+/// elsewhere and a value below 0 are refused.
+#[test]
+fn val_a_raster_of_friction_stops_the_vehicle() {
+    let folder = area();
+    write(folder.path(), "slope.asc", &ascii(0.1, |_, col| 0.014 * f64::from(col)));
+    let belt = |ice: f64| move |_: u32, col: u32| if (40..60).contains(&col) { ice } else { -9999.0 };
+    write(folder.path(), "ice.asc", &ascii(0.1, belt(0.05)));
+    write(folder.path(), "bad.asc", &ascii(0.1, belt(-0.05)));
+    write(folder.path(), "far.asc", &ascii(0.1, belt(0.05)).replace("xllcorner 0", "xllcorner 1000"));
+    let study = |raster: &str| {
+        format!(
+            "[study]\nname = \"ice\"\nseed = 1\ndate = \"2026-01-01\"\n\
+             [[dem]]\nid = \"slope\"\nfile = \"slope.asc\"\n[[dem]]\nid = \"{raster}\"\nfile = \"{raster}.asc\"\n\
+             [[missions]]\nid = \"m\"\nterrains = [\"slope\"]\ncount = 20\nlength_m = 5.0\nborder_m = 1.0\n\
+             [[traverse]]\nid = \"dry\"\nmissions = \"m\"\ntimeout_s = 60\n\
+             [[traverse]]\nid = \"icy\"\nmissions = \"m\"\ntimeout_s = 60\nwheel_friction_raster = \"{raster}\"\n"
+        )
+    };
+    write(folder.path(), "study.toml", &study("ice"));
+    let call = sastrugi_in(folder.path(), &["run", "study.toml", "-o", "icy", "--quiet"]);
+    assert_eq!(call.code, 0, "{}", call.stderr);
+    let uphill = |row: &&Row| {
+        let (from, to) = (row["start_x_m"].as_f64().unwrap(), row["goal_x_m"].as_f64().unwrap());
+        from < 3.8 && to > 6.2
+    };
+    let missions = rows(&folder.path().join("icy"), "missions");
+    let arrived = |run: &str| {
+        let of_run: Vec<&Row> = missions.iter().filter(|row| text(row, "traverse_id") == run).filter(uphill).collect();
+        (of_run.iter().filter(|row| text(row, "outcome") == "success").count(), of_run.len())
+    };
+    let ((dry, across), (icy, same)) = (arrived("dry"), arrived("icy"));
+    assert!(across >= 2 && dry == across && same == across && icy == 0, "{dry} {icy} of {across}");
+    for (raster, words) in [("far", "shares no ground with the terrain"), ("bad", "must be 0 or above")] {
+        write(folder.path(), "study.toml", &study(raster));
+        let call = sastrugi_in(folder.path(), &["run", "study.toml", "-o", raster, "--quiet"]);
+        assert!(call.code == 3 && call.stderr.contains(words), "{} {}", call.code, call.stderr);
+    }
+}
+
 /// A mission across cells without data ends there; the others arrive.
 #[test]
 fn val_a_gap_ends_a_mission() {

@@ -171,6 +171,44 @@ fn prop_unknown_figures_are_absent_not_nan() {
     assert_sound(&report(&data).0);
 }
 
+/// Rows of a file of numbers.
+fn rows(files: &BTreeMap<String, String>, name: &str) -> Vec<Vec<serde_json::Value>> {
+    let json: serde_json::Value = serde_json::from_str(&files[&format!("data/{name}.json")]).unwrap();
+    serde_json::from_value(json["rows"].clone()).unwrap()
+}
+
+#[test]
+fn val_variants_stay_out_of_plain_comparisons() {
+    let with = report(&made_up::full(3, 24)).0;
+    let mut data = made_up::full(3, 24);
+    data.missions.retain(|m| m.variant.is_none());
+    data.terrains.retain(|t| t.variant.is_none());
+    let without = report(&data).0;
+    for name in ["outcomes", "mission-medians", "class-shares", "survivors", "incidence-2.30", "published"] {
+        assert_eq!(rows(&with, name), rows(&without, name), "{name}");
+    }
+    assert!(with.contains_key("data/sensitivity.json") && !without.contains_key("data/sensitivity.json"));
+    // 24 missions of the first group: 21 succeed in the plain run, none on steeper terrain.
+    let first = &rows(&with, "sensitivity")[0];
+    assert_eq!((first[0].as_str(), first[2].as_i64()), (Some("z_scale_percent = 1.0"), Some(0)));
+    assert_eq!(first[5].as_f64(), Some(-87.5));
+}
+
+/// Figures by group and changes of the paper, each with a verdict that its own row bears out.
+#[test]
+fn val_every_published_figure_has_a_verdict() {
+    let rows = rows(&report(&made_up::full(3, 24)).0, "published");
+    assert_eq!(rows.len(), 6 * 3 + 12 * 2);
+    for row in rows {
+        let [paper, low, high] = [3, 5, 6].map(|k| row[k].as_f64().unwrap());
+        match row[7].as_str() {
+            Some("inside") => assert!(paper >= low - 0.5 && paper <= high + 0.5, "{row:?}"),
+            Some("outside") => assert!(paper < low || paper > high, "{row:?}"),
+            other => panic!("{other:?}"),
+        }
+    }
+}
+
 /// Not a check: leaves a page to look at (its place is printed).
 #[test]
 #[ignore = "writes a page to look at"]

@@ -53,7 +53,7 @@ fn table(data: &Data, groups: &[Group<MissionRow>], pairs: &[(&str, Vec<&Mission
         ("group", ""),
         ("successful", ""),
         ("median", ""),
-        ("of these in all groups", ""),
+        ("in all groups", ""),
         ("their median", ""),
         ("change", ""),
         ("low", ""),

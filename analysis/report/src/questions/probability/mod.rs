@@ -12,7 +12,7 @@ use crate::render::number as set;
 use crate::render::svg::{Anchor, Paint, text_width};
 use sastrugi_schemas::tables::MissionRow;
 use sastrugi_statistics::{Components, Interval, bootstrap, components};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Registry entry.
 pub const QUESTION: Question =
@@ -52,7 +52,7 @@ struct Split<'a> {
 }
 
 fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
-    let groups: Vec<Split> = data.mission_groups().iter().filter_map(|g| split(data, g)).collect();
+    let groups = groups(data);
     if groups.is_empty() {
         return Ok(Vec::new());
     }
@@ -73,7 +73,7 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
 const WORDS: &str = "The variance of an outcome (success 1, failure 0) split into terrains, missions on a terrain, and starts of \
 a mission, by the estimators of the nested analysis of variance for unbalanced data (Searle, Casella and McCulloch, Variance \
 Components, 1992): sums of squares between terrains, between missions, and within missions are set equal to their expectations. \
-The part of the starts is the mean of p (1 - p) over missions with success probability p: what a better description of \
+The part of the starts is the mean of p (1 − p) over missions with success probability p: what a better description of \
 terrain and line could never foresee. Estimates can come out below zero where there is little; they are shown as zero and named \
 in the table.";
 
@@ -91,6 +91,17 @@ fn introduction(groups: &[Split]) -> String {
         set::count(undecided),
         set::fixed(100.0 * LEVEL, 0)
     )
+}
+
+/// Missions with several starts by group: those of the plain run, or of the first variant that has any.
+fn groups(data: &Data) -> Vec<Split<'_>> {
+    let variants: BTreeSet<&str> = data.missions.iter().filter_map(|m| m.variant.as_deref()).collect();
+    let of = |variant: &str| {
+        data.groups_of(data.missions.iter().filter(|m| m.variant.as_deref() == Some(variant)).collect())
+    };
+    let runs = std::iter::once(data.mission_groups()).chain(variants.into_iter().map(of));
+    let mut splits = runs.map(|groups| groups.iter().filter_map(|g| split(data, g)).collect::<Vec<_>>());
+    splits.find(|run| !run.is_empty()).unwrap_or_default()
 }
 
 /// Missions of a group with more than one start; `None` where there is none.

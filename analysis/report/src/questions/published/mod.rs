@@ -26,13 +26,18 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     let Some(paper) = papers::applicable(data) else { return Ok(Vec::new()) };
     let pairing = Pairing::of(data);
     let rows = rows(data, &paper, &pairing);
+    let paired = if pairing.is_common() {
+        " Our groups share their random draws, so our changes scatter less than those of groups drawn apart."
+    } else {
+        ""
+    };
     let introduction = format!(
         "Every figure that {} ({}) print for their groups, beside ours for groups of the same fractal dimension, whether they \
          agree or not; nothing was tuned to them. The band holds 5 to 95 % of what our own study gives when whole {} are \
          drawn anew; a printed figure is inside when it, give or take its rounding, lies in the band. The paper's figures \
-         scatter too, about as much as ours, so one just outside is no contradiction; and changes from one group to the \
-         next share the group in between, so they are not independent. The paper prints changes of medians, absolute and \
-         relative; its medians follow from these.",
+         scatter too, so one just outside is no contradiction; and changes from one group to the next share the group in \
+         between, so they are not independent.{paired} The paper prints changes of medians, absolute and relative; its medians \
+         follow from both.",
         paper.authors,
         paper.title,
         in_words(&pairing)
@@ -213,12 +218,12 @@ fn table(paper: &Paper, rows: &[Row]) -> TableBlock {
     let columns = [
         ("figure", ""),
         ("unit", ""),
-        ("group or change", ""),
+        ("group", ""),
         ("paper", ""),
         ("ours", ""),
         ("band, 5 %", ""),
         ("band, 95 %", ""),
-        ("paper's figure is", ""),
+        ("paper is", ""),
         ("printed in", ""),
     ];
     let query = "tables/missions and tables/terrains, plain run; bands over clusters of terrains";

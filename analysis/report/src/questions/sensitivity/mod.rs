@@ -25,6 +25,11 @@ const DRAWN_MAX: usize = 24;
 /// Figures whose medians are compared: the three root mean squares.
 const RMS: usize = 3;
 
+/// Variants that drive the plain run again, from more starts.
+const MORE_STARTS: &str = "replicates = ";
+/// Words at the end of a parameter's name that are its unit.
+const UNITS: [&str; 9] = ["n", "m", "s", "px", "rad", "percent", "deg", "hz", "kg"];
+
 /// A variant in one group.
 struct Effect {
     variant: String,
@@ -42,7 +47,7 @@ struct Effect {
 }
 
 impl Effect {
-    /// What rows are sorted by: the largest change in points or per cent.
+    /// What variants are sorted by: the largest change in points or per cent.
     fn size(&self) -> f64 {
         self.medians.iter().map(|m| m.1.abs()).chain([self.change.abs()]).filter(|v| v.is_finite()).fold(0.0, f64::max)
     }
@@ -66,9 +71,10 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     Ok(vec![Block::Text(introduction), Block::Figures(vec![figure(&effects)]), Block::Table(table(data, &effects))])
 }
 
-/// Every variant in every group that has a plain run, the largest effect first.
+/// Every variant in every group that has a plain run, the variant of the largest effect first.
 fn effects(data: &Data) -> Vec<Effect> {
-    let names: BTreeSet<&str> = data.missions.iter().filter_map(|m| m.variant.as_deref()).collect();
+    let differs = |v: &&str| !v.starts_with(MORE_STARTS);
+    let names: BTreeSet<&str> = data.missions.iter().filter_map(|m| m.variant.as_deref()).filter(differs).collect();
     let plain = data.mission_groups();
     let mut effects = Vec::new();
     for name in names {
@@ -78,8 +84,15 @@ fn effects(data: &Data) -> Vec<Effect> {
             effects.extend(reference.map(|plain| effect(data, name, &group, plain)));
         }
     }
-    effects
-        .sort_by(|a, b| b.size().total_cmp(&a.size()).then_with(|| (&a.variant, a.index).cmp(&(&b.variant, b.index))));
+    let mut largest: BTreeMap<String, f64> = BTreeMap::new();
+    for e in &effects {
+        let size = largest.entry(e.variant.clone()).or_default();
+        *size = size.max(e.size());
+    }
+    effects.sort_by(|a, b| {
+        let (first, second) = (largest[&a.variant], largest[&b.variant]);
+        second.total_cmp(&first).then_with(|| (&a.variant, a.index).cmp(&(&b.variant, b.index)))
+    });
     effects
 }
 
@@ -177,11 +190,17 @@ fn figure(effects: &[Effect]) -> Figure {
     }
 }
 
-/// A variant as two lines: the parameter without the table it stands in, and its value.
+/// A variant as two lines: the parameter without its unit, and the table it stands in with its value.
 fn label(variant: &str) -> RowLabel {
     let (path, value) = variant.split_once(" = ").unwrap_or((variant, ""));
-    let name = path.rsplit('.').next().unwrap_or(path);
-    RowLabel { name: name.replace('_', " "), detail: value.to_owned() }
+    let mut parts = path.rsplit('.');
+    let mut words: Vec<&str> = parts.next().unwrap_or(path).split('_').collect();
+    while words.len() > 1 && words.last().is_some_and(|w| UNITS.contains(w)) {
+        words.pop();
+    }
+    let value = value.parse().map_or_else(|_| value.to_owned(), |v| set::plain(v, 4));
+    let detail = parts.next().map_or_else(|| value.clone(), |table| format!("{}: {value}", table.replace('_', " ")));
+    RowLabel { name: words.join(" "), detail }
 }
 
 fn symbol(index: usize) -> Symbol {
@@ -230,15 +249,15 @@ fn table(data: &Data, effects: &[Effect]) -> TableBlock {
         ("successes", "1"),
         ("missions", "1"),
         ("pairs", "1"),
-        ("change of success", "points"),
+        ("change", "points"),
         ("low", "points"),
         ("high", "points"),
         ("acceleration", "m/s2"),
-        ("its change", "%"),
+        ("change", "%"),
         ("pitch rate", "deg/s"),
-        ("its change", "%"),
+        ("change", "%"),
         ("roll rate", "deg/s"),
-        ("its change", "%"),
+        ("change", "%"),
     ];
     let mut numbers = Numbers::new("tables/missions by variant and group; medians where outcome = 'success'", &columns);
     for e in effects {
@@ -271,4 +290,21 @@ fn plain(group: &Group<MissionRow>) -> Vec<sastrugi_schemas::Cell> {
         [number(sums::median(&sums::finite(&values))), none()]
     };
     head.into_iter().chain((0..RMS).flat_map(median)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn val_labels() {
+        let of = |variant| {
+            let label = label(variant);
+            (label.name, label.detail)
+        };
+        assert_eq!(of("vehicle_changes.tyre.damping_n_s_m = 250.0"), ("damping".into(), "tyre: 250".into()));
+        assert_eq!(of("phase_max_rad = 3.141592653589793"), ("phase max".into(), "3.142".into()));
+        assert_eq!(of("mode = \"paper\""), ("mode".into(), "\"paper\"".into()));
+        assert_eq!(of("m"), ("m".into(), "".into()));
+    }
 }
