@@ -276,13 +276,12 @@ fn val_traverse_says_why_it_refuses() {
     refused(&ascii(0.1, |row, col| f64::from((row + col) % 2)), &short, "has low roughness");
     refused(&ascii(0.1, |_, _| -9999.0), &short, "none of the 96 x 96 cells holds data");
     refused(&ascii(1.0, |_, _| 0.0), &[], "larger than its wheelbase");
-    // Low roughness only in the corners of a terrain on which no goal lies 8 m away inside the border.
+    // Low roughness in one corner only, and no goal 9 m away inside the border.
     let far = ["--set-missions", "length_m=9.0", "--set-missions", "border_m=1.0", "--set-missions", "max_draws=50"];
     let corner = |row: u32, col: u32| if row < 30 && col < 30 { 0.0 } else { f64::from((row + col) % 2) };
     refused(&ascii(0.1, corner), &far, "50 draws");
     let dem = write(folder.path(), "dem.asc", &ascii(0.1, |_, _| 0.0));
-    for (key, words) in [("replicates=0", "1 to 1000"), ("start_tolerance_m=3.0", "below the missions' length of 3 m")]
-    {
+    for (key, words) in [("replicates=0", "1 to 1000"), ("start_tolerance_m=3.0", "below the missions'")] {
         let (code, said) = drive(folder.path(), &dem, &[&short[..], &["--set", key]].concat());
         assert!(code == 2 && said.contains(words), "{code} {said}");
     }

@@ -107,7 +107,8 @@ pub fn progress_m(mission: &Mission, recording: &Recording) -> f64 {
     along.fold(0.0, f64::max).min(mission.length_m())
 }
 
-/// The rows of a mission's samples; `classes` (codes of [`RoughnessClass`]) tells the class under base_link.
+/// The rows of a mission's samples; `classes` (codes of [`RoughnessClass`](sastrugi_schemas::RoughnessClass)) tells the class
+/// under base_link.
 pub fn sample_rows(terrain_id: &str, mission: &Mission, recording: &Recording, classes: &Grid<u8>) -> Vec<SampleRow> {
     let mission_id = mission.id();
     let commands = recording.commands.iter().map(Some).chain(std::iter::repeat(None));
