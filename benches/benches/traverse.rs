@@ -10,7 +10,7 @@
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
 use sastrugi_benches::floor_in;
-use sastrugi_mobility::missions::{Mission, MissionParameters, MissionSettings, draw_missions};
+use sastrugi_mobility::missions::{Mission, MissionParameters, MissionSettings, StartCells, draw_missions};
 use sastrugi_mobility::vehicle::{Ground, TraverseParameters, TraverseSettings, Vehicle, drive};
 use sastrugi_numeric::{Grid, Streams, Surface};
 use sastrugi_roughness::{ClassThresholds, classify, close_disk, moore_gradient};
@@ -57,7 +57,8 @@ impl Course {
         let rules = MissionSettings::try_from(raw).expect("valid parameters");
         let classes = classify(&moore_gradient(&dem), &ClassThresholds::default());
         let classes = close_disk(&classes, vehicle.half_diagonal_m());
-        let missions = draw_missions(&classes, &rules, &Streams::for_seed(1, "missions")).expect("missions");
+        let missions = draw_missions(&classes, &rules, StartCells::Low, &Streams::for_seed(1, "missions"));
+        let missions = missions.expect("missions");
         Self { vehicle, settings, dem, missions }
     }
 

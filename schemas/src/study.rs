@@ -62,9 +62,9 @@ pub enum Pairing {
     /// Every terrain and every mission is drawn by itself.
     #[default]
     Independent,
-    /// The k-th replicates of all terrains draw from one stream, so that they differ by their parameters alone, and their
-    /// missions lead from the same starts to the same goals: a start has low roughness, a goal low or semi roughness, on
-    /// every one of them.
+    /// The k-th replicates of all terrains draw from one stream, so that they differ by their parameters alone. Their missions
+    /// come from the same draws, each accepted by the terrain's own class map: where two terrains accept the same draw,
+    /// their missions lead from the same start to the same goal.
     Common,
 }
 

@@ -109,15 +109,16 @@ fn val_a_paired_study_has_its_rows() {
     for row in &missions {
         lines.entry(text(row, "pair_id")).or_default().insert(of(row, &LINE));
     }
-    let pairs: Vec<&str> = lines.keys().copied().collect();
+    // `<missions>-<replicate>-<mission>.<draw>`: the same pair, the same line; groups share some of them.
+    let blocks: BTreeSet<&str> = lines.keys().map(|pair| pair.split('.').next().unwrap()).collect();
     let expected =
         ["flat-m-0001-", "flat-m-0002-", "m-0001-", "m-0002-"].map(|p| [format!("{p}0001"), format!("{p}0002")]);
-    assert_eq!(pairs, expected.as_flattened());
+    assert_eq!(blocks, expected.as_flattened().iter().map(String::as_str).collect());
     assert!(lines.values().all(|lines| lines.len() == 1), "{lines:?}");
     let groups = |pair: &str| -> BTreeSet<&str> {
         missions.iter().filter(|r| text(r, "pair_id") == pair).map(|r| text(r, "group")).collect()
     };
-    assert_eq!(groups("m-0002-0001"), BTreeSet::from(["a", "b"]));
+    assert!(lines.keys().any(|pair| groups(pair) == BTreeSet::from(["a", "b"])), "{lines:?}");
     let variants: BTreeSet<(&str, &str)> =
         missions.iter().map(|row| (text(row, "traverse_id"), text(row, "variant"))).collect();
     let flat = "z_scale_percent = 0.1, vehicle_changes.drive.torque_limit_n_m = 30.0";
@@ -156,7 +157,7 @@ fn replicates(missions: &[Row], starts: &[Row]) {
         let place: Vec<String> = starts.iter().map(|row| of(row, &columns)).collect();
         places.entry(text(mission, "pair_id")).or_default().insert(place.join("; "));
     }
-    assert!(places.len() == 4 && places.values().all(|places| places.len() == 1), "{places:?}");
+    assert!(places.len() >= 4 && places.values().all(|places| places.len() == 1), "{places:?}");
     let plain = missions.iter().filter(|row| text(row, "traverse_id") == "husky");
     assert!(plain.into_iter().all(|row| row["replicates"] == 1));
 }
@@ -169,7 +170,7 @@ fn gold_a_paired_study_has_the_same_bytes() {
     assert_eq!(differing(&whole, &run(two.path(), PAIRED, "2")), Vec::<String>::new(), "threads");
     fs::remove_dir_all(two.path().join("release")).unwrap();
     fs::remove_dir_all(two.path().join("release.work/items/traverse/grip-0.5@b-0002")).unwrap();
-    fs::remove_dir_all(two.path().join("release.work/items/missions/m@common-0001")).unwrap();
+    fs::remove_dir_all(two.path().join("release.work/items/missions/m@a-0001")).unwrap();
     assert_eq!(differing(&whole, &run(two.path(), PAIRED, "2")), Vec::<String>::new(), "resumed");
 }
 

@@ -19,7 +19,7 @@ const MISSIONS_PER_TERRAIN: usize = 20;
 
 /// Four terrains for each fractal dimension, 20 missions each, from a seed that nothing else uses.
 fn study() -> String {
-    let mut text = "[study]\nname = \"peer\"\nseed = 20261121\ndate = \"2026-11-21\"\n".to_owned();
+    let mut text = "[study]\nname = \"peer\"\nseed = 20261122\ndate = \"2026-11-21\"\n".to_owned();
     for group in GROUPS {
         writeln!(
             text,

@@ -9,7 +9,8 @@ use sastrugi_schemas::fit::FitFile;
 use sastrugi_schemas::manifest::FailedItem;
 use sastrugi_schemas::tables::{
     CandidateCurveRow, CandidateRow, CovarianceRow, FitRow, HeightDistributionRow, LikelihoodProfileRow, MissionRow,
-    ProfilePsdRow, PsdRow, ReplicateRow, SampleRow, ScoreCovarianceRow, ScoreRow, StructureRow, SurfaceRow, TerrainRow,
+    ParameterRow, ProfilePsdRow, PsdRow, ReplicateRow, SampleRow, ScoreCovarianceRow, ScoreRow, StructureRow,
+    SurfaceRow, TerrainRow,
 };
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -95,6 +96,8 @@ pub struct Data {
     pub missions: Vec<MissionRow>,
     /// Starts of missions that have several.
     pub replicates: Vec<ReplicateRow>,
+    /// Every number of every run.
+    pub parameters: Vec<ParameterRow>,
     /// Files read on demand.
     pub files: Box<dyn Files>,
 }

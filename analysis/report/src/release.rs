@@ -52,6 +52,7 @@ impl Data {
             scoreboard_covariance: release.rows()?,
             missions: release.rows()?,
             replicates: release.rows()?,
+            parameters: release.rows()?,
             files: Box::new(release),
         })
     }

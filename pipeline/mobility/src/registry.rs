@@ -1,7 +1,8 @@
-//! The list of vehicles.
+//! The list of vehicles and surfaces, and every number of a run with its source.
 
 use crate::vehicle::{
-    HUSKY_A200, MATERIALS, Material, ROCKER_BOGIE_ROVER, SurfaceParameters, UGV_4X4, Vehicle, VehicleParameters,
+    HUSKY_A200, MATERIALS, Material, ROCKER_BOGIE_ROVER, SurfaceParameters, TraverseSettings, UGV_4X4, Vehicle,
+    VehicleParameters,
 };
 use sastrugi_schemas::kind::{read_parameters, schema_of};
 use sastrugi_schemas::{Kind, ParameterError};
@@ -62,6 +63,61 @@ pub fn vehicle(kind: &str, changes: &Map<String, Value>) -> Result<Vehicle, Para
     Vehicle::new(kind, parameters).map_err(|e| e.within("vehicle_changes"))
 }
 
+/// One number of a run: what it is, its value as JSON, and where it comes from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Number {
+    /// Dotted path, `vehicle.` before those of the vehicle.
+    pub parameter: String,
+    /// Value as JSON.
+    pub value: String,
+    /// Source of a vehicle's or a surface's number; absent where the study states it, or where it is a setting.
+    pub source: Option<String>,
+}
+
+/// Every number of a run, those that were left open included: the vehicle's by the names of its data file, then the run's.
+pub fn numbers(vehicle: &Vehicle, settings: &TraverseSettings) -> Vec<Number> {
+    let entry = ENTRIES.iter().find(|e| e.kind == vehicle.name());
+    let section = |name: &str| entry.map_or(Value::Null, |e| e.section(name));
+    let (defaults, sources) = (section("parameters"), section("sources"));
+    let of_vehicle = |(path, value): (String, Value)| {
+        let pointer = path.replace('.', "/");
+        let untouched = defaults.pointer(&pointer).is_some_and(|v| same(v, &value));
+        let source = sources.pointer(&pointer).and_then(Value::as_str).filter(|_| untouched);
+        Number { parameter: format!("vehicle{path}"), value: value.to_string(), source: source.map(str::to_owned) }
+    };
+    let preset = settings.parameters().surface.preset.source();
+    let of_run = |(path, value): (String, Value)| Number {
+        source: (path == ".surface.preset").then(|| preset.to_owned()),
+        parameter: path.trim_start_matches('.').to_owned(),
+        value: value.to_string(),
+    };
+    let json = |value: Result<Value, _>| value.unwrap_or(Value::Null);
+    let mut run = json(serde_json::to_value(settings.parameters()));
+    if let Value::Object(run) = &mut run {
+        // The vehicle is written out above, its changes included.
+        run.retain(|key, _| key != "vehicle" && key != "vehicle_changes");
+    }
+    let of_vehicle = leaves(&json(serde_json::to_value(vehicle.parameters())), "").into_iter().map(of_vehicle);
+    of_vehicle.chain(leaves(&run, "").into_iter().map(of_run)).collect()
+}
+
+/// Dotted paths of all leaves but nulls, with their values.
+fn leaves(value: &Value, path: &str) -> Vec<(String, Value)> {
+    match value {
+        Value::Object(map) => map.iter().flat_map(|(k, v)| leaves(v, &format!("{path}.{k}"))).collect(),
+        Value::Null => Vec::new(),
+        _ => vec![(path.to_owned(), value.clone())],
+    }
+}
+
+/// Equal as numbers: 1 and 1.0 are.
+fn same(a: &Value, b: &Value) -> bool {
+    match (a, b) {
+        (Value::Array(a), Value::Array(b)) => a.len() == b.len() && a.iter().zip(b).all(|(a, b)| same(a, b)),
+        _ => a == b || a.as_f64().is_some_and(|a| Some(a) == b.as_f64()),
+    }
+}
+
 fn unknown(kind: &str) -> ParameterError {
     let known: Vec<String> = ENTRIES.iter().map(|e| format!("`{}`", e.kind)).collect();
     ParameterError::new("vehicle", format!("`{kind}` is no vehicle; the known ones are {}", known.join(", ")))
@@ -115,23 +171,33 @@ fn merge(base: &mut Value, changes: &Map<String, Value>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// Dotted paths of all leaves.
-    fn leaves(value: &Value, path: &str) -> Vec<String> {
-        match value {
-            Value::Object(map) => map.iter().flat_map(|(k, v)| leaves(v, &format!("{path}.{k}"))).collect(),
-            _ => vec![path.to_owned()],
-        }
-    }
+    use crate::vehicle::TraverseParameters;
 
     #[test]
     fn val_every_vehicle_can_drive_and_every_number_has_a_source() {
         for entry in &ENTRIES {
             let (parameters, sources) = (entry.section("parameters"), entry.section("sources"));
-            assert_eq!(leaves(&parameters, ""), leaves(&sources, ""), "{}", entry.kind);
+            let paths = |v: &Value| leaves(v, "").into_iter().map(|(path, _)| path).collect::<Vec<_>>();
+            assert_eq!(paths(&parameters), paths(&sources), "{}", entry.kind);
             let vehicle = vehicle(entry.kind, &Map::new()).unwrap();
             assert_eq!(serde_json::to_value(vehicle.parameters()).unwrap(), parameters);
         }
+    }
+
+    /// Every number of a run, with its source unless the study changed it.
+    #[test]
+    fn val_numbers_of_a_run() {
+        let mut parameters = TraverseParameters::default();
+        parameters.vehicle_changes.insert("drive".to_owned(), serde_json::json!({"torque_limit_n_m": 30}));
+        let (vehicle, settings) = parameters.prepare().unwrap();
+        let all = numbers(&vehicle, &settings);
+        let of = |name: &str| all.iter().find(|n| n.parameter == name).map(|n| (n.value.as_str(), n.source.is_some()));
+        assert_eq!(of("vehicle.wheels.radius_m"), Some(("0.1651", true)));
+        assert_eq!(of("vehicle.drive.torque_limit_n_m"), Some(("30.0", false)));
+        assert_eq!(of("controller.lookahead_m"), Some(("1.536", false)));
+        assert_eq!(of("surface.wheel_friction"), Some(("1.0", false)));
+        assert_eq!(of("surface.preset"), Some(("\"study\"", true)));
+        assert_eq!(of("vehicle_changes.drive.torque_limit_n_m"), None);
     }
 
     #[test]

@@ -9,6 +9,7 @@ pub mod fits;
 pub mod height_distribution;
 pub mod likelihood_profile;
 pub mod missions;
+pub mod parameters;
 pub mod profile_psd;
 pub mod psd;
 pub mod replicates;
@@ -25,6 +26,7 @@ pub use fits::FitRow;
 pub use height_distribution::HeightDistributionRow;
 pub use likelihood_profile::LikelihoodProfileRow;
 pub use missions::MissionRow;
+pub use parameters::ParameterRow;
 pub use profile_psd::ProfilePsdRow;
 pub use psd::PsdRow;
 pub use replicates::ReplicateRow;
@@ -77,7 +79,7 @@ pub struct Table {
 }
 
 /// All tables, in the order of the report and of `schema`.
-pub const ALL: [&Table; 16] = [
+pub const ALL: [&Table; 17] = [
     &TerrainRow::TABLE,
     &SurfaceRow::TABLE,
     &FitRow::TABLE,
@@ -94,6 +96,7 @@ pub const ALL: [&Table; 16] = [
     &MissionRow::TABLE,
     &ReplicateRow::TABLE,
     &SampleRow::TABLE,
+    &ParameterRow::TABLE,
 ];
 
 /// The table of that name.

@@ -65,6 +65,7 @@ pub fn empty() -> Data {
         scoreboard_covariance: Vec::new(),
         missions: Vec::new(),
         replicates: Vec::new(),
+        parameters: Vec::new(),
         files: Box::new(Shelf::default()),
     }
 }

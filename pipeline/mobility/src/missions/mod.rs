@@ -8,8 +8,9 @@
 //! none of those before. The paper does not say what happens on a terrain that allows no mission: here the draws are
 //! counted and end in an error.
 //!
-//! Terrains that are to be compared line by line share their missions: those are drawn on the [`worst_classes`] of their
-//! maps, so that the rules hold on every one of them. [`ReplicateSettings`] perturbs the start of a drawn mission.
+//! Terrains that are to be compared line by line share their draws ([`StartCells::All`]): each accepts them by its own map, so
+//! that its missions are what they would be alone, and where two accept the same draw they share the mission.
+//! [`ReplicateSettings`] perturbs the start of a drawn mission.
 //!
 //! Cost: one pass over the map and a few draws per mission; memory: four bytes per eligible cell.
 
@@ -118,16 +119,15 @@ pub enum MissionError {
     },
 }
 
-/// The worse class of two maps in every cell; a cell without data in either has none in `worst`. False, and no change, where
-/// the maps do not cover the same cells.
-#[must_use]
-pub fn worst_classes(worst: &mut Grid<u8>, other: &Grid<u8>) -> bool {
-    if worst.geometry != other.geometry {
-        return false;
-    }
-    // Codes grow with the roughness, and that for no data is the largest.
-    worst.values.iter_mut().zip(&other.values).for_each(|(worst, other)| *worst = (*worst).max(*other));
-    true
+/// Which cells starts are drawn from; either way they are uniform over the low-roughness cells.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum StartCells {
+    /// Those of low roughness.
+    Low,
+    /// All inside the border, drawn again until one has low roughness: draw k of a mission is then the same start and
+    /// heading on every map with these cells, so that maps which accept the same draw share the mission.
+    All,
 }
 
 /// Draws the missions of one terrain from its closed class map (codes of [`RoughnessClass`]).
@@ -137,9 +137,10 @@ pub fn worst_classes(worst: &mut Grid<u8>, other: &Grid<u8>) -> bool {
 pub fn draw_missions(
     classes: &Grid<u8>,
     settings: &MissionSettings,
+    cells: StartCells,
     streams: &Streams,
 ) -> Result<Vec<Mission>, MissionError> {
-    let field = Field::new(classes, settings)?;
+    let field = Field::new(classes, settings, cells)?;
     (0..settings.count()).map(|index| field.draw(index, streams)).collect()
 }
 
@@ -147,12 +148,14 @@ pub fn draw_missions(
 struct Field<'a> {
     classes: &'a Grid<u8>,
     settings: &'a MissionSettings,
-    /// Row-major indices of the cells in which a mission may start.
-    starts: Vec<usize>,
+    /// Row-major indices of the cells that starts are drawn from.
+    cells: Vec<usize>,
+    /// Number of low-roughness cells among them.
+    starts: usize,
 }
 
 impl<'a> Field<'a> {
-    fn new(classes: &'a Grid<u8>, settings: &'a MissionSettings) -> Result<Self, MissionError> {
+    fn new(classes: &'a Grid<u8>, settings: &'a MissionSettings, cells: StartCells) -> Result<Self, MissionError> {
         let [inside_x_m, inside_y_m] = classes.geometry.size().map(|extent| extent - 2.0 * settings.border_m());
         let (length_m, border_m) = (settings.length_m(), settings.border_m());
         let diagonal_m = (inside_x_m * inside_x_m + inside_y_m * inside_y_m).sqrt();
@@ -161,38 +164,42 @@ impl<'a> Field<'a> {
         }
         let inside: Vec<usize> =
             (0..classes.values.len()).filter(|&k| is_inside(&classes.geometry, border_m, centre(classes, k))).collect();
-        let cells = inside.len();
-        let starts: Vec<usize> =
-            inside.into_iter().filter(|&k| classes.values[k] == RoughnessClass::Low as u8).collect();
-        if starts.is_empty() {
-            return Err(MissionError::NoEligibleStart { cells, border_m });
+        let low: Vec<usize> = inside.iter().copied().filter(|&k| is_low(classes, k)).collect();
+        if low.is_empty() {
+            return Err(MissionError::NoEligibleStart { cells: inside.len(), border_m });
         }
-        Ok(Self { classes, settings, starts })
+        let starts = low.len();
+        let cells = match cells {
+            StartCells::Low => low,
+            StartCells::All => inside,
+        };
+        Ok(Self { classes, settings, cells, starts })
     }
 
     /// The mission with that index, from its own stream.
     fn draw(&self, index: usize, streams: &Streams) -> Result<Mission, MissionError> {
         let mut stream = streams.child(&mission_id(index)).stream("start and heading");
         for draws in 1..=self.settings.max_draws() {
-            let (start_m, heading_rad) = self.candidate(&mut stream);
+            let (start, heading_rad) = self.candidate(&mut stream);
+            let start_m = centre(self.classes, start);
             let (sin, cos) = libm::sincos(heading_rad);
             let length_m = self.settings.length_m();
             let goal_m = [start_m[0] + length_m * cos, start_m[1] + length_m * sin];
-            if self.is_goal(goal_m) {
+            if is_low(self.classes, start) && self.is_goal(goal_m) {
                 return Ok(Mission { index, start_m, goal_m, heading_rad, draws });
             }
         }
         Err(MissionError::DrawsExhausted {
             mission_id: mission_id(index),
             draws: self.settings.max_draws(),
-            starts: self.starts.len(),
+            starts: self.starts,
             length_m: self.settings.length_m(),
         })
     }
 
-    fn candidate(&self, stream: &mut Stream) -> ([f64; 2], f64) {
-        let start = self.starts[stream.below(self.starts.len() as u64) as usize];
-        (centre(self.classes, start), stream.uniform_in(0.0, std::f64::consts::TAU))
+    fn candidate(&self, stream: &mut Stream) -> (usize, f64) {
+        let start = self.cells[stream.below(self.cells.len() as u64) as usize];
+        (start, stream.uniform_in(0.0, std::f64::consts::TAU))
     }
 
     fn is_goal(&self, point_m: [f64; 2]) -> bool {
@@ -204,6 +211,10 @@ impl<'a> Field<'a> {
                 Some(RoughnessClass::Low | RoughnessClass::Semi)
             )
     }
+}
+
+fn is_low(classes: &Grid<u8>, index: usize) -> bool {
+    classes.values[index] == RoughnessClass::Low as u8
 }
 
 /// True more than `border_m` from every edge of the grid.

@@ -110,8 +110,11 @@ impl TraverseParameters {
         self.check_rates()?;
         self.check_step(&vehicle)?;
         let tip_sin_cos = libm::sincos(self.tip_deg.to_radians());
+        let mut parameters = self.clone();
         let lookahead_m = self.controller.lookahead_m.unwrap_or(LOOKAHEAD_WHEELBASES * vehicle.wheelbase_m());
-        Ok((vehicle, TraverseSettings { parameters: self.clone(), tip_sin_cos, lookahead_m }))
+        parameters.controller.lookahead_m = Some(lookahead_m);
+        parameters.surface.fill();
+        Ok((vehicle, TraverseSettings { parameters, tip_sin_cos, lookahead_m }))
     }
 
     fn check_rules(&self) -> Result<(), ParameterError> {
@@ -193,7 +196,7 @@ pub struct TraverseSettings {
 }
 
 impl TraverseSettings {
-    /// The parameters it was made from.
+    /// The parameters it was made from, those that were left open filled in.
     pub fn parameters(&self) -> &TraverseParameters {
         &self.parameters
     }

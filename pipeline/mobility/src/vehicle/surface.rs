@@ -137,6 +137,13 @@ pub(crate) struct Friction {
     pub rolling: f64,
 }
 
+impl SurfacePreset {
+    /// Where its numbers come from.
+    pub(crate) fn source(self) -> &'static str {
+        MATERIALS.iter().find(|m| m.preset == self).map_or("", |m| m.source)
+    }
+}
+
 impl Friction {
     /// Of a preset.
     fn of(preset: SurfacePreset) -> Self {
@@ -172,6 +179,12 @@ impl SurfaceParameters {
     /// Where no class and no raster says otherwise.
     pub(crate) fn friction(&self) -> Friction {
         Friction::of(self.preset).with(self.wheel_friction, self.belly_friction, self.rolling_resistance)
+    }
+
+    /// Writes out the numbers that the preset stands for.
+    pub(crate) fn fill(&mut self) {
+        let Friction { wheel, belly, rolling } = self.friction();
+        (self.wheel_friction, self.belly_friction, self.rolling_resistance) = (Some(wheel), Some(belly), Some(rolling));
     }
 
     /// Whether a class has a surface of its own.

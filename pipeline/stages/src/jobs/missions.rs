@@ -6,8 +6,8 @@ use crate::registry::{BuildError, Builder};
 use crate::revision::Room;
 use crate::runner::graph::Node;
 use crate::study::Entry;
-use sastrugi_mobility::missions::{Mission, MissionParameters, MissionSettings, draw_missions, worst_classes};
-use sastrugi_numeric::{Geometry, Grid, Streams};
+use sastrugi_mobility::missions::{Mission, MissionParameters, MissionSettings, StartCells, draw_missions};
+use sastrugi_numeric::{Geometry, Streams};
 use sastrugi_schemas::Kind;
 use sastrugi_schemas::kind::{read_parameters, schema_of};
 use sastrugi_schemas::study::MissionsItem;
@@ -50,25 +50,33 @@ pub struct Lines {
     pub heightfield: String,
     /// Item that draws them.
     pub item: ItemRef,
-    /// Name that the pair ids of the missions begin with.
-    pub pair: String,
     /// Random streams are named by this: the heightfield, or what it shares with others.
     pub word: String,
+    /// Number of the replicates that share draws with this one, from 0.
+    shared: Option<u64>,
 }
 
-/// Heightfields that share their missions.
-struct Block {
-    word: String,
-    replicate: u64,
-    /// Name that the pair ids begin with, where it is not that of the item.
-    pair: Option<String>,
-    heightfields: Vec<String>,
+impl Lines {
+    /// Name of a mission's start and goal, for one-by-one comparison.
+    pub fn pair_id(&self, mission: &Mission) -> String {
+        match self.shared {
+            None => format!("{}-{:04}", self.item.id, mission.index + 1),
+            // The same draw is the same line on all that share it.
+            Some(_) => format!("{}-{:04}.{}", self.block(), mission.index + 1, mission.draws),
+        }
+    }
+
+    /// Name of what shares draws: `<missions>-<replicate>`.
+    fn block(&self) -> String {
+        let missions = self.item.id.split_once('@').map_or("", |(missions, _)| missions);
+        format!("{missions}-{:04}", self.shared.unwrap_or(0) + 1)
+    }
 }
 
 struct MissionsJob {
-    /// One, or several of the same geometry.
-    heightfields: Vec<String>,
+    heightfield: String,
     settings: MissionSettings,
+    cells: StartCells,
     streams: Streams,
 }
 
@@ -90,21 +98,20 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
         for (k, id) in envelope.terrains.iter().enumerate() {
             heightfields.extend(builder.family(&entry, &format!("terrains.{k}"), id)?);
         }
-        let mut lines = Vec::new();
-        for block in blocks(builder, &envelope.id, heightfields) {
-            check_geometry(builder, &entry, &block.heightfields)?;
-            let item = ItemRef::new(STAGE, &format!("{}@{}", envelope.id, block.word));
-            let pair = block.pair.unwrap_or_else(|| item.id.clone());
-            lines.extend(block.heightfields.iter().map(|heightfield| Lines {
-                heightfield: heightfield.clone(),
-                item: item.clone(),
-                pair: pair.clone(),
-                word: block.word.clone(),
-            }));
-            let streams = builder.streams(STAGE, &item.id, envelope.seed, block.replicate);
+        let lines: Vec<Lines> = heightfields.into_iter().map(|id| lines(builder, &envelope.id, id)).collect();
+        check_geometry(builder, &entry, &lines)?;
+        for one in &lines {
+            let words = format!("{}@{}", envelope.id, one.word);
+            let streams = builder.streams(STAGE, &words, envelope.seed, one.shared.unwrap_or(0));
             let stream = Some(streams.label());
-            let parents = block.heightfields.iter().map(|id| roughness::item(id)).collect();
-            let job = MissionsJob { heightfields: block.heightfields, settings: settings.clone(), streams };
+            let job = MissionsJob {
+                heightfield: one.heightfield.clone(),
+                settings: settings.clone(),
+                cells: if one.shared.is_some() { StartCells::All } else { StartCells::Low },
+                streams,
+            };
+            let parents = vec![roughness::item(&one.heightfield)];
+            let item = one.item.clone();
             builder.node(&entry, Node { item, parents, inputs: Vec::new(), stream, job: Box::new(job) })?;
         }
         let drawn = Drawn { lines, count: settings.count(), length_m: settings.length_m() };
@@ -113,46 +120,38 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
     Ok(())
 }
 
-/// Every heightfield by itself; when replicates are paired, those with the same number together.
-fn blocks(builder: &Builder<'_>, missions: &str, heightfields: BTreeSet<String>) -> Vec<Block> {
-    let replicate =
-        |id: &String| builder.heightfields.get(id).and_then(|f| f.replicate).filter(|_| builder.is_paired());
-    let mut shared: BTreeMap<u64, Vec<String>> = BTreeMap::new();
-    let mut blocks = Vec::new();
-    for id in heightfields {
-        match replicate(&id) {
-            Some(number) => shared.entry(number).or_default().push(id),
-            None => blocks.push(Block { word: id.clone(), replicate: 0, pair: None, heightfields: vec![id] }),
-        }
+/// The missions of a heightfield: drawn by itself, or with the draws of the replicates of that number.
+fn lines(builder: &Builder<'_>, missions: &str, heightfield: String) -> Lines {
+    let replicate = builder.heightfields.get(&heightfield).and_then(|field| field.replicate);
+    let shared = replicate.filter(|_| builder.is_paired());
+    Lines {
+        item: ItemRef::new(STAGE, &format!("{missions}@{heightfield}")),
+        word: shared.map_or_else(|| heightfield.clone(), terrain::common),
+        shared,
+        heightfield,
     }
-    blocks.extend(shared.into_iter().map(|(replicate, heightfields)| Block {
-        word: terrain::common(replicate),
-        replicate,
-        pair: Some(format!("{missions}-{:04}", replicate + 1)),
-        heightfields,
-    }));
-    blocks
 }
 
-/// Refuses heightfields with different cells in one block, as far as that is known before the run.
-fn check_geometry(builder: &Builder<'_>, entry: &Entry<'_>, heightfields: &[String]) -> Result<(), BuildError> {
-    let known: Vec<(&String, Geometry)> =
-        heightfields.iter().filter_map(|id| Some((id, builder.heightfields.get(id)?.geometry?))).collect();
-    let Some((first, geometry)) = known.first() else { return Ok(()) };
-    match known.iter().find(|(_, other)| other != geometry) {
-        Some((other, of_other)) => {
-            let message = format!("`terrains`: {}", unlike((*first, geometry), (*other, of_other)));
-            Err(entry.error("terrains", message).into())
+/// Refuses heightfields with different cells that share draws, as far as that is known before the run.
+fn check_geometry(builder: &Builder<'_>, entry: &Entry<'_>, lines: &[Lines]) -> Result<(), BuildError> {
+    let mut first: BTreeMap<u64, (&str, Geometry)> = BTreeMap::new();
+    for one in lines {
+        let geometry = builder.heightfields.get(&one.heightfield).and_then(|field| field.geometry);
+        let (Some(number), Some(geometry)) = (one.shared, geometry) else { continue };
+        let (id, of_first) = *first.entry(number).or_insert((&one.heightfield, geometry));
+        if of_first != geometry {
+            let message = format!("`terrains`: {}", unlike((id, &of_first), (&one.heightfield, &geometry)));
+            return Err(entry.error("terrains", message).into());
         }
-        None => Ok(()),
     }
+    Ok(())
 }
 
 /// The sentence on two heightfields that cannot share missions.
 fn unlike((a, of_a): (&str, &Geometry), (b, of_b): (&str, &Geometry)) -> String {
     let cells = |g: &Geometry| format!("{} x {} cells of {} x {} m", g.rows, g.cols, g.cell[0], g.cell[1]);
     format!(
-        "with `pairing = \"common\"` replicates with the same number share their missions, so their cells must be the same, \
+        "with `pairing = \"common\"` replicates with the same number share their draws, so their cells must be the same, \
          but \"{a}\" has {} and \"{b}\" {}; list them in [[missions]] of their own",
         cells(of_a),
         cells(of_b)
@@ -161,7 +160,7 @@ fn unlike((a, of_a): (&str, &Geometry), (b, of_b): (&str, &Geometry)) -> String 
 
 impl Job for MissionsJob {
     fn recipe(&self) -> Value {
-        json!({ "heightfields": self.heightfields, "missions": self.settings })
+        json!({ "heightfield": self.heightfield, "missions": self.settings, "cells": self.cells })
     }
 
     fn rooms(&self) -> &'static [Room] {
@@ -169,40 +168,21 @@ impl Job for MissionsJob {
     }
 
     fn memory_bytes(&self) -> u64 {
-        // Class maps, whatever their number, two at a time.
         128 << 20
     }
 
     fn estimate(&self) -> Estimate {
-        Estimate { seconds: 0.02 * self.heightfields.len() as f64, bytes: 200.0 * self.settings.count() as f64 }
+        Estimate { seconds: 0.02, bytes: 200.0 * self.settings.count() as f64 }
     }
 
     fn run(&self, work: &Work<'_>) -> Result<Outcome, JobError> {
-        let classes = self.classes(work)?;
-        let missions = draw_missions(&classes, &self.settings, &self.streams)
+        let path = work.parent(&roughness::item(&self.heightfield), roughness::CLASSES)?;
+        let classes = dem::read_classes(&path).map_err(|e| input_error(&e))?;
+        let missions = draw_missions(&classes, &self.settings, self.cells, &self.streams)
             .map_err(|e| JobError::input(format!("cannot {e}")))?;
         let text = serde_json::to_vec(&missions).map_err(JobError::new)?;
         atomic::write(&work.output(MISSIONS), &text).map_err(JobError::new)?;
         Ok(Outcome { products: vec![Product::internal(MISSIONS)], ..Outcome::default() })
-    }
-}
-
-impl MissionsJob {
-    /// The closed class map; of several heightfields the worst class in every cell.
-    fn classes(&self, work: &Work<'_>) -> Result<Grid<u8>, JobError> {
-        let read = |id: &String| {
-            let path = work.parent(&roughness::item(id), roughness::CLASSES)?;
-            dem::read_classes(&path).map_err(|e| input_error(&e))
-        };
-        let (first, others) = self.heightfields.split_first().ok_or_else(|| JobError::new("no heightfield"))?;
-        let mut worst = read(first)?;
-        for id in others {
-            let classes = read(id)?;
-            if !worst_classes(&mut worst, &classes) {
-                return Err(JobError::new(unlike((first, &worst.geometry), (id, &classes.geometry))));
-            }
-        }
-        Ok(worst)
     }
 }
 

@@ -15,7 +15,8 @@ pub mod traverse;
 use crate::revision::Room;
 use sastrugi_schemas::tables::{
     CandidateCurveRow, CandidateRow, CovarianceRow, FitRow, HeightDistributionRow, LikelihoodProfileRow, MissionRow,
-    ProfilePsdRow, PsdRow, ReplicateRow, ScoreCovarianceRow, ScoreRow, StructureRow, SurfaceRow, TerrainRow,
+    ParameterRow, ProfilePsdRow, PsdRow, ReplicateRow, ScoreCovarianceRow, ScoreRow, StructureRow, SurfaceRow,
+    TerrainRow,
 };
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -163,6 +164,8 @@ pub struct Rows {
     pub scoreboard_covariance: Vec<ScoreCovarianceRow>,
     /// Table `missions`.
     pub missions: Vec<MissionRow>,
+    /// Table `parameters`.
+    pub parameters: Vec<ParameterRow>,
     /// Table `replicates`.
     pub replicates: Vec<ReplicateRow>,
 }

@@ -11,13 +11,14 @@ use crate::study::{Entry, StudyError, keys};
 use rayon::prelude::*;
 use sastrugi_mobility::metrics::{Differentiator, MissionLabels, mission_row, replicate_row, sample_rows};
 use sastrugi_mobility::missions::{Difficulty, Mission, ReplicateParameters, ReplicateSettings};
+use sastrugi_mobility::registry::{Number, numbers};
 use sastrugi_mobility::vehicle::{
     Ground, SurfaceLayers, SurfaceMap, TraverseError, TraverseParameters, TraverseSettings, Vehicle, drive,
 };
 use sastrugi_numeric::{Grid, Streams};
 use sastrugi_schemas::kind::{read_parameters, schema_of};
 use sastrugi_schemas::study::{StudyHead, TraverseItem};
-use sastrugi_schemas::tables::{MissionRow, ReplicateRow, SampleRow};
+use sastrugi_schemas::tables::{MissionRow, ParameterRow, ReplicateRow, SampleRow};
 use sastrugi_schemas::topics::{EventKind, Recording};
 use sastrugi_schemas::{Kind, ParameterError};
 use sastrugi_store::mcap::{MissionMcap, write_mission};
@@ -84,9 +85,7 @@ struct TraverseJob {
     terrain: String,
     group: Option<String>,
     variant: Option<String>,
-    missions: ItemRef,
-    /// Name that the missions' pair ids begin with.
-    pair: String,
+    lines: Lines,
     heightfield: ItemRef,
     /// Draws the starts beside the first.
     streams: Streams,
@@ -95,6 +94,11 @@ struct TraverseJob {
 /// The heightfield of an item of this stage.
 pub fn terrain_of(item_id: &str) -> &str {
     item_id.split_once('@').map_or(item_id, |(_, heightfield)| heightfield)
+}
+
+/// The run of an item of this stage.
+pub fn run_of(item_id: &str) -> &str {
+    item_id.split_once('@').map_or(item_id, |(run, _)| run)
 }
 
 /// Adds the items of `[[traverse]]`.
@@ -166,8 +170,7 @@ fn add_one(
         drive: drive.clone(),
         group: field.group.clone(),
         variant: joined(field.variant.as_deref(), drive.variant.as_deref()),
-        missions: lines.item.clone(),
-        pair: lines.pair.clone(),
+        lines: lines.clone(),
         heightfield: field.item.clone(),
         streams,
         terrain,
@@ -239,7 +242,7 @@ impl TraverseJob {
             terrain_id: self.terrain.clone(),
             group: self.group.clone(),
             variant: self.variant.clone(),
-            pair_id: format!("{}-{:04}", self.pair, mission.index + 1),
+            pair_id: self.lines.pair_id(mission),
             traverse_id: self.drive.id.clone(),
             path: release_path.clone(),
         };
@@ -327,6 +330,17 @@ impl TraverseJob {
         .into()
     }
 
+    /// Every number of the run.
+    fn parameters(&self) -> Vec<ParameterRow> {
+        let row = |number: Number| ParameterRow {
+            traverse_id: self.drive.id.clone(),
+            parameter: number.parameter,
+            value: number.value,
+            source: number.source,
+        };
+        numbers(&self.drive.vehicle, &self.drive.settings).into_iter().map(row).collect()
+    }
+
     /// Samples for the assembly, which writes them again with the study's metadata.
     fn write_samples(&self, work: &Work<'_>, driven: &mut [Driven]) -> Result<(), JobError> {
         let head = &self.drive.head;
@@ -369,7 +383,7 @@ impl Job for TraverseJob {
             "terrain": self.terrain,
             "group": self.group,
             "variant": self.variant,
-            "pair": self.pair,
+            "missions": self.lines.item,
             "study": { "name": head.name, "seed": head.seed, "license": head.license, "epoch_ns": head.epoch_ns },
         })
     }
@@ -393,14 +407,14 @@ impl Job for TraverseJob {
 
     fn run(&self, work: &Work<'_>) -> Result<Outcome, JobError> {
         let site = self.site(work)?;
-        let missions = missions::read(&missions::file(work, &self.missions)?)?;
+        let missions = missions::read(&missions::file(work, &self.lines.item)?)?;
         let driven: Result<Vec<Driven>, JobError> =
             missions.par_iter().map(|mission| self.drive(work, &site, mission)).collect();
         let mut driven = driven?;
         self.write_samples(work, &mut driven)?;
         let notes = site.ground.warnings().iter().cloned().chain(nowhere_note(&driven)).collect();
         let mut products = vec![Product::internal(SAMPLES)];
-        let mut rows = Rows::default();
+        let mut rows = Rows { parameters: self.parameters(), ..Rows::default() };
         for d in driven {
             let product = Product::released(&d.file, d.release_path, Some(d.content));
             products.push(Product { records: Some(d.messages), ..product });

@@ -10,7 +10,7 @@ use crate::jobs::{ItemRef, Rows, fit, roughness, scoreboard, texture, traverse};
 use sastrugi_schemas::Record as Row;
 use sastrugi_schemas::manifest::{FailedItem, ItemNote, Origin};
 use sastrugi_schemas::study::StudyHead;
-use sastrugi_schemas::tables::SampleRow;
+use sastrugi_schemas::tables::{ParameterRow, SampleRow};
 use sastrugi_store::release::{self, Head, Release, ReleaseBuilder, ReleaseError};
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
@@ -167,7 +167,8 @@ fn add_tables(builder: &mut ReleaseBuilder, contents: &Contents<'_>) -> Result<(
     add_described(builder, contents)?;
     add_table(builder, contents, &[scoreboard::STAGE], |rows| rows.scoreboard)?;
     add_table(builder, contents, &[scoreboard::STAGE], |rows| rows.scoreboard_covariance)?;
-    add_missions(builder, contents)
+    add_missions(builder, contents)?;
+    add_parameters(builder, contents)
 }
 
 /// One table, its rows taken item by item; the ids of items are the rows' first key.
@@ -249,6 +250,20 @@ fn add_missions(builder: &mut ReleaseBuilder, contents: &Contents<'_>) -> Result
         |rows| rows.replicates,
         |a, b| (&a.mission_id, a.replicate).cmp(&(&b.mission_id, b.replicate)),
     )
+}
+
+/// `parameters`: every run once, whatever the number of its terrains.
+fn add_parameters(builder: &mut ReleaseBuilder, contents: &Contents<'_>) -> Result<(), Error> {
+    let mut runs: BTreeMap<&str, &PathBuf> = BTreeMap::new();
+    for (item, folder) in contents.results(&[traverse::STAGE]) {
+        runs.entry(traverse::run_of(&item.id)).or_insert(folder);
+    }
+    let sorted = |folder: &PathBuf| -> Result<Vec<ParameterRow>, Error> {
+        let mut rows = record(folder)?.rows.parameters;
+        rows.sort_by(|a, b| a.parameter.cmp(&b.parameter));
+        Ok(rows)
+    };
+    write_parts(builder, runs.into_values().map(sorted), traverse::STAGE)
 }
 
 /// One table whose first key is the terrain, its rows taken terrain by terrain and sorted there by the other keys.

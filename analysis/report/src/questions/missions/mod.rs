@@ -10,10 +10,11 @@ mod survivors;
 use super::clusters::{Pairing, REPLICATES, in_words};
 use super::{Question, outcome};
 use crate::ReportError;
-use crate::content::{Block, Numbers, TableBlock};
+use crate::content::{Block, Numbers, TableBlock, text};
 use crate::data::{Data, Group};
 use crate::render::number as set;
 use sastrugi_schemas::tables::MissionRow;
+use std::collections::BTreeSet;
 
 /// Registry entry.
 pub const QUESTION: Question = Question { id: "missions", name: "Missions", title: "How did the missions go?", answer };
@@ -63,6 +64,7 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     let drawn = maps::drawn(data, &groups)?;
     section(&mut blocks, "Where they drove", MAPS, maps::figures(data, &drawn)?);
     section(&mut blocks, "Missions in detail", STRIPS, strip::figures(data, &groups, &drawn)?);
+    blocks.extend(parameters(data).map(Block::FoldedTable));
     blocks.push(Block::FoldedTable(all(data)));
     Ok(blocks)
 }
@@ -81,8 +83,7 @@ fn section(blocks: &mut Vec<Block>, heading: &str, words: &str, figures: Vec<cra
 fn introduction(data: &Data, groups: &[Group<MissionRow>], pairing: &Pairing) -> String {
     let missions: usize = groups.iter().map(|g| g.rows.len()).sum();
     let goals: usize = groups.iter().map(|g| g.rows.iter().filter(|m| outcome::successful(m)).count()).sum();
-    let vehicles: std::collections::BTreeSet<&str> =
-        groups.iter().flat_map(|g| g.rows.iter().map(|m| m.vehicle.as_str())).collect();
+    let vehicles: BTreeSet<&str> = groups.iter().flat_map(|g| g.rows.iter().map(|m| m.vehicle.as_str())).collect();
     let variants = match data.missions.len() - missions {
         0 => String::new(),
         n => format!(" {} more belong to variants and are compared further below.", set::count(n)),
@@ -98,6 +99,20 @@ fn introduction(data: &Data, groups: &[Group<MissionRow>], pairing: &Pairing) ->
         set::count(goals),
         in_words(pairing),
     )
+}
+
+/// Every number of the plain runs: what was assumed stands beside what was measured or published.
+fn parameters(data: &Data) -> Option<TableBlock> {
+    let plain: BTreeSet<&str> =
+        data.missions.iter().filter(|m| m.variant.is_none()).map(|m| m.traverse_id.as_str()).collect();
+    let columns = [("run", ""), ("parameter", ""), ("value", ""), ("source", "")];
+    let mut numbers = Numbers::new("tables/parameters of the plain runs", &columns);
+    for row in data.parameters.iter().filter(|row| plain.contains(row.traverse_id.as_str())) {
+        let source = row.source.as_deref().unwrap_or("setting of the study");
+        numbers.row([text(&row.traverse_id), text(&row.parameter), text(&row.value), text(source)]);
+    }
+    let caption = "Every number of vehicle, surface, steering and rules, with its source".into();
+    (!numbers.rows.is_empty()).then(|| TableBlock { id: "run-parameters".into(), caption, numbers })
 }
 
 fn all(data: &Data) -> TableBlock {
