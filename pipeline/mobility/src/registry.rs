@@ -51,13 +51,20 @@ fn surface(material: &Material) -> Kind {
     Kind { family: "surface", kind: material.name, summary: material.summary, source: material.source, parameters }
 }
 
-/// The vehicle `kind` with `changes`: those of its parameters that differ from the data file, nested as there.
+/// A vehicle of the study's own: all of its parameters are given as changes.
+pub const CUSTOM: &str = "custom";
+
+/// The vehicle `kind` with `changes`: those of its parameters that differ from the data file, nested as there; a table of
+/// another `kind` (of suspension or drive) replaces the data file's. For [`CUSTOM`], all parameters.
 ///
 /// # Errors
-/// A [`ParameterError`] for an unknown vehicle, an unknown parameter, or a value out of range.
+/// A [`ParameterError`] for an unknown vehicle, an unknown or missing parameter, or a value out of range.
 pub fn vehicle(kind: &str, changes: &Map<String, Value>) -> Result<Vehicle, ParameterError> {
-    let entry = ENTRIES.iter().find(|e| e.kind == kind).ok_or_else(|| unknown(kind))?;
-    let mut parameters = entry.section("parameters");
+    let mut parameters = match ENTRIES.iter().find(|e| e.kind == kind) {
+        Some(entry) => entry.section("parameters"),
+        None if kind == CUSTOM => Value::Object(Map::new()),
+        None => return Err(unknown(kind)),
+    };
     merge(&mut parameters, changes);
     let parameters: VehicleParameters = read_parameters(&parameters).map_err(|e| e.within("vehicle_changes"))?;
     Vehicle::new(kind, parameters).map_err(|e| e.within("vehicle_changes"))
@@ -86,10 +93,9 @@ pub fn numbers(vehicle: &Vehicle, settings: &TraverseSettings) -> Vec<Number> {
         Number { parameter: format!("vehicle{path}"), value: value.to_string(), source: source.map(str::to_owned) }
     };
     let preset = settings.parameters().surface.preset.source();
-    let of_run = |(path, value): (String, Value)| Number {
-        source: (path == ".surface.preset").then(|| preset.to_owned()),
-        parameter: path.trim_start_matches('.').to_owned(),
-        value: value.to_string(),
+    let with_source = |number: Number| match number.parameter.as_str() {
+        "surface.preset" => Number { source: Some(preset.to_owned()), ..number },
+        _ => number,
     };
     let json = |value: Result<Value, _>| value.unwrap_or(Value::Null);
     let mut run = json(serde_json::to_value(settings.parameters()));
@@ -98,7 +104,17 @@ pub fn numbers(vehicle: &Vehicle, settings: &TraverseSettings) -> Vec<Number> {
         run.retain(|key, _| key != "vehicle" && key != "vehicle_changes");
     }
     let of_vehicle = leaves(&json(serde_json::to_value(vehicle.parameters())), "").into_iter().map(of_vehicle);
-    of_vehicle.chain(leaves(&run, "").into_iter().map(of_run)).collect()
+    of_vehicle.chain(stated("", &run).into_iter().map(with_source)).collect()
+}
+
+/// Settings without a source: all leaves of a JSON value but nulls, by dotted path below `prefix`.
+pub fn stated(prefix: &str, value: &Value) -> Vec<Number> {
+    let number = |(path, value): (String, Value)| Number {
+        parameter: path.trim_start_matches('.').to_owned(),
+        value: value.to_string(),
+        source: None,
+    };
+    leaves(value, prefix).into_iter().map(number).collect()
 }
 
 /// Dotted paths of all leaves but nulls, with their values.
@@ -120,7 +136,10 @@ fn same(a: &Value, b: &Value) -> bool {
 
 fn unknown(kind: &str) -> ParameterError {
     let known: Vec<String> = ENTRIES.iter().map(|e| format!("`{}`", e.kind)).collect();
-    ParameterError::new("vehicle", format!("`{kind}` is no vehicle; the known ones are {}", known.join(", ")))
+    let known = known.join(", ");
+    let message =
+        format!("`{kind}` is no vehicle; the known ones are {known}, and `custom` with all of its parameters");
+    ParameterError::new("vehicle", message)
 }
 
 impl Entry {
@@ -155,12 +174,19 @@ fn from_toml(item: &Item) -> Value {
     }
 }
 
+/// True when both name a `kind`, and not the same.
+fn of_another_kind(base: &Value, change: &Map<String, Value>) -> bool {
+    base.get("kind").zip(change.get("kind")).is_some_and(|(old, new)| old != new)
+}
+
 /// Lays `changes` over `base`, table by table.
 fn merge(base: &mut Value, changes: &Map<String, Value>) {
     let Value::Object(base) = base else { return };
     for (key, change) in changes {
         match (base.get_mut(key), change) {
-            (Some(below @ Value::Object(_)), Value::Object(change)) => merge(below, change),
+            (Some(below @ Value::Object(_)), Value::Object(change)) if !of_another_kind(below, change) => {
+                merge(below, change);
+            }
             _ => {
                 base.insert(key.clone(), change.clone());
             }
@@ -198,6 +224,17 @@ mod tests {
         assert_eq!(of("surface.wheel_friction"), Some(("1.0", false)));
         assert_eq!(of("surface.preset"), Some(("\"study\"", true)));
         assert_eq!(of("vehicle_changes.drive.torque_limit_n_m"), None);
+    }
+
+    /// A vehicle of the study's own drives like the shipped one with its numbers; a drive of another kind replaces the table.
+    #[test]
+    fn val_own_vehicles() {
+        let Value::Object(all) = ENTRIES[1].section("parameters") else { panic!() };
+        let own = vehicle(CUSTOM, &all).unwrap();
+        assert_eq!((own.name(), own.parameters()), ("custom", vehicle("ugv_4x4", &Map::new()).unwrap().parameters()));
+        assert!(vehicle(CUSTOM, &Map::new()).unwrap_err().message.contains("missing field"));
+        let drive = [("drive".to_owned(), all["drive"].clone())].into_iter().collect();
+        assert!(vehicle("husky_a200", &drive).is_ok());
     }
 
     #[test]

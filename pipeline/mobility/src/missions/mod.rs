@@ -12,7 +12,8 @@
 //! that its missions are what they would be alone, and where two accept the same draw they share the mission.
 //! [`ReplicateSettings`] perturbs the start of a drawn mission.
 //!
-//! Cost: one pass over the map and a few draws per mission; memory: four bytes per eligible cell.
+//! Cost: one pass over the map and a few draws per mission; memory: sixteen bytes per cell
+//! inside the border.
 
 mod difficulty;
 mod params;
@@ -104,8 +105,8 @@ pub enum MissionError {
     },
     /// No draw met the goal rule.
     #[error(
-        "find a goal for {mission_id}: {draws} draws from {starts} low-roughness cells met none at {length_m} m in low \
-         or semi roughness; raise `max_draws` or shorten `length_m`"
+        "find a goal for {mission_id}: {draws} draws met none of the {starts} low-roughness cells with a goal {length_m} m \
+         away in low or semi roughness; raise `max_draws` or shorten `length_m`"
     )]
     DrawsExhausted {
         /// Id of the mission.

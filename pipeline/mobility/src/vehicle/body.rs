@@ -35,6 +35,12 @@ impl Body {
         self.orientation = turned(self.orientation, scale(self.rate, step_s));
     }
 
+    /// False once a number has overflowed.
+    pub(crate) fn is_finite(&self) -> bool {
+        let vectors = self.position.iter().chain(&self.velocity).chain(&self.rate);
+        vectors.chain(&self.orientation).all(|v| v.is_finite())
+    }
+
     /// Axes of the body.
     pub(crate) fn axes(&self) -> Axes {
         Axes::of(self.orientation)

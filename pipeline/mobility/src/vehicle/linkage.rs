@@ -132,16 +132,16 @@ impl Linkage {
         Joints { position: vec![0.0; count], rate: vec![0.0; count] }
     }
 
-    /// No wheel's hub is ever farther from its place at rest, m.
+    /// How far a wheel's hub may be from its place at rest, m.
     pub(crate) fn travel_m(&self, hubs: &[Vec3]) -> f64 {
         match self {
             Self::Rigid => 0.0,
-            // A stop gives way; twice the travel is never reached.
+            // Stops are at least as stiff as the springs: twice the travel takes more than the vehicle's weight.
             Self::Independent { springs, .. } => 2.0 * springs.bump_m.max(springs.droop_m),
-            // Anywhere on the circles about both pivots.
+            // Anywhere on a circle about the bogie's pivot, itself anywhere on one about the rocker's.
             Self::RockerBogie { rocker, bogie, .. } => {
                 let from = |[x, z]: [f64; 2], hub: &Vec3| norm([hub[0] - x, 0.0, hub[2] - z]);
-                hubs.iter().map(|hub| 2.0 * (from(*rocker, hub) + from(*bogie, hub))).fold(0.0, f64::max)
+                hubs.iter().map(|hub| 2.0 * from(*rocker, hub) + 4.0 * from(*bogie, hub)).fold(0.0, f64::max)
             }
         }
     }

@@ -255,7 +255,8 @@ pub(crate) fn step_limit_s(vehicle: &Vehicle) -> f64 {
 }
 
 fn step_limit_of(mass: f64, stiffness: f64, damping: f64) -> f64 {
-    ((damping * damping + 4.0 * stiffness * mass).sqrt() - damping) / stiffness
+    // The root of the condition, written so that it neither cancels nor overflows to a limit that allows everything.
+    4.0 * mass / (damping + (damping * damping + 4.0 * stiffness * mass).sqrt())
 }
 
 /// Largest stable time step of a wheel between its tyre and its suspension, s; infinite without joints.
@@ -273,13 +274,13 @@ fn joint_step_limit_s(vehicle: &Vehicle) -> f64 {
             // The lightest turning part is a bogie with its two wheels.
             let [x, z] = joints.bogie_pivot_m;
             let wheels = &vehicle.parameters().wheels;
-            let arm_squared = |axle: usize| {
-                let (dx, dz) = (wheels.axles_m[axle] - x, wheels.axle_z_m - z);
-                dx * dx + dz * dz
+            let arms_squared = |below: f64| -> f64 {
+                let dz = wheels.axle_z_m - below - z;
+                wheels.axles_m[1..].iter().map(|axle| (axle - x) * (axle - x) + dz * dz).sum()
             };
-            let both = arm_squared(1) + arm_squared(2);
+            let (hubs, contacts) = (arms_squared(0.0), arms_squared(wheels.radius_m).max(arms_squared(0.0)));
             let (stop, friction) = (joints.stop_stiffness_n_m, joints.damping_n_m_s);
-            step_limit_of(wheel_kg * both, stiffness * both + stop, damping * both + friction)
+            step_limit_of(wheel_kg * hubs, stiffness * contacts + stop, damping * contacts + friction)
         }
     }
 }

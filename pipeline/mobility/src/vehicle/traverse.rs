@@ -24,6 +24,16 @@ pub enum TraverseError {
     /// The surface differs by roughness class, and the ground was prepared without classes.
     #[error("drive on a surface that differs by roughness class: the ground was prepared without a class map")]
     NoSurface,
+    /// The simulation of a vehicle with extreme numbers went beyond all bounds.
+    #[error(
+        "drive `{vehicle}`: its motion went beyond all bounds at {time_s} s; raise `step_rate_hz` or soften the vehicle"
+    )]
+    Diverged {
+        /// Name of the vehicle.
+        vehicle: String,
+        /// Time since the start, s.
+        time_s: f64,
+    },
     /// Start or goal is not a point.
     #[error("drive from {start_m:?} to {goal_m:?}: start and goal must be finite and apart")]
     NoLine {
@@ -34,7 +44,7 @@ pub enum TraverseError {
     },
 }
 
-/// Drives one mission. Time 0 is when the vehicle stands at rest on the start point, facing the goal.
+/// Drives one mission. Time 0 is when the vehicle stands at rest on the start point, facing along its heading.
 ///
 /// # Errors
 /// [`TraverseError`]; a vehicle that tips, sticks, leaves the terrain or runs out of time is an outcome, not an error.
@@ -55,10 +65,10 @@ pub fn drive(
     if !(length_m.is_finite() && length_m > 0.0 && mission.heading_rad.is_finite()) {
         return Err(TraverseError::NoLine { start_m, goal_m });
     }
-    Ok(match settled(ground, vehicle, settings, mission) {
+    match settled(ground, vehicle, settings, mission) {
         Some(simulation) => Run::new(simulation, ground, vehicle, settings, mission).finish(),
-        None => nowhere(vehicle, settings.parameters(), mission),
-    })
+        None => Ok(nowhere(vehicle, settings.parameters(), mission)),
+    }
 }
 
 /// The vehicle at rest on the start, wheels locked; `None` where the ground is undefined.
@@ -84,7 +94,8 @@ pub(crate) fn settled<'a>(
         simulation.step(&brakes);
     }
     simulation.zero_angles();
-    (!simulation.undefined).then_some(simulation)
+    // What is not finite any more is told by the run.
+    (!simulation.undefined || !simulation.body.is_finite()).then_some(simulation)
 }
 
 /// A vehicle whose suspension still moves is given this many times `settle_s` to come to rest.
@@ -209,12 +220,15 @@ impl<'a> Run<'a> {
     }
 
     /// Steps to the outcome.
-    fn finish(mut self) -> Recording {
+    fn finish(mut self) -> Result<Recording, TraverseError> {
         loop {
+            if !self.simulation.body.is_finite() {
+                return Err(TraverseError::Diverged { vehicle: self.vehicle.name().to_owned(), time_s: self.time_s() });
+            }
             self.on_clock();
             if let Some((kind, text)) = self.outcome() {
                 self.recording.events.push(Event { time_s: self.time_s(), kind, text });
-                return self.recording;
+                return Ok(self.recording);
             }
             let (command, steering) = (&self.controller.command, &self.simulation.steering);
             actuation::servos(self.vehicle, command, steering, &mut self.servos);

@@ -52,6 +52,8 @@ pub struct Lines {
     pub item: ItemRef,
     /// Random streams are named by this: the heightfield, or what it shares with others.
     pub word: String,
+    /// Rules of the draw.
+    pub settings: MissionSettings,
     /// Number of the replicates that share draws with this one, from 0.
     shared: Option<u64>,
 }
@@ -76,8 +78,10 @@ impl Lines {
 struct MissionsJob {
     heightfield: String,
     settings: MissionSettings,
-    cells: StartCells,
+    start_cells: StartCells,
     streams: Streams,
+    /// Cells of the heightfield.
+    cells: u64,
 }
 
 /// Adds the items of `[[missions]]`.
@@ -98,7 +102,8 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
         for (k, id) in envelope.terrains.iter().enumerate() {
             heightfields.extend(builder.family(&entry, &format!("terrains.{k}"), id)?);
         }
-        let lines: Vec<Lines> = heightfields.into_iter().map(|id| lines(builder, &envelope.id, id)).collect();
+        let lines: Vec<Lines> =
+            heightfields.into_iter().map(|id| lines(builder, &envelope.id, &settings, id)).collect();
         check_geometry(builder, &entry, &lines)?;
         for one in &lines {
             let words = format!("{}@{}", envelope.id, one.word);
@@ -107,8 +112,9 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
             let job = MissionsJob {
                 heightfield: one.heightfield.clone(),
                 settings: settings.clone(),
-                cells: if one.shared.is_some() { StartCells::All } else { StartCells::Low },
+                start_cells: if one.shared.is_some() { StartCells::All } else { StartCells::Low },
                 streams,
+                cells: builder.heightfields.get(&one.heightfield).map_or(0, |field| field.cells),
             };
             let parents = vec![roughness::item(&one.heightfield)];
             let item = one.item.clone();
@@ -121,12 +127,14 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
 }
 
 /// The missions of a heightfield: drawn by itself, or with the draws of the replicates of that number.
-fn lines(builder: &Builder<'_>, missions: &str, heightfield: String) -> Lines {
-    let replicate = builder.heightfields.get(&heightfield).and_then(|field| field.replicate);
-    let shared = replicate.filter(|_| builder.is_paired());
+fn lines(builder: &Builder<'_>, missions: &str, settings: &MissionSettings, heightfield: String) -> Lines {
+    // Draws can be shared only where the cells are known to be the same.
+    let known = builder.heightfields.get(&heightfield).filter(|field| builder.is_paired() && field.geometry.is_some());
+    let shared = known.and_then(|field| field.replicate);
     Lines {
         item: ItemRef::new(STAGE, &format!("{missions}@{heightfield}")),
         word: shared.map_or_else(|| heightfield.clone(), terrain::common),
+        settings: settings.clone(),
         shared,
         heightfield,
     }
@@ -149,7 +157,10 @@ fn check_geometry(builder: &Builder<'_>, entry: &Entry<'_>, lines: &[Lines]) -> 
 
 /// The sentence on two heightfields that cannot share missions.
 fn unlike((a, of_a): (&str, &Geometry), (b, of_b): (&str, &Geometry)) -> String {
-    let cells = |g: &Geometry| format!("{} x {} cells of {} x {} m", g.rows, g.cols, g.cell[0], g.cell[1]);
+    let cells = |g: &Geometry| {
+        let ([x, y], [dx, dy]) = (g.origin, g.cell);
+        format!("{} x {} cells of {dx} x {dy} m from ({x}, {y})", g.rows, g.cols)
+    };
     format!(
         "with `pairing = \"common\"` replicates with the same number share their draws, so their cells must be the same, \
          but \"{a}\" has {} and \"{b}\" {}; list them in [[missions]] of their own",
@@ -160,7 +171,7 @@ fn unlike((a, of_a): (&str, &Geometry), (b, of_b): (&str, &Geometry)) -> String 
 
 impl Job for MissionsJob {
     fn recipe(&self) -> Value {
-        json!({ "heightfield": self.heightfield, "missions": self.settings, "cells": self.cells })
+        json!({ "heightfield": self.heightfield, "missions": self.settings, "cells": self.start_cells })
     }
 
     fn rooms(&self) -> &'static [Room] {
@@ -168,7 +179,8 @@ impl Job for MissionsJob {
     }
 
     fn memory_bytes(&self) -> u64 {
-        128 << 20
+        // The class map, and the indices of its cells twice.
+        (64 << 20) + 17 * self.cells
     }
 
     fn estimate(&self) -> Estimate {
@@ -178,7 +190,7 @@ impl Job for MissionsJob {
     fn run(&self, work: &Work<'_>) -> Result<Outcome, JobError> {
         let path = work.parent(&roughness::item(&self.heightfield), roughness::CLASSES)?;
         let classes = dem::read_classes(&path).map_err(|e| input_error(&e))?;
-        let missions = draw_missions(&classes, &self.settings, self.cells, &self.streams)
+        let missions = draw_missions(&classes, &self.settings, self.start_cells, &self.streams)
             .map_err(|e| JobError::input(format!("cannot {e}")))?;
         let text = serde_json::to_vec(&missions).map_err(JobError::new)?;
         atomic::write(&work.output(MISSIONS), &text).map_err(JobError::new)?;

@@ -154,7 +154,7 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
                     release_path: format!("texture/{id}.tif"),
                     cells: base.as_ref().or(fill.as_ref()).map_or(draft.geometry().len() as u64, |(_, cells)| *cells),
                     cell_m: Some(draft.geometry().cell.into_iter().fold(f64::INFINITY, f64::min)),
-                    geometry: None,
+                    geometry: (base.is_none() && fill.is_none()).then(|| draft.geometry()),
                 };
                 let cells = field.cells;
                 let one_of_many = item.count.is_some_and(|count| count > 1);

@@ -11,7 +11,7 @@ use crate::study::{Entry, StudyError, keys};
 use rayon::prelude::*;
 use sastrugi_mobility::metrics::{Differentiator, MissionLabels, mission_row, replicate_row, sample_rows};
 use sastrugi_mobility::missions::{Difficulty, Mission, ReplicateParameters, ReplicateSettings};
-use sastrugi_mobility::registry::{Number, numbers};
+use sastrugi_mobility::registry::{Number, numbers, stated};
 use sastrugi_mobility::vehicle::{
     Ground, SurfaceLayers, SurfaceMap, TraverseError, TraverseParameters, TraverseSettings, Vehicle, drive,
 };
@@ -87,6 +87,8 @@ struct TraverseJob {
     variant: Option<String>,
     lines: Lines,
     heightfield: ItemRef,
+    /// Cells of the heightfield.
+    cells: u64,
     /// Draws the starts beside the first.
     streams: Streams,
 }
@@ -120,6 +122,11 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
             builder.claim(&entry, STAGE, &one.id)?;
             let (starts, raw) = split(&one.params).map_err(|e| entry.refuse(e))?;
             let (vehicle, settings) = raw.prepare().map_err(|e| entry.refuse(e))?;
+            if raw.goal_tolerance_m >= drawn.length_m {
+                let (tolerance_m, length_m) = (raw.goal_tolerance_m, drawn.length_m);
+                let message = format!("is {tolerance_m}; it must be below the missions' length of {length_m} m");
+                return Err(entry.refuse(ParameterError::new("goal_tolerance_m", message)).into());
+            }
             let starts = ReplicateSettings::new(starts, drawn.length_m).map_err(|e| entry.refuse(e))?;
             let drive = Drive {
                 id: one.id,
@@ -130,7 +137,7 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
                 rasters: rasters.clone(),
                 head: builder.study.head.clone(),
                 count: drawn.count,
-                seconds_each: drawn.length_m / raw.speed_m_s,
+                seconds_each: (drawn.length_m / raw.speed_m_s).min(raw.timeout_s),
             };
             drawn.lines.iter().try_for_each(|lines| add_one(builder, &entry, &envelope.id, &drive, lines))?;
         }
@@ -172,6 +179,7 @@ fn add_one(
         variant: joined(field.variant.as_deref(), drive.variant.as_deref()),
         lines: lines.clone(),
         heightfield: field.item.clone(),
+        cells: field.cells,
         streams,
         terrain,
     };
@@ -338,7 +346,10 @@ impl TraverseJob {
             value: number.value,
             source: number.source,
         };
-        numbers(&self.drive.vehicle, &self.drive.settings).into_iter().map(row).collect()
+        let Drive { vehicle, settings, starts, rasters, .. } = &self.drive;
+        let rasters = json!({ "wheel_friction_raster": rasters[0], "rolling_resistance_raster": rasters[1] });
+        let more = json!({ "starts": starts, "surface": rasters, "missions": self.lines.settings });
+        numbers(vehicle, settings).into_iter().chain(stated("", &more)).map(row).collect()
     }
 
     /// Samples for the assembly, which writes them again with the study's metadata.
@@ -393,10 +404,12 @@ impl Job for TraverseJob {
     }
 
     fn memory_bytes(&self) -> u64 {
-        // Terrain, classes and pyramid once; samples of every mission: 20 Hz, some 300 bytes each; rows of the starts.
-        let Drive { count, seconds_each, starts, .. } = &self.drive;
+        // Heights, ground with its bound, classes and rasters once; samples of every mission, some 700 bytes each with their
+        // wheels; rows of the starts.
+        let Drive { count, seconds_each, starts, settings, .. } = &self.drive;
         let rows = (count * starts.count()) as u64;
-        (256 << 20) + (*count as f64 * seconds_each * 20.0 * 300.0) as u64 + 400 * rows
+        let samples = *count as f64 * seconds_each * f64::from(settings.parameters().sample_rate_hz);
+        ((64 << 20) + 48 * self.cells).saturating_add((700.0 * samples) as u64).saturating_add(400 * rows)
     }
 
     fn estimate(&self) -> Estimate {

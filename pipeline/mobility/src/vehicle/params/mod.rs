@@ -112,7 +112,7 @@ impl VehicleParameters {
         self.tyre.check().map_err(|e| e.within("tyre"))?;
         self.belly.check().map_err(|e| e.within("belly"))?;
         let axles = self.wheels.axles_m.len();
-        self.suspension.check(axles).map_err(|e| e.within("suspension"))?;
+        self.suspension.check(&self.wheels.axles_m).map_err(|e| e.within("suspension"))?;
         self.drive.check(axles).map_err(|e| e.within("drive"))?;
         self.check_balance()
     }

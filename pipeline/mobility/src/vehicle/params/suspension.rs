@@ -53,16 +53,18 @@ pub struct RockerBogieParameters {
 }
 
 impl SuspensionParameters {
-    /// Checks every number, for a vehicle with that many axles.
-    pub(super) fn check(&self, axles: usize) -> Result<(), ParameterError> {
+    /// Checks every number, for a vehicle with axles there, front to rear.
+    pub(super) fn check(&self, axles_m: &[f64]) -> Result<(), ParameterError> {
         match self {
             Self::Rigid => Ok(()),
             Self::Independent(springs) => springs.check(),
-            Self::RockerBogie(_) if axles != 3 => {
-                let message = format!("is `rocker_bogie`, which needs 3 axles; the vehicle has {axles}");
-                Err(ParameterError::new("kind", message))
-            }
-            Self::RockerBogie(linkage) => linkage.check(),
+            Self::RockerBogie(linkage) => match axles_m {
+                &[front, middle, rear] => linkage.check([front, middle, rear]),
+                _ => {
+                    let message = format!("is `rocker_bogie`, which needs 3 axles; the vehicle has {}", axles_m.len());
+                    Err(ParameterError::new("kind", message))
+                }
+            },
         }
     }
 }
@@ -70,22 +72,33 @@ impl SuspensionParameters {
 impl IndependentParameters {
     fn check(&self) -> Result<(), ParameterError> {
         ParameterError::not_negative("damping_n_s_m", self.damping_n_s_m)?;
-        all_positive([
-            ("stiffness_n_m", self.stiffness_n_m),
-            ("bump_m", self.bump_m),
-            ("droop_m", self.droop_m),
-            ("stop_stiffness_n_m", self.stop_stiffness_n_m),
-        ])
+        all_positive([("stiffness_n_m", self.stiffness_n_m), ("bump_m", self.bump_m), ("droop_m", self.droop_m)])?;
+        if self.stop_stiffness_n_m.is_finite() && self.stop_stiffness_n_m >= self.stiffness_n_m {
+            return Ok(());
+        }
+        let message = format!(
+            "is {}; it must be at least the spring's stiffness of {} N/m",
+            self.stop_stiffness_n_m, self.stiffness_n_m
+        );
+        Err(ParameterError::new("stop_stiffness_n_m", message))
     }
 }
 
 impl RockerBogieParameters {
-    fn check(&self) -> Result<(), ParameterError> {
+    fn check(&self, [front, middle, rear]: [f64; 3]) -> Result<(), ParameterError> {
         self.rocker_pivot_m.into_iter().try_for_each(|v| finite("rocker_pivot_m", v))?;
         self.bogie_pivot_m.into_iter().try_for_each(|v| finite("bogie_pivot_m", v))?;
         ParameterError::between("rocker_limit_deg", self.rocker_limit_deg, 0.0, 90.0)?;
         ParameterError::between("bogie_limit_deg", self.bogie_limit_deg, 0.0, 90.0)?;
         ParameterError::not_negative("damping_n_m_s", self.damping_n_m_s)?;
-        ParameterError::positive("stop_stiffness_n_m", self.stop_stiffness_n_m).map(drop)
+        ParameterError::positive("stop_stiffness_n_m", self.stop_stiffness_n_m)?;
+        // Otherwise the linkage folds onto its stops under the vehicle's weight.
+        let (rocker, bogie) = (self.rocker_pivot_m[0], self.bogie_pivot_m[0]);
+        let between = |key: &str, x: f64, low: f64, high: f64, what: &str| {
+            let message = format!("x is {x}; it must lie between {what}, {low} to {high} m");
+            if x > low && x < high { Ok(()) } else { Err(ParameterError::new(key, message)) }
+        };
+        between("bogie_pivot_m", bogie, rear, middle, "the rear and the middle axle")?;
+        between("rocker_pivot_m", rocker, bogie, front, "the bogie pivot and the front axle")
     }
 }
