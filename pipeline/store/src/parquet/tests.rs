@@ -50,8 +50,8 @@ fn shown<R: Record>(rows: &[R]) -> Vec<String> {
 }
 
 /// Lists of no to six floats, of which some are NaN.
-fn lists() -> impl Strategy<Value = Vec<Vec<f64>>> {
-    let value = prop::option::of(any::<f64>()).prop_map(|v| v.unwrap_or(f64::NAN));
+fn lists(floats: impl Strategy<Value = f64>) -> impl Strategy<Value = Vec<Vec<f64>>> {
+    let value = prop::option::of(floats).prop_map(|v| v.unwrap_or(f64::NAN));
     prop::collection::vec(prop::collection::vec(value, 0..7), 1..200)
 }
 
@@ -87,7 +87,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(30))]
 
     #[test]
-    fn prop_lists_come_back(lists in lists()) {
+    fn prop_lists_come_back(lists in lists(any::<f64>())) {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("t.parquet");
         let rows = rows_of_lists(&lists);
@@ -98,8 +98,9 @@ proptest! {
         prop_assert_eq!(fs::read(path).unwrap(), fs::read(folder.path().join("u.parquet")).unwrap());
     }
 
+    /// JSON has no infinities: the floats are such that single precision has them.
     #[test]
-    fn prop_lists_pass_through_json(lists in lists()) {
+    fn prop_lists_pass_through_json(lists in lists(-1e38..1e38)) {
         let rows = rows_of_lists(&lists);
         let back: Vec<SampleRow> = serde_json::from_str(&serde_json::to_string(&rows).unwrap()).unwrap();
         prop_assert_eq!(shown(&back), shown(&rows));
