@@ -177,8 +177,30 @@ fn rows() -> Vec<SampleRow> {
             command_speed_m_s: 1.0,
             command_yaw_rate_deg_s: value(),
             class: Some(sample % 3),
+            cross_track_m: in_steps(value(), 4096.0),
+            heading_error_deg: in_steps(value(), 128.0),
+            distance_to_goal_m: in_steps(value(), 4096.0),
+            chassis_force_n: 0.0,
+            wheel_normal_force_n: wheels(&mut || in_steps(140.0 + 20.0 * value(), 32.0) as f32),
+            wheel_longitudinal_force_n: wheels(&mut || in_steps(10.0 * value(), 32.0) as f32),
+            wheel_lateral_force_n: wheels(&mut || in_steps(10.0 * value(), 32.0) as f32),
+            wheel_slip_ratio: wheels(&mut || in_steps(0.05 * value(), 4096.0) as f32),
+            wheel_spin_rad_s: wheels(&mut || in_steps(6.0 + 0.1 * value(), 4096.0) as f32),
+            wheel_torque_n_m: wheels(&mut || in_steps(2.0 * value(), 512.0) as f32),
+            wheel_steering_deg: wheels(&mut || 0.0),
+            wheel_contact_x_m: wheels(&mut || in_steps(value(), 16384.0)),
+            wheel_contact_y_m: wheels(&mut || in_steps(value(), 16384.0)),
+            wheel_contact_z_m: wheels(&mut || in_steps(value(), 16384.0)),
         })
         .collect()
+}
+
+fn wheels<T>(value: &mut dyn FnMut() -> T) -> Vec<T> {
+    (0..4).map(|_| value()).collect()
+}
+
+fn in_steps(value: f64, steps: f64) -> f64 {
+    (value * steps).round() / steps
 }
 
 fn write_rows(path: &Path, rows: &[SampleRow]) {
@@ -194,7 +216,7 @@ fn write_rows(path: &Path, rows: &[SampleRow]) {
 }
 
 /// Numbers of a row, bytes.
-const ROW_BYTES: u64 = 22 * 8;
+const ROW_BYTES: u64 = 26 * 8 + 4 * (7 * 4 + 3 * 8);
 
 #[divan::bench(sample_count = 10)]
 fn parquet_samples_100k(bencher: Bencher) {

@@ -1,19 +1,44 @@
 """Reads every Parquet table with pyarrow and duckdb.
 
-    python check_tables.py RELEASE    rows, columns, units, keys and content hashes against the manifest
+    python check_tables.py RELEASE    rows, columns, units, keys and content hashes against the manifest; the lists of table
+                                      `samples` against the recordings and the vehicle's weight
     python check_tables.py FILE...    figures of single files
 """
 
+import math
 import struct
 from pathlib import Path
 
 import duckdb
 import pyarrow as pa
 import pyarrow.parquet as pq
+from mcap.reader import make_reader
+from mcap_protobuf.decoder import DecoderFactory
 
 from common import ContentHash, expect, manifest, run
 
-TYPES = {"string": "text", "double": "f64", "int64": "i64", "bool": "bool"}
+TYPES = {
+    "string": "text",
+    "double": "f64",
+    "int64": "i64",
+    "bool": "bool",
+    "list<element: float>": "f32_list",
+    "list<element: double>": "f64_list",
+}
+# Columns of table `samples` beside the fields of /wheels and /command.
+SAME = {
+    "chassis_force_n", "wheel_normal_force_n", "wheel_longitudinal_force_n", "wheel_lateral_force_n", "wheel_slip_ratio",
+    "wheel_spin_rad_s", "wheel_torque_n_m", "cross_track_m", "distance_to_goal_m",
+}
+CONTACTS = ["wheel_contact_x_m", "wheel_contact_y_m", "wheel_contact_z_m"]
+ANGLES = {"wheel_steering_deg": "steering_rad", "heading_error_deg": "heading_error_rad"}
+# Half a step of 1/128 deg in the table and of 1/4096 rad in the recording.
+ANGLE_TOLERANCE_DEG = 0.5 / 128 + math.degrees(0.5 / 4096) + 1e-6
+# Every so many samples, a row is compared with the recording.
+ROW_STEP = 20
+HUSKY_WEIGHT_N = 56.58 * 9.80665
+# A vehicle that stands this upright carries its weight on the normal forces of its wheels.
+UPRIGHT_DEG = 2.0
 
 
 def encode(value):
@@ -26,6 +51,8 @@ def encode(value):
         return b"\1" + struct.pack("<Q", len(data)) + data
     if isinstance(value, float):
         return b"\2" + struct.pack("<d", value)
+    if isinstance(value, list):
+        return b"\5" + struct.pack("<Q", len(value)) + b"".join(map(encode, value))
     return b"\3" + struct.pack("<q", value)
 
 
@@ -46,16 +73,24 @@ def check_keys(path, table, keys):
     expect(all(a < b for a, b in zip(rows, rows[1:])), f"{path} is not sorted by its keys, or a key comes twice")
 
 
+def flat(column):
+    """The values of a column, those of lists one after the other, without nulls."""
+    values = column.to_pylist()
+    if pa.types.is_list(column.type):
+        values = [element for value in values for element in value]
+    return [value for value in values if value is not None]
+
+
 def check_sums(path, table):
-    """duckdb and pyarrow must see the same numbers of rows and values, and the same sums of integers and extremes."""
+    """duckdb and pyarrow must see the same numbers of rows and values, and the same extremes."""
     connection = duckdb.connect()
     source = f"read_parquet('{path}')"
     count = connection.execute(f"select count(*) from {source}").fetchone()[0]
     expect(count == table.num_rows, f"{path}: duckdb sees {count} rows, pyarrow {table.num_rows}")
     for field in table.schema:
-        found = connection.execute(f'select count("{field.name}"), min("{field.name}"), max("{field.name}") from {source}')
-        column = table.column(field.name)
-        values = [v for v in column.to_pylist() if v is not None]
+        column = f'unnest("{field.name}")' if pa.types.is_list(field.type) else f'"{field.name}"'
+        found = connection.execute(f"select count(v), min(v), max(v) from (select {column} as v from {source})")
+        values = flat(table.column(field.name))
         expected = (len(values), min(values, default=None), max(values, default=None))
         expect(found.fetchone() == expected, f"{path}: duckdb and pyarrow differ on column {field.name}")
 
@@ -75,8 +110,7 @@ def figures(path):
         expect(field.metadata and b"unit" in field.metadata, f"{path}: column {field.name} has no unit")
         expect(field.metadata.get(b"description"), f"{path}: column {field.name} has no description")
         columns[field.name] = {"type": TYPES[str(field.type)], "unit": field.metadata[b"unit"].decode()}
-    floats = [f.name for f in table.schema if pa.types.is_floating(f.type)]
-    nans = [f for f in floats if any(v != v for v in table.column(f).to_pylist() if v is not None)]
+    nans = [f.name for f in table.schema if any(v != v for v in flat(table.column(f.name)))]
     expect(not nans, f"{path}: columns {nans} hold NaN instead of null")
     keys = [f.name for f in table.schema if not f.nullable]
     check_keys(path, table, keys)
@@ -97,6 +131,7 @@ def check_release(release):
     expect(report, f"{release} holds no table")
     for table in {figures["table"] for figures in report.values()}:
         check_parts(release, table, report)
+    check_samples(release)
     return report
 
 
@@ -106,6 +141,67 @@ def check_parts(release, table, report):
     rows = duckdb.connect().execute(f"select count(*) from read_parquet('{parts}')").fetchone()[0]
     expected = sum(figures["rows"] for figures in report.values() if figures["table"] == table)
     expect(rows == expected, f"table {table}: duckdb sees {rows} rows in all parts, not {expected}")
+
+
+def check_samples(release):
+    """Rows of the first mission of every terrain against its recording, and of all missions at rest against the weight."""
+    files = sorted((release / "tables" / "missions").glob("*.parquet"))
+    missions = {(m["terrain_id"], m["mission_id"]): m for file in files for m in pq.read_table(file).to_pylist()}
+    compared = set()
+    for file in sorted((release / "tables" / "samples").glob("*.parquet")):
+        samples = {}
+        for row in pq.read_table(file).to_pylist():
+            samples.setdefault((row["terrain_id"], row["mission_id"]), []).append(row)
+        for key, rows in samples.items():
+            mission = missions[key]
+            check_weight(file, mission, rows[0])
+            if mission["path"] and key[0] not in compared:
+                compared.add(key[0])
+                check_recording(release / mission["path"], rows)
+
+
+def check_weight(file, mission, row):
+    """At rest and upright, the normal forces carry the vehicle."""
+    upright = max(abs(row["roll_deg"]), abs(row["pitch_deg"])) < UPRIGHT_DEG
+    if mission["vehicle"] == "husky_a200" and upright and row["chassis_force_n"] == 0:
+        force = sum(row["wheel_normal_force_n"])
+        expect(
+            abs(force / HUSKY_WEIGHT_N - 1) < 0.01,
+            f"{file}: the normal forces of {row['mission_id']} at rest sum to {force} N, the weight is {HUSKY_WEIGHT_N} N",
+        )
+
+
+def check_recording(path, rows):
+    """Every so many rows equal the messages of their instant."""
+    with open(path, "rb") as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        topics = {"/wheels": [], "/command": []}
+        for _, channel, _, message in reader.iter_decoded_messages(topics=list(topics)):
+            topics[channel.topic].append(message)
+    for topic, messages in topics.items():
+        expect(len(messages) == len(rows), f"{path}: {len(messages)} messages {topic}, table samples has {len(rows)} rows")
+    for row, wheels, command in list(zip(rows, *topics.values()))[::ROW_STEP]:
+        check_row(path, row, wheels, command)
+
+
+def check_row(path, row, wheels, command):
+    def recorded(name):
+        name = name.removeprefix("wheel_")
+        value = getattr(wheels, name) if hasattr(wheels, name) else getattr(command, name)
+        return list(value) if hasattr(value, "append") else value
+
+    def same(name, equal):
+        expect(equal, f"{path}: sample {row['sample']} has {name} {row[name]}, the recording {recorded(name)}")
+
+    for name in SAME:
+        same(name, row[name] == recorded(name))
+    for name in CONTACTS:
+        points = [0 if force == 0 and value is None else value for value, force in zip(row[name], row["wheel_normal_force_n"])]
+        same(name, points == recorded(name))
+    for name, field in ANGLES.items():
+        here, there = (v if isinstance(v, list) else [v] for v in (row[name], recorded(field)))
+        close = [abs(a - math.degrees(b)) <= ANGLE_TOLERANCE_DEG for a, b in zip(here, there, strict=True)]
+        expect(all(close), f"{path}: sample {row['sample']} has {name} {here}, the recording {field} {there}")
 
 
 def check_files(paths):

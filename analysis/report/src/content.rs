@@ -177,13 +177,27 @@ fn value(cell: &Cell) -> Value {
         Cell::F64(v) => json!(v),
         Cell::I64(v) => json!(v),
         Cell::Bool(v) => json!(v),
+        Cell::F32List(v) => list(v.iter().map(|v| f64::from(*v))),
+        Cell::F64List(v) => list(v.iter().copied()),
     }
+}
+
+/// Floats as an array; what is not finite is null.
+fn list(values: impl Iterator<Item = f64>) -> Value {
+    values.map(|v| value(&number(v))).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use sastrugi_schemas::tables::PsdRow;
+
+    #[test]
+    fn val_lists_are_arrays_with_null_for_what_is_absent() {
+        assert_eq!(value(&Cell::F32List(vec![0.5, f32::NAN])), json!([0.5, null]));
+        assert_eq!(value(&Cell::F64List(vec![f64::INFINITY, -2.25])), json!([null, -2.25]));
+        assert_eq!(value(&Cell::F64List(vec![])), json!([]));
+    }
 
     #[test]
     fn val_slugs_are_file_names() {

@@ -40,7 +40,7 @@ use serde::Serialize;
 
 /// Storage type of a column. Every column may hold nulls except key columns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
+#[serde(rename_all = "snake_case")]
 pub enum ColumnType {
     /// UTF-8.
     Text,
@@ -50,6 +50,10 @@ pub enum ColumnType {
     I64,
     /// Boolean.
     Bool,
+    /// List of 32-bit floats, whose elements may be null.
+    F32List,
+    /// List of 64-bit floats, whose elements may be null.
+    F64List,
 }
 
 /// One column: part of the contract with readers.
@@ -117,6 +121,10 @@ pub enum Cell {
     I64(i64),
     /// Boolean.
     Bool(bool),
+    /// List of 32-bit floats. An element that is NaN is stored as null.
+    F32List(Vec<f32>),
+    /// List of 64-bit floats. An element that is NaN is stored as null.
+    F64List(Vec<f64>),
 }
 
 /// A row type.
@@ -179,6 +187,24 @@ impl CellType for bool {
         if let Cell::Bool(v) = cell { Some(v) } else { None }
     }
 }
+impl CellType for Vec<f32> {
+    const TYPE: ColumnType = ColumnType::F32List;
+    fn to_cell(&self) -> Cell {
+        Cell::F32List(self.clone())
+    }
+    fn from_cell(cell: Cell) -> Option<Self> {
+        if let Cell::F32List(v) = cell { Some(v) } else { None }
+    }
+}
+impl CellType for Vec<f64> {
+    const TYPE: ColumnType = ColumnType::F64List;
+    fn to_cell(&self) -> Cell {
+        Cell::F64List(self.clone())
+    }
+    fn from_cell(cell: Cell) -> Option<Self> {
+        if let Cell::F64List(v) = cell { Some(v) } else { None }
+    }
+}
 impl<T: CellType> CellType for Option<T> {
     const TYPE: ColumnType = T::TYPE;
     fn to_cell(&self) -> Cell {
@@ -215,6 +241,18 @@ pub(crate) mod nan_as_null {
             field.unwrap_or(f64::NAN)
         }
     }
+    macro_rules! as_list {
+        ($($t:ty),*) => {$(impl AsField for Vec<$t> {
+            type Field = Vec<Option<$t>>;
+            fn as_field(&self) -> Vec<Option<$t>> {
+                self.iter().map(|v| (!v.is_nan()).then_some(*v)).collect()
+            }
+            fn from_field(field: Vec<Option<$t>>) -> Self {
+                field.into_iter().map(|v| v.unwrap_or(<$t>::NAN)).collect()
+            }
+        })*};
+    }
+    as_list!(f32, f64);
     macro_rules! as_itself {
         ($($t:ty),*) => {$(impl AsField for $t {
             type Field = $t;

@@ -1,7 +1,11 @@
 //! Table `samples`.
+//!
+//! Forces and the controller's state are quantised as in the topics `/wheels` and `/command`: finer than any sensor's noise,
+//! and short to compress.
 
 super::table! {
-    /// One row per recorded instant of a mission: the base_link frame in the map frame.
+    /// One row per recorded instant of a mission: base_link in the map frame, the commands, the wheels. A list has one value
+    /// per wheel, in the order of the vehicle's wheels: axle by axle from the front, left before right.
     "samples" SampleRow {
         keys {
             /// Id of the terrain.
@@ -51,5 +55,33 @@ super::table! {
         command_yaw_rate_deg_s: f64 ["deg/s"],
         /// Roughness class code under base_link (0 low, 1 semi, 2 high); null outside of the map.
         class: Option<i64> [""],
+        /// Distance from the mission line, left positive, in steps of 1/4096.
+        cross_track_m: f64 ["m"],
+        /// Bearing of the controller's look-ahead point relative to the vehicle, in steps of 1/128.
+        heading_error_deg: f64 ["deg"],
+        /// Distance to the goal, in steps of 1/4096.
+        distance_to_goal_m: f64 ["m"],
+        /// Size of the force of the ground on the chassis, in steps of 1/32.
+        chassis_force_n: f64 ["N"],
+        /// Force of the ground on each wheel along the contact normal, 0 without contact, in steps of 1/32.
+        wheel_normal_force_n: Vec<f32> ["N"],
+        /// Force of the ground on each wheel along its rolling direction, in steps of 1/32.
+        wheel_longitudinal_force_n: Vec<f32> ["N"],
+        /// Force of the ground on each wheel across its rolling direction, left positive, in steps of 1/32.
+        wheel_lateral_force_n: Vec<f32> ["N"],
+        /// Slip ratio of each wheel: rim speed less ground speed over the larger of the two, in steps of 1/4096.
+        wheel_slip_ratio: Vec<f32> ["1"],
+        /// Spin of each wheel, in steps of 1/4096.
+        wheel_spin_rad_s: Vec<f32> ["rad/s"],
+        /// Drive torque on each wheel, in steps of 1/512.
+        wheel_torque_n_m: Vec<f32> ["N m"],
+        /// Steering angle of each wheel about the body's z axis, left positive, in steps of 1/128.
+        wheel_steering_deg: Vec<f32> ["deg"],
+        /// Easting of each wheel's contact point, to 0.1 mm; null without contact.
+        wheel_contact_x_m: Vec<f64> ["m"],
+        /// Northing of each wheel's contact point, to 0.1 mm; null without contact.
+        wheel_contact_y_m: Vec<f64> ["m"],
+        /// Height of each wheel's contact point, to 0.1 mm; null without contact.
+        wheel_contact_z_m: Vec<f64> ["m"],
     }
 }

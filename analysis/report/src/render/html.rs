@@ -191,7 +191,14 @@ fn cell((cell, decimals): (&Cell, &Option<usize>)) -> String {
         }
         Cell::I64(v) => format!("<td class=\"n\">{v}</td>"),
         Cell::Bool(v) => format!("<td>{}</td>", if *v { "yes" } else { "no" }),
+        Cell::F32List(v) => list(v.iter().map(|v| f64::from(*v))),
+        Cell::F64List(v) => list(v.iter().copied()),
     }
+}
+
+fn list(values: impl Iterator<Item = f64>) -> String {
+    let figure = |v: f64| if v.is_finite() { number::plain(v, 4) } else { number::ABSENT.to_owned() };
+    format!("<td>{}</td>", values.map(figure).collect::<Vec<_>>().join(", "))
 }
 
 #[cfg(test)]

@@ -339,6 +339,20 @@ fn missions(data: &mut Data, shelf: &mut Shelf, terrain_id: &str, g: usize, terr
                 command_speed_m_s: 1.0,
                 command_yaw_rate_deg_s: 0.0,
                 class: Some(i64::from((libm::sin(21.0 * t) > 0.4) as i32 + (libm::sin(21.0 * t) > 0.93) as i32)),
+                cross_track_m: wiggle,
+                heading_error_deg: 0.0,
+                distance_to_goal_m: reached * (1.0 - t),
+                chassis_force_n: 0.0,
+                wheel_normal_force_n: vec![],
+                wheel_longitudinal_force_n: vec![],
+                wheel_lateral_force_n: vec![],
+                wheel_slip_ratio: vec![],
+                wheel_spin_rad_s: vec![],
+                wheel_torque_n_m: vec![],
+                wheel_steering_deg: vec![],
+                wheel_contact_x_m: vec![],
+                wheel_contact_y_m: vec![],
+                wheel_contact_z_m: vec![],
             });
         }
     }

@@ -4,7 +4,19 @@ use super::{Differentiator, EulerAngles, Metrics};
 use crate::missions::{Difficulty, Mission, class_at};
 use sastrugi_numeric::Grid;
 use sastrugi_schemas::tables::{MissionRow, ReplicateRow, SampleRow};
-use sastrugi_schemas::topics::{CommandSample, EventKind, Recording, StateSample};
+use sastrugi_schemas::topics::{CommandSample, EventKind, Recording, StateSample, WheelSample, WheelState};
+
+/// Steps per unit of what the tables hold about wheels and controller, as in the topics `/wheels` and `/command`: finer than
+/// any sensor's noise, and short to compress. Rates, ratios and distances.
+const FINE: f64 = 4096.0;
+/// Torques.
+const MEDIUM: f64 = 512.0;
+/// Angles, in degrees: half of the topics' step.
+const DEGREES: f64 = 128.0;
+/// Forces.
+const COARSE: f64 = 32.0;
+/// Coordinates of contact points.
+const CONTACT: f64 = 16384.0;
 
 /// What the tables say about a mission beside what happened in it.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -111,22 +123,49 @@ pub fn progress_m(mission: &Mission, recording: &Recording) -> f64 {
 /// under base_link.
 pub fn sample_rows(terrain_id: &str, mission: &Mission, recording: &Recording, classes: &Grid<u8>) -> Vec<SampleRow> {
     let mission_id = mission.id();
-    let commands = recording.commands.iter().map(Some).chain(std::iter::repeat(None));
-    let row = |(sample, (state, command)): (usize, (&StateSample, Option<&CommandSample>))| {
+    let row = |(sample, state): (usize, &StateSample)| {
         let class = class_at(classes, state.position_m[0], state.position_m[1]).map(|class| class as i64);
-        sample_row(terrain_id, &mission_id, sample as i64, state, command, class)
+        let instant = Instant { state, command: recording.commands.get(sample), wheels: recording.wheels.get(sample) };
+        sample_row(terrain_id, &mission_id, sample as i64, instant, class)
     };
-    recording.states.iter().zip(commands).enumerate().map(row).collect()
+    recording.states.iter().enumerate().map(row).collect()
 }
 
-fn sample_row(
-    terrain_id: &str,
-    mission_id: &str,
-    sample: i64,
-    state: &StateSample,
-    command: Option<&CommandSample>,
-    class: Option<i64>,
-) -> SampleRow {
+/// What a recording holds of one instant.
+struct Instant<'a> {
+    state: &'a StateSample,
+    command: Option<&'a CommandSample>,
+    wheels: Option<&'a WheelSample>,
+}
+
+impl Instant<'_> {
+    /// A figure of the controller in steps; NaN where there is none.
+    fn controller(&self, steps: f64, figure: fn(&CommandSample) -> f64) -> f64 {
+        self.command.map_or(f64::NAN, |c| in_steps(figure(c), steps))
+    }
+
+    fn of_wheels<T>(&self, figure: impl Fn(&WheelState) -> T) -> Vec<T> {
+        self.wheels.map_or_else(Vec::new, |sample| sample.wheels.iter().map(figure).collect())
+    }
+
+    /// A figure of every wheel in steps.
+    fn wheels(&self, steps: f64, figure: fn(&WheelState) -> f64) -> Vec<f32> {
+        self.of_wheels(|w| in_steps(figure(w), steps) as f32)
+    }
+
+    /// A coordinate of every wheel's contact point; NaN without contact.
+    fn contacts(&self, axis: usize) -> Vec<f64> {
+        self.of_wheels(|w| if w.normal_force_n == 0.0 { f64::NAN } else { in_steps(w.contact_m[axis], CONTACT) })
+    }
+}
+
+/// The nearest whole step; zero is positive.
+fn in_steps(value: f64, steps: f64) -> f64 {
+    (value * steps).round() / steps + 0.0
+}
+
+fn sample_row(terrain_id: &str, mission_id: &str, sample: i64, instant: Instant<'_>, class: Option<i64>) -> SampleRow {
+    let Instant { state, command, wheels } = instant;
     let angles = EulerAngles::of(state.orientation);
     let [qx, qy, qz, qw] = state.orientation;
     let [x_m, y_m, z_m] = state.position_m;
@@ -156,5 +195,19 @@ fn sample_row(
         command_speed_m_s: command.map_or(f64::NAN, |c| c.speed_m_s),
         command_yaw_rate_deg_s: command.map_or(f64::NAN, |c| c.yaw_rate_rad_s.to_degrees()),
         class,
+        cross_track_m: instant.controller(FINE, |c| c.cross_track_m),
+        heading_error_deg: instant.controller(DEGREES, |c| c.heading_error_rad.to_degrees()),
+        distance_to_goal_m: instant.controller(FINE, |c| c.distance_to_goal_m),
+        chassis_force_n: wheels.map_or(f64::NAN, |w| in_steps(w.chassis_force_n, COARSE)),
+        wheel_normal_force_n: instant.wheels(COARSE, |w| w.normal_force_n),
+        wheel_longitudinal_force_n: instant.wheels(COARSE, |w| w.longitudinal_force_n),
+        wheel_lateral_force_n: instant.wheels(COARSE, |w| w.lateral_force_n),
+        wheel_slip_ratio: instant.wheels(FINE, |w| w.slip_ratio),
+        wheel_spin_rad_s: instant.wheels(FINE, |w| w.spin_rad_s),
+        wheel_torque_n_m: instant.wheels(MEDIUM, |w| w.torque_n_m),
+        wheel_steering_deg: instant.wheels(DEGREES, |w| w.steering_rad.to_degrees()),
+        wheel_contact_x_m: instant.contacts(0),
+        wheel_contact_y_m: instant.contacts(1),
+        wheel_contact_z_m: instant.contacts(2),
     }
 }

@@ -1,6 +1,6 @@
 use super::*;
 use proptest::prelude::*;
-use sastrugi_schemas::tables::{self, CovarianceRow, PsdRow};
+use sastrugi_schemas::tables::{self, CovarianceRow, PsdRow, SampleRow};
 use std::fs;
 
 fn metadata() -> TableMetadata {
@@ -27,7 +27,35 @@ fn row(fit: u32, bin: i64, value: f64) -> CovarianceRow {
     }
 }
 
-fn write(path: &Path, rows: &[CovarianceRow]) -> TableSummary {
+/// A row of a table with lists, each of them these values.
+fn row_of_lists(number: i64, values: &[f64]) -> SampleRow {
+    let cell = |column: &Column| match column.column_type {
+        ColumnType::Text => Cell::Text("a".to_owned()),
+        ColumnType::F64 => Cell::F64(number as f64),
+        ColumnType::I64 => Cell::I64(number),
+        ColumnType::Bool => Cell::Bool(true),
+        ColumnType::F32List => Cell::F32List(values.iter().map(|v| *v as f32).collect()),
+        ColumnType::F64List => Cell::F64List(values.to_vec()),
+    };
+    SampleRow::from_cells(SampleRow::TABLE.columns.iter().map(cell).collect()).unwrap()
+}
+
+fn rows_of_lists(lists: &[Vec<f64>]) -> Vec<SampleRow> {
+    lists.iter().zip(0..).map(|(values, number)| row_of_lists(number, values)).collect()
+}
+
+/// The values of rows as text: unlike a comparison of floats, it finds NaN equal to itself.
+fn shown<R: Record>(rows: &[R]) -> Vec<String> {
+    rows.iter().map(|row| format!("{:?}", row.cells())).collect()
+}
+
+/// Lists of no to six floats, of which some are NaN.
+fn lists(floats: impl Strategy<Value = f64>) -> impl Strategy<Value = Vec<Vec<f64>>> {
+    let value = prop::option::of(floats).prop_map(|v| v.unwrap_or(f64::NAN));
+    prop::collection::vec(prop::collection::vec(value, 0..7), 1..200)
+}
+
+fn write<R: Record>(path: &Path, rows: &[R]) -> TableSummary {
     let mut writer = TableWriter::create(path, &metadata()).unwrap();
     rows.iter().for_each(|row| writer.push(row).unwrap());
     writer.finish().unwrap()
@@ -56,6 +84,46 @@ proptest! {
 }
 
 proptest! {
+    #![proptest_config(ProptestConfig::with_cases(30))]
+
+    #[test]
+    fn prop_lists_come_back(lists in lists(any::<f64>())) {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("t.parquet");
+        let rows = rows_of_lists(&lists);
+        let summary = write(&path, &rows);
+        let back: Vec<SampleRow> = read_table(&path).unwrap();
+        prop_assert_eq!(shown(&back), shown(&rows));
+        prop_assert_eq!(write(&folder.path().join("u.parquet"), &back), summary);
+        prop_assert_eq!(fs::read(path).unwrap(), fs::read(folder.path().join("u.parquet")).unwrap());
+    }
+
+    /// JSON has no infinities: the floats are such that single precision has them.
+    #[test]
+    fn prop_lists_pass_through_json(lists in lists(-1e38..1e38)) {
+        let rows = rows_of_lists(&lists);
+        let back: Vec<SampleRow> = serde_json::from_str(&serde_json::to_string(&rows).unwrap()).unwrap();
+        prop_assert_eq!(shown(&back), shown(&rows));
+    }
+}
+
+/// The same elements in other lists, and an absent element, are other content.
+#[test]
+fn val_content_tells_where_lists_end() {
+    let folder = tempfile::tempdir().unwrap();
+    let content = |lists: &[Vec<f64>]| write(&folder.path().join("t.parquet"), &rows_of_lists(lists)).content_sha256;
+    let found = [
+        content(&[vec![1.0, 2.0], vec![]]),
+        content(&[vec![1.0], vec![2.0]]),
+        content(&[vec![], vec![1.0, 2.0]]),
+        content(&[vec![1.0], vec![f64::NAN]]),
+        content(&[vec![1.0], vec![]]),
+    ];
+    let different: std::collections::BTreeSet<_> = found.iter().collect();
+    assert_eq!(different.len(), found.len());
+}
+
+proptest! {
     #![proptest_config(ProptestConfig::with_cases(600))]
 
     #[test]
@@ -64,29 +132,50 @@ proptest! {
         bytes in prop::collection::vec(any::<u8>(), 1..5),
         cut in any::<Option<prop::sample::Index>>(),
     ) {
-        let mut file = sample().to_vec();
-        let at = at.index(file.len());
-        let end = (at + bytes.len()).min(file.len());
-        file[at..end].copy_from_slice(&bytes[..end - at]);
-        if let Some(cut) = cut {
-            file.truncate(cut.index(file.len()));
-        }
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("t.parquet");
-        fs::write(&path, file).unwrap();
+        fs::write(&path, damaged(sample(), at, &bytes, cut)).unwrap();
         let _ = read_table::<CovarianceRow>(&path);
+        fs::write(&path, damaged(sample_of_lists(), at, &bytes, cut)).unwrap();
+        let _ = read_table::<SampleRow>(&path);
     }
+}
+
+/// A file with some bytes exchanged, and its end cut off.
+fn damaged(file: &[u8], at: prop::sample::Index, bytes: &[u8], cut: Option<prop::sample::Index>) -> Vec<u8> {
+    let mut file = file.to_vec();
+    let at = at.index(file.len());
+    let end = (at + bytes.len()).min(file.len());
+    file[at..end].copy_from_slice(&bytes[..end - at]);
+    if let Some(cut) = cut {
+        file.truncate(cut.index(file.len()));
+    }
+    file
 }
 
 fn sample() -> &'static [u8] {
     static SAMPLE: std::sync::OnceLock<Vec<u8>> = std::sync::OnceLock::new();
     SAMPLE.get_or_init(|| {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("t.parquet");
         let rows: Vec<_> = (0..200).map(|n| row(n / 40, i64::from(n % 40), f64::from(n).sqrt())).collect();
-        write(&path, &rows);
-        fs::read(path).unwrap()
+        written(&rows)
     })
+}
+
+fn sample_of_lists() -> &'static [u8] {
+    static SAMPLE: std::sync::OnceLock<Vec<u8>> = std::sync::OnceLock::new();
+    SAMPLE.get_or_init(|| {
+        let value = |n: i64| if n % 7 == 0 { f64::NAN } else { n as f64 };
+        let rows: Vec<_> =
+            (0..200).map(|n| row_of_lists(n, &[value(n), value(3 * n + 1)][..(n % 3) as usize])).collect();
+        written(&rows)
+    })
+}
+
+fn written<R: Record>(rows: &[R]) -> Vec<u8> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("t.parquet");
+    write(&path, rows);
+    fs::read(path).unwrap()
 }
 
 #[test]
