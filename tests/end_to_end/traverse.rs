@@ -328,6 +328,28 @@ fn val_a_raster_of_friction_stops_the_vehicle() {
     }
 }
 
+/// A vehicle file of the user's own drives as the shipped vehicle whose numbers it has; one without its table is refused.
+#[test]
+fn val_a_vehicle_of_ones_own() {
+    let folder = area();
+    let dem = write(folder.path(), "dem.asc", &ascii(0.1, |row, col| 0.02 * f64::from(row % 5 + col % 7)));
+    let shipped = sastrugi_fixtures::workspace_root().join("pipeline/mobility/src/vehicle/models/husky_a200.toml");
+    write(folder.path(), "mine.toml", &fs::read_to_string(shipped).unwrap());
+    let short = ["--set-missions", "length_m=3.0", "--set-missions", "border_m=1.5", "--missions", "2"];
+    let outcomes = |vehicle: &str| -> Vec<String> {
+        let (code, said) = drive(folder.path(), &dem, &[&short[..], &["--vehicle", vehicle]].concat());
+        assert_eq!(code, 0, "{said}");
+        let driven = rows(&folder.path().join("drive"), "missions");
+        fs::remove_dir_all(folder.path().join("drive")).unwrap();
+        driven.iter().map(|row| of(row, &["outcome", "time_s", "rms_roll_rate_deg_s"])).collect()
+    };
+    let mine = folder.path().join("mine.toml");
+    assert_eq!(outcomes("husky_a200"), outcomes(mine.to_str().unwrap()));
+    write(folder.path(), "mine.toml", "[chassis]\nmass_kg = 1\n");
+    let (code, said) = drive(folder.path(), &dem, &["--vehicle", mine.to_str().unwrap()]);
+    assert!(code == 2 && said.contains("no table [parameters]"), "{code} {said}");
+}
+
 /// A mission across cells without data ends there; the others arrive.
 #[test]
 fn val_a_gap_ends_a_mission() {

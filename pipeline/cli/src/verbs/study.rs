@@ -45,7 +45,8 @@ pub fn merge(args: &Merge, common: &Common) -> Verdict {
 pub fn traverse(args: &Traverse, common: &Common) -> Verdict {
     let mut missions = json!({ "count": args.missions });
     parameters::assign(&mut missions, &args.set_missions)?;
-    let mut parameters = json!({ "vehicle": args.vehicle });
+    let mut parameters = json!({});
+    parameters::assign_vehicle(&mut parameters, &args.vehicle)?;
     if let Some(replicates) = args.replicates {
         parameters["replicates"] = json!(replicates);
     }

@@ -15,7 +15,7 @@ use serde_json::{Map, Value};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct TraverseParameters {
-    /// Kind of vehicle (see `sastrugi kinds`).
+    /// Kind of vehicle (see `sastrugi kinds`), or `custom`: then `vehicle_changes` holds all parameters.
     pub vehicle: String,
     /// Vehicle parameters that differ from its data file, as `{ drive = { torque_limit_n_m = 30 } }`.
     pub vehicle_changes: Map<String, Value>,

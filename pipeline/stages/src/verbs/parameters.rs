@@ -3,6 +3,7 @@
 use crate::error::Error;
 use crate::study::keys;
 use crate::study::text::{StudyText, value_to_json};
+use sastrugi_mobility::registry::CUSTOM;
 use sastrugi_schemas::Kind;
 use serde_json::{Map, Value};
 
@@ -19,6 +20,27 @@ pub fn assign(params: &mut Value, pairs: &[String]) -> Result<(), Error> {
         place(params, name.trim(), parse_value(pair, text.trim())?)?;
     }
     Ok(())
+}
+
+/// The vehicle of a run: the name of a known one, or a file like the shipped ones (`.toml`), whose table `[parameters]` is a
+/// vehicle of the user's own.
+///
+/// # Errors
+/// A file that cannot be read, is no TOML, or has no such table.
+pub fn assign_vehicle(params: &mut Value, vehicle: &str) -> Result<(), Error> {
+    if !vehicle.ends_with(".toml") {
+        return place(params, "vehicle", Value::from(vehicle));
+    }
+    let text = std::fs::read_to_string(vehicle).map_err(|e| Error::Input(format!("{vehicle}: {e}")))?;
+    let parsed = StudyText::parse(&text).and_then(|text| text.to_json());
+    let file = parsed.map_err(|e| Error::Usage(format!("{vehicle}: {e}")))?;
+    match file.get("parameters") {
+        Some(parameters @ Value::Object(_)) => {
+            place(params, "vehicle", Value::from(CUSTOM))?;
+            place(params, "vehicle_changes", parameters.clone())
+        }
+        _ => Err(Error::Usage(format!("{vehicle}: it has no table [parameters]; a vehicle file has one"))),
+    }
 }
 
 fn parse_value(pair: &str, text: &str) -> Result<Value, Error> {
