@@ -20,7 +20,7 @@ use sastrugi_schemas::study::{StudyHead, TraverseItem};
 use sastrugi_schemas::tables::{MissionRow, ReplicateRow, SampleRow};
 use sastrugi_schemas::topics::{EventKind, Recording};
 use sastrugi_schemas::{Kind, ParameterError};
-use sastrugi_store::mcap::{MissionMcap, write_mission};
+use sastrugi_store::mcap::{MissionMcap, TerrainView, write_mission};
 use sastrugi_store::parquet::{TableMetadata, TableWriter};
 use sastrugi_store::{dem, digest};
 use serde_json::{Map, Value, json};
@@ -231,7 +231,13 @@ impl TraverseJob {
     }
 
     /// Drives a mission from all its starts; the first is recorded.
-    fn drive(&self, work: &Work<'_>, site: &Site, mission: &Mission) -> Result<Driven, JobError> {
+    fn drive(
+        &self,
+        work: &Work<'_>,
+        site: &Site,
+        view: &TerrainView<'_>,
+        mission: &Mission,
+    ) -> Result<Driven, JobError> {
         let id = format!("{}-{:04}", self.drive.id, mission.index + 1);
         let fail = |e: &dyn std::fmt::Display| JobError::new(format!("{id}: {e}"));
         let release_path = format!("mcap/{}/{id}.mcap", self.terrain);
@@ -258,8 +264,7 @@ impl TraverseJob {
         let metadata = self.metadata(&row, &site.heights_sha256);
         let mcap = MissionMcap {
             recording: &recording,
-            dem: &site.heights,
-            classes: Some(&site.classes),
+            terrain: view,
             start_m: mission.start_m,
             goal_m: mission.goal_m,
             epoch_ns: self.drive.head.epoch_ns,
@@ -393,9 +398,10 @@ impl Job for TraverseJob {
 
     fn run(&self, work: &Work<'_>) -> Result<Outcome, JobError> {
         let site = self.site(work)?;
+        let view = TerrainView::new(&site.heights, Some(&site.classes)).map_err(JobError::new)?;
         let missions = missions::read(&missions::file(work, &self.missions)?)?;
         let driven: Result<Vec<Driven>, JobError> =
-            missions.par_iter().map(|mission| self.drive(work, &site, mission)).collect();
+            missions.par_iter().map(|mission| self.drive(work, &site, &view, mission)).collect();
         let mut driven = driven?;
         self.write_samples(work, &mut driven)?;
         let notes = site.ground.warnings().iter().cloned().chain(nowhere_note(&driven)).collect();
