@@ -9,7 +9,7 @@ use sastrugi_schemas::topics::{
     CommandSample, ImuSample, Recording, StateSample, VehicleOutline, WheelOutline, WheelSample, WheelState,
 };
 use sastrugi_store::dem::{self, Crs, WriteOptions};
-use sastrugi_store::mcap::{self, MissionMcap};
+use sastrugi_store::mcap::{self, MissionMcap, TerrainView};
 use sastrugi_store::parquet::{TableMetadata, TableWriter};
 use std::collections::BTreeMap;
 use std::io::Write;
@@ -112,10 +112,10 @@ fn with_mission<T>(f: impl FnOnce(&MissionMcap) -> T) -> T {
     let classes = dem.map(|z| if z < 0.0 { 0 } else { 1 });
     let recording = recording(&dem);
     let metadata = BTreeMap::new();
+    let terrain = TerrainView::new(&dem, Some(&classes)).expect("classes on the same cells");
     f(&MissionMcap {
         recording: &recording,
-        dem: &dem,
-        classes: Some(&classes),
+        terrain: &terrain,
         start_m: [5.0, 25.0],
         goal_m: [40.0, 25.0],
         epoch_ns: 1_700_000_000_000_000_000,

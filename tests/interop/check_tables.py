@@ -32,8 +32,8 @@ SAME = {
 }
 CONTACTS = ["wheel_contact_x_m", "wheel_contact_y_m", "wheel_contact_z_m"]
 ANGLES = {"wheel_steering_deg": "steering_rad", "heading_error_deg": "heading_error_rad"}
-# Half a step of 1/128 deg in the table and of 1/4096 rad in the recording.
-ANGLE_TOLERANCE_DEG = 0.5 / 128 + math.degrees(0.5 / 4096) + 1e-6
+# Half a step of 1/32 deg in the table and of 1/1024 rad in the recording.
+ANGLE_TOLERANCE_DEG = 0.5 / 32 + math.degrees(0.5 / 1024) + 1e-6
 # Every so many samples, a row is compared with the recording.
 ROW_STEP = 20
 HUSKY_WEIGHT_N = 56.58 * 9.80665

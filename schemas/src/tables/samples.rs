@@ -55,27 +55,27 @@ super::table! {
         command_yaw_rate_deg_s: f64 ["deg/s"],
         /// Roughness class code under base_link (0 low, 1 semi, 2 high); null outside of the map.
         class: Option<i64> [""],
-        /// Distance from the mission line, left positive, in steps of 1/4096.
+        /// Distance from the mission line, left positive, in steps of 1/1024.
         cross_track_m: f64 ["m"],
-        /// Bearing of the controller's look-ahead point relative to the vehicle, in steps of 1/128.
+        /// Bearing of the controller's look-ahead point relative to the vehicle, in steps of 1/32.
         heading_error_deg: f64 ["deg"],
-        /// Distance to the goal, in steps of 1/4096.
+        /// Distance to the goal, in steps of 1/1024.
         distance_to_goal_m: f64 ["m"],
-        /// Size of the force of the ground on the chassis, in steps of 1/32.
+        /// Size of the force of the ground on the chassis, in steps of 1/4.
         chassis_force_n: f64 ["N"],
-        /// Force of the ground on each wheel along the contact normal, 0 without contact, in steps of 1/32.
+        /// Force of the ground on each wheel along the contact normal, 0 without contact, in steps of 1/4.
         wheel_normal_force_n: Vec<f32> ["N"],
-        /// Force of the ground on each wheel along its rolling direction, in steps of 1/32.
+        /// Force of the ground on each wheel along its rolling direction, in steps of 1/4.
         wheel_longitudinal_force_n: Vec<f32> ["N"],
-        /// Force of the ground on each wheel across its rolling direction, left positive, in steps of 1/32.
+        /// Force of the ground on each wheel across its rolling direction, left positive, in steps of 1/4.
         wheel_lateral_force_n: Vec<f32> ["N"],
         /// Slip ratio of each wheel: rim speed less ground speed over the larger of the two, in steps of 1/4096.
         wheel_slip_ratio: Vec<f32> ["1"],
-        /// Spin of each wheel, in steps of 1/4096.
+        /// Spin of each wheel, in steps of 1/1024.
         wheel_spin_rad_s: Vec<f32> ["rad/s"],
-        /// Drive torque on each wheel, in steps of 1/512.
+        /// Drive torque on each wheel, in steps of 1/64.
         wheel_torque_n_m: Vec<f32> ["N m"],
-        /// Steering angle of each wheel about the body's z axis, left positive, in steps of 1/128.
+        /// Steering angle of each wheel about the body's z axis, left positive, in steps of 1/32.
         wheel_steering_deg: Vec<f32> ["deg"],
         /// Easting of each wheel's contact point, to 0.1 mm; null without contact.
         wheel_contact_x_m: Vec<f64> ["m"],

@@ -7,8 +7,8 @@ use super::{Topic, field};
 pub const TOPIC: Topic = Topic {
     name: "/imu",
     schema: "sastrugi.Imu",
-    description: "an ideal inertial measurement unit at base_link, at its own rate; rates in steps of 1/4096 rad/s, \
-                  specific forces of 1/512 m/s2",
+    description: "an ideal inertial measurement unit at base_link, at its own rate; rates in steps of 1/1024 rad/s, \
+                  specific forces of 1/128 m/s2",
     fields: &[
         field("roll_rate_rad_s", Float, "rad/s", "angular velocity about the body's x axis"),
         field("pitch_rate_rad_s", Float, "rad/s", "angular velocity about the body's y axis"),

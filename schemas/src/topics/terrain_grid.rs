@@ -7,6 +7,6 @@ pub const TOPIC: Topic = Topic {
     name: "/terrain/grid",
     schema: "foxglove.Grid",
     description: "the terrain seen from above, at most 64 cells a side: colour of the roughness class and elevation in \
-                  m; one message at the mission's start",
+                  steps of 1/256 m; one message at the mission's start",
     fields: &[],
 };

@@ -6,6 +6,7 @@ use super::Topic;
 pub const TOPIC: Topic = Topic {
     name: "/tf",
     schema: "foxglove.FrameTransforms",
-    description: "map -> base_link and base_link -> each wheel (where the suspension has it, steered and turned by its angle), at the sampling rate",
+    description: "map -> base_link and base_link -> each wheel (where the suspension has it, steered and turned by its angle, in \
+                  steps of 1/16384), at the sampling rate",
     fields: &[],
 };

@@ -7,8 +7,8 @@ use super::{Topic, field};
 pub const TOPIC: Topic = Topic {
     name: "/wheels",
     schema: "sastrugi.Wheels",
-    description: "all wheels at one instant, at the sampling rate; a field has one value per wheel unless it says otherwise; angles, spins and \
-                  ratios in steps of 1/4096, torques of 1/512 N m, forces of 1/32 N",
+    description: "all wheels at one instant, at the sampling rate; a field has one value per wheel unless it says otherwise; angles and spins \
+                  in steps of 1/1024, slip ratios of 1/4096, torques of 1/64 N m, forces of 1/4 N, contact points of 1/1024 m",
     fields: &[
         field("wheel", Texts, "", "name of the wheel and of its frame"),
         field("angle_rad", Floats, "rad", "angle turned since the start, forward positive"),
@@ -18,9 +18,9 @@ pub const TOPIC: Topic = Topic {
         field("longitudinal_force_n", Floats, "N", "ground force along the rolling direction"),
         field("lateral_force_n", Floats, "N", "ground force across the rolling direction, left positive"),
         field("slip_ratio", Floats, "1", "rim speed less ground speed over the larger of the two"),
-        field("contact_x_m", Doubles, "m", "contact point in the map frame, east, to 0.1 mm; 0 without contact"),
-        field("contact_y_m", Doubles, "m", "contact point in the map frame, north, to 0.1 mm; 0 without contact"),
-        field("contact_z_m", Doubles, "m", "contact point in the map frame, up, to 0.1 mm; 0 without contact"),
+        field("contact_x_m", Doubles, "m", "contact point in the map frame, east, to 1 mm; 0 without contact"),
+        field("contact_y_m", Doubles, "m", "contact point in the map frame, north, to 1 mm; 0 without contact"),
+        field("contact_z_m", Doubles, "m", "contact point in the map frame, up, to 1 mm; 0 without contact"),
         field("steering_rad", Floats, "rad", "steering angle, left positive"),
         field("chassis_force_n", Float, "N", "size of the force of the ground on the chassis; one value"),
     ],

@@ -7,16 +7,16 @@ use sastrugi_schemas::tables::{MissionRow, ReplicateRow, SampleRow};
 use sastrugi_schemas::topics::{CommandSample, EventKind, Recording, StateSample, WheelSample, WheelState};
 
 /// Steps per unit of what the tables hold about wheels and controller, as in the topics `/wheels` and `/command`: finer than
-/// any sensor's noise, and short to compress. Rates, ratios and distances.
-const FINE: f64 = 4096.0;
+/// any sensor's noise, and short to compress. Rates and lengths.
+const FINE: f64 = 1024.0;
+/// Slip ratios.
+const SLIP: f64 = 4096.0;
 /// Torques.
-const MEDIUM: f64 = 512.0;
+const TORQUE: f64 = 64.0;
 /// Angles, in degrees: half of the topics' step.
-const DEGREES: f64 = 128.0;
+const DEGREES: f64 = 32.0;
 /// Forces.
-const COARSE: f64 = 32.0;
-/// Coordinates of contact points.
-const CONTACT: f64 = 16384.0;
+const COARSE: f64 = 4.0;
 
 /// What the tables say about a mission beside what happened in it.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -155,7 +155,7 @@ impl Instant<'_> {
 
     /// A coordinate of every wheel's contact point; NaN without contact.
     fn contacts(&self, axis: usize) -> Vec<f64> {
-        self.of_wheels(|w| if w.normal_force_n == 0.0 { f64::NAN } else { in_steps(w.contact_m[axis], CONTACT) })
+        self.of_wheels(|w| if w.normal_force_n == 0.0 { f64::NAN } else { in_steps(w.contact_m[axis], FINE) })
     }
 }
 
@@ -202,9 +202,9 @@ fn sample_row(terrain_id: &str, mission_id: &str, sample: i64, instant: Instant<
         wheel_normal_force_n: instant.wheels(COARSE, |w| w.normal_force_n),
         wheel_longitudinal_force_n: instant.wheels(COARSE, |w| w.longitudinal_force_n),
         wheel_lateral_force_n: instant.wheels(COARSE, |w| w.lateral_force_n),
-        wheel_slip_ratio: instant.wheels(FINE, |w| w.slip_ratio),
+        wheel_slip_ratio: instant.wheels(SLIP, |w| w.slip_ratio),
         wheel_spin_rad_s: instant.wheels(FINE, |w| w.spin_rad_s),
-        wheel_torque_n_m: instant.wheels(MEDIUM, |w| w.torque_n_m),
+        wheel_torque_n_m: instant.wheels(TORQUE, |w| w.torque_n_m),
         wheel_steering_deg: instant.wheels(DEGREES, |w| w.steering_rad.to_degrees()),
         wheel_contact_x_m: instant.contacts(0),
         wheel_contact_y_m: instant.contacts(1),

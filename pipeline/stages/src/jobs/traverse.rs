@@ -21,7 +21,7 @@ use sastrugi_schemas::study::{StudyHead, TraverseItem};
 use sastrugi_schemas::tables::{MissionRow, ParameterRow, ReplicateRow, SampleRow};
 use sastrugi_schemas::topics::{EventKind, Recording};
 use sastrugi_schemas::{Kind, ParameterError};
-use sastrugi_store::mcap::{MissionMcap, write_mission};
+use sastrugi_store::mcap::{MissionMcap, TerrainView, write_mission};
 use sastrugi_store::parquet::{TableMetadata, TableWriter};
 use sastrugi_store::{dem, digest};
 use serde_json::{Map, Value, json};
@@ -242,7 +242,13 @@ impl TraverseJob {
     }
 
     /// Drives a mission from all its starts; the first is recorded.
-    fn drive(&self, work: &Work<'_>, site: &Site, mission: &Mission) -> Result<Driven, JobError> {
+    fn drive(
+        &self,
+        work: &Work<'_>,
+        site: &Site,
+        view: &TerrainView<'_>,
+        mission: &Mission,
+    ) -> Result<Driven, JobError> {
         let id = format!("{}-{:04}", self.drive.id, mission.index + 1);
         let fail = |e: &dyn std::fmt::Display| JobError::new(format!("{id}: {e}"));
         let release_path = format!("mcap/{}/{id}.mcap", self.terrain);
@@ -269,8 +275,7 @@ impl TraverseJob {
         let metadata = self.metadata(&row, &site.heights_sha256);
         let mcap = MissionMcap {
             recording: &recording,
-            dem: &site.heights,
-            classes: Some(&site.classes),
+            terrain: view,
             start_m: mission.start_m,
             goal_m: mission.goal_m,
             epoch_ns: self.drive.head.epoch_ns,
@@ -404,12 +409,12 @@ impl Job for TraverseJob {
     }
 
     fn memory_bytes(&self) -> u64 {
-        // Heights, ground with its bound, classes and rasters once; samples of every mission, some 700 bytes each with their
+        // Heights, ground with its bound, classes and rasters once; samples of every mission, some 1000 bytes each with their
         // wheels; rows of the starts.
         let Drive { count, seconds_each, starts, settings, .. } = &self.drive;
         let rows = (count * starts.count()) as u64;
         let samples = *count as f64 * seconds_each * f64::from(settings.parameters().sample_rate_hz);
-        ((64 << 20) + 48 * self.cells).saturating_add((700.0 * samples) as u64).saturating_add(400 * rows)
+        ((64 << 20) + 48 * self.cells).saturating_add((1000.0 * samples) as u64).saturating_add(400 * rows)
     }
 
     fn estimate(&self) -> Estimate {
@@ -420,9 +425,10 @@ impl Job for TraverseJob {
 
     fn run(&self, work: &Work<'_>) -> Result<Outcome, JobError> {
         let site = self.site(work)?;
+        let view = TerrainView::new(&site.heights, Some(&site.classes)).map_err(JobError::new)?;
         let missions = missions::read(&missions::file(work, &self.lines.item)?)?;
         let driven: Result<Vec<Driven>, JobError> =
-            missions.par_iter().map(|mission| self.drive(work, &site, mission)).collect();
+            missions.par_iter().map(|mission| self.drive(work, &site, &view, mission)).collect();
         let mut driven = driven?;
         self.write_samples(work, &mut driven)?;
         let notes = site.ground.warnings().iter().cloned().chain(nowhere_note(&driven)).collect();

@@ -4,8 +4,8 @@
 //! path is drawn cell by cell. Any other leaf is drawn as a fan from its centre to every vertex that it or a neighbour
 //! has on its edge, so that surfaces of different resolution meet without gap or overlap.
 //!
-//! Tiles of one shape share their list of indices and their plan coordinates, so that they compress to little more
-//! than their heights.
+//! Patches of one shape share their list of indices and their plan coordinates, so that they compress to little more
+//! than their heights: tiles, fans, and the largest leaves, of which a whole row makes one patch.
 
 use sastrugi_numeric::{Geometry, Grid};
 use sastrugi_schemas::RoughnessClass;
@@ -15,8 +15,10 @@ use std::collections::BTreeMap;
 const TILE: usize = 8;
 /// Most leaves along a side before any is split.
 const COARSE_LEAVES: usize = 32;
-/// Heights are stored in steps of 2^-10 m.
-const HEIGHT_STEPS_PER_M: f64 = 1024.0;
+/// Heights are stored in steps of 2^-8 m: 2 mm off at most.
+const HEIGHT_STEPS_PER_M: f64 = 256.0;
+/// Least depth of the point that heights count from: a whole byte of a double then holds their place within a metre.
+const DEPTH_M: f64 = 16.0;
 
 /// A part of the terrain's surface.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -38,24 +40,45 @@ pub(super) struct Square {
     pub half_side: f64,
 }
 
-/// The surface, in full wherever one of the squares lies.
-pub(super) fn terrain(dem: &Grid, classes: Option<&Grid<u8>>, near: &[Square]) -> Vec<Patch> {
+/// The surface, in full wherever one of the squares lies. Heights count from `base_m`, see [`base`].
+pub(super) fn terrain(dem: &Grid, classes: Option<&Grid<u8>>, base_m: f64, near: &[Square]) -> Vec<Patch> {
     let g = &dem.geometry;
     if g.rows < 2 || g.cols < 2 {
         return vec![];
     }
-    let leaves = leaves(g, &marked_tiles(g, near));
-    let drawing = Drawing { dem, classes, base: base_height(dem) };
-    let (fine, coarse): (Vec<_>, Vec<_>) = leaves.into_iter().partition(|leaf| leaf.fine);
-    let mut patches: Vec<Patch> = fine.iter().map(|leaf| drawing.tile(leaf)).collect();
-    patches.push(drawing.fans(&coarse, &vertices(g, &fine, &coarse)));
-    patches.retain(|patch| !patch.triangles.is_empty());
-    patches
+    let side = coarse_side(g);
+    let (fine, coarse): (Vec<_>, Vec<_>) =
+        leaves(g, &marked_tiles(g, near), side).into_iter().partition(|leaf| leaf.fine);
+    let vertices = vertices(g, &fine, &coarse);
+    let fans = coarse.iter().map(|leaf| (leaf, leaf.outline(&vertices, g.cols)));
+    let (plain, ragged): (Vec<_>, Vec<_>) = fans.partition(|(leaf, outline)| leaf.is_plain(g, side, outline));
+    let mut rows: BTreeMap<usize, Vec<&Leaf>> = BTreeMap::new();
+    plain.into_iter().for_each(|(leaf, _)| rows.entry(leaf.row).or_default().push(leaf));
+    let drawing = Drawing { dem, classes, base: base_m };
+    let tiles = fine.iter().map(|leaf| drawing.tile(leaf));
+    let fans = ragged.iter().map(|(leaf, outline)| drawing.fan(leaf, outline));
+    let strips = rows.values().filter_map(|leaves| drawing.strip(leaves, side));
+    tiles.chain(fans).chain(strips).filter(|patch| !patch.triangles.is_empty()).collect()
 }
 
-/// Where heights count from: the lowest one, so that single precision in a viewer suffices.
-fn base_height(dem: &Grid) -> f64 {
-    dem.range().map_or(0.0, |(low, _)| low.floor())
+/// Where heights count from, for heights from `low_m` to `high_m`: a whole number of metres, so far below that all heights
+/// lie within one power of two. As floating-point numbers they then share their exponent and differ in a byte or two.
+pub(super) fn base(low_m: f64, high_m: f64) -> f64 {
+    let low_m = low_m.floor();
+    let mut depth_m = DEPTH_M;
+    while depth_m <= high_m - low_m && depth_m.is_finite() {
+        depth_m *= 2.0;
+    }
+    low_m - depth_m
+}
+
+/// Cells along the side of the largest leaves.
+fn coarse_side(g: &Geometry) -> usize {
+    let mut side = TILE;
+    while side * COARSE_LEAVES < g.rows.max(g.cols) - 1 {
+        side *= 2;
+    }
+    side
 }
 
 /// Nodes `row..=row_end` and `col..=col_end` (a node is a cell centre).
@@ -73,6 +96,17 @@ impl Leaf {
     fn new(g: &Geometry, row: usize, col: usize, side: usize, near: bool) -> Self {
         let (row_end, col_end) = ((row + side).min(g.rows - 1), (col + side).min(g.cols - 1));
         Self { row, col, row_end, col_end, fine: near || row_end - row < 2 || col_end - col < 2 }
+    }
+
+    /// The node of its centre.
+    fn centre(&self) -> (usize, usize) {
+        (self.row.midpoint(self.row_end), self.col.midpoint(self.col_end))
+    }
+
+    /// True for one of the largest leaves (cut at the grid's edge or not) with no vertex but its corners.
+    fn is_plain(&self, g: &Geometry, side: usize, outline: &[(usize, usize)]) -> bool {
+        let whole = |start: usize, end: usize, n: usize| start.is_multiple_of(side) && end == (start + side).min(n - 1);
+        outline.len() == 4 && whole(self.row, self.row_end, g.rows) && whole(self.col, self.col_end, g.cols)
     }
 
     /// Nodes around it that are vertices, counterclockwise from above from the north-west corner.
@@ -116,11 +150,7 @@ impl Tiles {
     }
 }
 
-fn leaves(g: &Geometry, tiles: &Tiles) -> Vec<Leaf> {
-    let mut side = TILE;
-    while side * COARSE_LEAVES < g.rows.max(g.cols) - 1 {
-        side *= 2;
-    }
+fn leaves(g: &Geometry, tiles: &Tiles, side: usize) -> Vec<Leaf> {
     let mut leaves = vec![];
     for row in (0..g.rows - 1).step_by(side) {
         for col in (0..g.cols - 1).step_by(side) {
@@ -179,56 +209,61 @@ impl Drawing<'_> {
         self.classes.map_or(RoughnessClass::NO_DATA, |classes| classes.at(row, col))
     }
 
-    /// Height over the base in steps of 2^-10 m.
+    /// Height over the base in whole steps.
     fn height(&self, row: usize, col: usize) -> f64 {
         ((self.dem.at(row, col) - self.base) * HEIGHT_STEPS_PER_M).round() / HEIGHT_STEPS_PER_M
     }
 
-    /// A leaf cell by cell.
-    fn tile(&self, leaf: &Leaf) -> Patch {
+    /// A patch of these nodes, none of which lies west of `west` or south of `south`.
+    fn patch(
+        &self,
+        (south, west): (usize, usize),
+        nodes: impl Iterator<Item = (usize, usize)>,
+        triangles: Vec<[u32; 3]>,
+    ) -> Patch {
         let g = &self.dem.geometry;
-        let mut patch = Patch { origin: [g.x(leaf.col), g.y(leaf.row_end), self.base], ..Patch::default() };
-        for row in leaf.row..=leaf.row_end {
-            for col in leaf.col..=leaf.col_end {
-                let [dx, dy] = [(col - leaf.col) as f64 * g.cell[0], (leaf.row_end - row) as f64 * g.cell[1]];
-                let z = self.height(row, col);
-                patch.points.push([dx, dy, if z.is_finite() { z } else { f64::NAN }]);
-                patch.codes.push(self.code(row, col));
-            }
-        }
-        let width = (leaf.col_end - leaf.col + 1) as u32;
-        for row in 0..(leaf.row_end - leaf.row) as u32 {
-            for col in 0..width - 1 {
-                let nw = row * width + col;
-                let (ne, sw, se) = (nw + 1, nw + width, nw + width + 1);
-                patch.triangles.extend([[nw, sw, se], [nw, se, ne]]);
-            }
+        let mut patch = Patch { origin: [g.x(west), g.y(south), self.base], triangles, ..Patch::default() };
+        for (row, col) in nodes {
+            let [dx, dy] = [(col - west) as f64 * g.cell[0], (south - row) as f64 * g.cell[1]];
+            patch.points.push([dx, dy, self.height(row, col)]);
+            patch.codes.push(self.code(row, col));
         }
         without_holes(patch)
     }
 
-    /// All other leaves as fans, in one patch that shares its points.
-    fn fans(&self, leaves: &[Leaf], vertices: &[bool]) -> Patch {
+    /// A leaf cell by cell.
+    fn tile(&self, leaf: &Leaf) -> Patch {
+        let nodes = (leaf.row..=leaf.row_end).flat_map(|row| (leaf.col..=leaf.col_end).map(move |col| (row, col)));
+        let width = (leaf.col_end - leaf.col + 1) as u32;
+        let height = (leaf.row_end - leaf.row) as u32;
+        let cells = (0..height).flat_map(|row| (0..width - 1).map(move |col| row * width + col));
+        let halves = cells.flat_map(|nw| [[nw, nw + width, nw + width + 1], [nw, nw + width + 1, nw + 1]]);
+        self.patch((leaf.row_end, leaf.col), nodes, halves.collect())
+    }
+
+    /// A leaf from its centre to its outline.
+    fn fan(&self, leaf: &Leaf, outline: &[(usize, usize)]) -> Patch {
+        let nodes = std::iter::once(leaf.centre()).chain(outline.iter().copied());
+        let n = outline.len() as u32;
+        let triangles = (0..n).map(|k| [0, k + 1, (k + 1) % n + 1]).collect();
+        self.patch((leaf.row_end, leaf.col), nodes, triangles)
+    }
+
+    /// Plain leaves of one row. Its points are the corners and centres of all leaves that could be there, so that the
+    /// strips of a terrain have the same ones.
+    fn strip(&self, leaves: &[&Leaf], side: usize) -> Option<Patch> {
         let g = &self.dem.geometry;
-        let mut patch = Patch { origin: [g.x(0), g.y(g.rows - 1), self.base], ..Patch::default() };
-        let mut known = BTreeMap::new();
-        let mut point = |row: usize, col: usize, patch: &mut Patch| {
-            *known.entry((row, col)).or_insert_with(|| {
-                let [dx, dy] = [col as f64 * g.cell[0], (g.rows - 1 - row) as f64 * g.cell[1]];
-                patch.points.push([dx, dy, self.height(row, col)]);
-                patch.codes.push(self.code(row, col));
-                (patch.points.len() - 1) as u32
-            })
-        };
-        for leaf in leaves {
-            let centre = point(leaf.row.midpoint(leaf.row_end), leaf.col.midpoint(leaf.col_end), &mut patch);
-            let outline = leaf.outline(vertices, g.cols);
-            let around: Vec<u32> = outline.into_iter().map(|(r, c)| point(r, c, &mut patch)).collect();
-            let next = around.iter().cycle().skip(1);
-            let fan = around.iter().zip(next).map(|(&a, &b)| [centre, a, b]);
-            patch.triangles.extend(fan.filter(|[c, a, b]| c != a && c != b && a != b));
-        }
-        without_holes(patch)
+        let &&Leaf { row, row_end, .. } = leaves.first()?;
+        let edges: Vec<usize> = (0..g.cols - 1).step_by(side).chain([g.cols - 1]).collect();
+        let corners = |row: usize| edges.iter().map(move |&col| (row, col));
+        let centres = edges.windows(2).map(|pair| (row.midpoint(row_end), pair[0].midpoint(pair[1])));
+        let n = edges.len() as u32;
+        let triangles = leaves.iter().flat_map(|leaf| {
+            let nw = (leaf.col / side) as u32;
+            let (ne, centre, sw, se) = (nw + 1, nw + n, nw + 2 * n - 1, nw + 2 * n);
+            [[centre, nw, sw], [centre, sw, se], [centre, se, ne], [centre, ne, nw]]
+        });
+        Some(self.patch((row_end, 0), corners(row).chain(centres).chain(corners(row_end)), triangles.collect()))
     }
 }
 

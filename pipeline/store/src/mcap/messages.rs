@@ -2,12 +2,12 @@
 
 use super::mesh::{self, Patch, Square};
 use super::protobuf::{self, Value};
-use super::{McapError, MissionMcap, Pending, log_time, timestamp};
+use super::{McapError, MissionMcap, Pending, TerrainView, log_time, timestamp};
 use foxglove::Encode;
 use foxglove::messages as fox;
 use foxglove::messages::{Color, Point3, Pose, Quaternion, Timestamp, Vector2, Vector3};
 use prost::Message;
-use sastrugi_numeric::{Geometry, Surface};
+use sastrugi_numeric::{Geometry, Grid, Surface};
 use sastrugi_schemas::RoughnessClass;
 use sastrugi_schemas::topics::{
     self, CommandSample, Event, EventKind, ImuSample, Recording, StateSample, Topic, VIEWER, WheelSample, WheelState,
@@ -20,14 +20,20 @@ const GRID_CELLS: usize = 64;
 /// Poses per second of `/vehicle/path`.
 const PATH_RATE_HZ: f64 = 2.0;
 /// Steps per unit in which sensor-like values are stored: finer than any sensor's noise, and short to compress.
-/// Angles, rates and ratios.
-const FINE: f64 = 4096.0;
-/// Specific forces and torques.
-const MEDIUM: f64 = 512.0;
+/// Angles, rates, lengths.
+const FINE: f64 = 1024.0;
+/// Slip ratios.
+const SLIP: f64 = 4096.0;
+/// Specific forces.
+const MEDIUM: f64 = 128.0;
+/// Torques.
+const TORQUE: f64 = 64.0;
 /// Forces.
-const COARSE: f64 = 32.0;
-/// Coordinates of contact points.
-const CONTACT: f64 = 16384.0;
+const COARSE: f64 = 4.0;
+/// Where wheels are drawn: quaternions and hubs in base_link.
+const DRAWN: f64 = 16384.0;
+/// Elevation of `/terrain/grid`.
+const ELEVATION: f64 = 256.0;
 const GREY: [u8; 3] = [0x9a, 0x9a, 0x94];
 const IDENTITY: [f64; 4] = [0.0, 0.0, 0.0, 1.0];
 
@@ -50,7 +56,9 @@ pub(super) fn of_mission(mission: &MissionMcap) -> Result<Vec<Pending>, McapErro
     let mut out = Messages { epoch_ns: mission.epoch_ns, pending: vec![] };
     let recording = mission.recording;
     out.add(&topics::terrain_mesh::TOPIC, 0.0, |t| terrain_mesh(mission, t).encode_to_vec())?;
-    out.add(&topics::terrain_grid::TOPIC, 0.0, |t| terrain_grid(mission, t).encode_to_vec())?;
+    out.add(&topics::terrain_grid::TOPIC, 0.0, |t| {
+        fox::Grid { timestamp: Some(t), ..mission.terrain.grid.clone() }.encode_to_vec()
+    })?;
     out.add(&topics::vehicle_shape::TOPIC, 0.0, |t| vehicle_shape(mission, t).encode_to_vec())?;
     out.add(&topics::vehicle_path::TOPIC, 0.0, |t| vehicle_path(recording, t).encode_to_vec())?;
     let wheels = recording.wheels.iter().map(Some).chain(std::iter::repeat(None));
@@ -111,19 +119,18 @@ pub(super) fn wheel_values(names: &[String], sample: &WheelSample) -> Vec<Value>
         Value::Floats(sample.wheels.iter().map(|w| in_steps(f(w), steps)).collect())
     };
     let contact = |axis: usize| {
-        let touching =
-            |w: &WheelState| if w.normal_force_n == 0.0 { 0.0 } else { in_steps(w.contact_m[axis], CONTACT) };
+        let touching = |w: &WheelState| if w.normal_force_n == 0.0 { 0.0 } else { in_steps(w.contact_m[axis], FINE) };
         Value::Doubles(sample.wheels.iter().map(touching).collect())
     };
     vec![
         Value::Texts(names.to_vec()),
         all(FINE, |w| w.angle_rad),
         all(FINE, |w| w.spin_rad_s),
-        all(MEDIUM, |w| w.torque_n_m),
+        all(TORQUE, |w| w.torque_n_m),
         all(COARSE, |w| w.normal_force_n),
         all(COARSE, |w| w.longitudinal_force_n),
         all(COARSE, |w| w.lateral_force_n),
-        all(FINE, |w| w.slip_ratio),
+        all(SLIP, |w| w.slip_ratio),
         contact(0),
         contact(1),
         contact(2),
@@ -154,7 +161,8 @@ fn transforms(
         let wheel = wheels.and_then(|sample| sample.wheels.get(index));
         let (hub_m, steering, angle) =
             wheel.map_or((outline.hub_m, 0.0, 0.0), |w| (w.hub_m, w.steering_rad, w.angle_rad));
-        all.push(transform(BASE, &outline.name, hub_m, wheel_rotation(steering, angle)));
+        let rotation = wheel_rotation(steering, angle).map(|v| in_steps(v, DRAWN));
+        all.push(transform(BASE, &outline.name, hub_m.map(|v| in_steps(v, DRAWN)), rotation));
     }
     fox::FrameTransforms { transforms: all }
 }
@@ -215,7 +223,7 @@ fn vehicle_shape(mission: &MissionMcap, time: Timestamp) -> fox::SceneUpdate {
     });
     let marker = |id: &str, [x, y]: [f64; 2], rgb| fox::SceneEntity {
         spheres: vec![fox::SpherePrimitive {
-            pose: Some(pose([x, y, mission.dem.height(x, y).unwrap_or(0.0)], IDENTITY)),
+            pose: Some(pose([x, y, mission.terrain.dem.height(x, y).unwrap_or(0.0)], IDENTITY)),
             size: Some(vector([0.4; 3])),
             color: Some(colour(rgb, 0.8)),
         }],
@@ -227,24 +235,28 @@ fn vehicle_shape(mission: &MissionMcap, time: Timestamp) -> fox::SceneUpdate {
 }
 
 fn terrain_mesh(mission: &MissionMcap, time: Timestamp) -> fox::SceneUpdate {
-    let patches = mesh::terrain(mission.dem, mission.classes, &corridor(mission));
+    let &TerrainView { dem, classes, base_m, .. } = mission.terrain;
+    let patches = mesh::terrain(dem, classes, base_m, &corridor(mission));
     let triangles = patches.into_iter().map(triangle_list).collect();
     let entity = fox::SceneEntity { triangles, ..entity(time, MAP, "terrain", false) };
     fox::SceneUpdate { deletions: vec![], entities: vec![entity] }
 }
 
-/// Where the terrain is drawn in full: under the wheels and the chassis at every sample.
+/// Where the terrain is drawn in full: under the wheels at every sample, and a cell around.
 pub(super) fn corridor(mission: &MissionMcap) -> Vec<Square> {
     let Recording { vehicle, states, wheels, .. } = mission.recording;
-    let cell = mission.dem.geometry.cell[0].max(mission.dem.geometry.cell[1]);
+    let [dx, dy] = mission.terrain.dem.geometry.cell;
+    let cell = dx.max(dy);
     let mut near = vec![];
     for state in states {
         let [x, y, _] = state.position_m;
-        near.push(Square { centre: [x, y], half_side: cell });
         for wheel in &vehicle.wheels {
-            let [dx, dy, _] = rotated(state.orientation, wheel.hub_m);
-            let half_side = wheel.radius_m.max(0.5 * wheel.width_m) + cell;
-            near.push(Square { centre: [x + dx, y + dy], half_side });
+            let half_side = (0.5 * wheel.radius_m).max(0.5 * wheel.width_m) + cell;
+            for ahead in [-wheel.radius_m, 0.0, wheel.radius_m] {
+                let [hub_x, hub_y, hub_z] = wheel.hub_m;
+                let [dx, dy, _] = rotated(state.orientation, [hub_x + ahead, hub_y, hub_z]);
+                near.push(Square { centre: [x + dx, y + dy], half_side });
+            }
         }
     }
     let touching = wheels.iter().flat_map(|sample| &sample.wheels).filter(|wheel| wheel.normal_force_n != 0.0);
@@ -274,18 +286,18 @@ fn triangle_list(patch: Patch) -> fox::TriangleListPrimitive {
     }
 }
 
-fn terrain_grid(mission: &MissionMcap, time: Timestamp) -> fox::Grid {
+/// The terrain seen from above, without its time.
+pub(super) fn terrain_grid(dem: &Grid, classes: Option<&Grid<u8>>, low_m: f64) -> fox::Grid {
     use fox::packed_element_field::NumericType;
-    let dem = mission.dem;
     let g = &dem.geometry;
-    let step = g.rows.max(g.cols).div_ceil(GRID_CELLS);
+    let step = g.rows.max(g.cols).div_ceil(GRID_CELLS).max(1);
     let (rows, cols) = (g.rows.div_ceil(step), g.cols.div_ceil(step));
     let mut data = Vec::with_capacity(rows * cols * 8);
     // The message's rows run from south to north.
     for (row, col) in (0..rows).rev().flat_map(|r| (0..cols).map(move |c| (r, c))) {
         let (row, col) = ((row * step + step / 2).min(g.rows - 1), (col * step + step / 2).min(g.cols - 1));
-        let z = dem.at(row, col);
-        let rgb = mission.classes.map_or(GREY, |classes| class_rgb(classes.at(row, col)));
+        let z = in_steps(dem.at(row, col), ELEVATION);
+        let rgb = classes.map_or(GREY, |classes| class_rgb(classes.at(row, col)));
         data.extend(rgb);
         data.push(if z.is_finite() { 255 } else { 0 });
         data.extend((if z.is_finite() { z as f32 } else { 0.0 }).to_le_bytes());
@@ -297,9 +309,9 @@ fn terrain_grid(mission: &MissionMcap, time: Timestamp) -> fox::Grid {
     };
     let bytes = ["red", "green", "blue", "alpha"].into_iter().zip(0..).map(|(n, at)| field(n, at, NumericType::Uint8));
     fox::Grid {
-        timestamp: Some(time),
+        timestamp: None,
         frame_id: MAP.to_owned(),
-        pose: Some(pose(grid_corner(g, rows, step, dem.range().map_or(0.0, |(low, _)| low)), IDENTITY)),
+        pose: Some(pose(grid_corner(g, rows, step, low_m), IDENTITY)),
         column_count: cols as u32,
         cell_size: Some(Vector2 { x: g.cell[0] * step as f64, y: g.cell[1] * step as f64 }),
         row_stride: cols as u32 * 8,

@@ -12,6 +12,7 @@ mod tests;
 
 use crate::digest::ContentHash;
 use crate::{PROGRAM, atomic};
+use foxglove::messages as fox;
 use foxglove::messages::Timestamp;
 use mcap::records::{MessageHeader, Metadata};
 use mcap::{Compression, WriteOptions, Writer};
@@ -62,15 +63,39 @@ impl McapError {
     }
 }
 
+/// A terrain as its missions' recordings show it: what is the same for all of them is worked out once.
+#[derive(Clone, Debug)]
+pub struct TerrainView<'a> {
+    dem: &'a Grid,
+    classes: Option<&'a Grid<u8>>,
+    /// Where the heights of `/terrain/mesh` count from, m.
+    base_m: f64,
+    /// `/terrain/grid` without its time.
+    grid: fox::Grid,
+}
+
+impl<'a> TerrainView<'a> {
+    /// The view of a terrain and, on the same cells, its roughness classes.
+    ///
+    /// # Errors
+    /// [`McapError::Unfit`] for a class map of another shape than the terrain.
+    pub fn new(dem: &'a Grid, classes: Option<&'a Grid<u8>>) -> Result<Self, McapError> {
+        if classes.is_some_and(|c| (c.rows(), c.cols()) != (dem.rows(), dem.cols())) {
+            return Err(McapError::unfit("the class map has another shape than the terrain"));
+        }
+        let (low_m, high_m) = dem.range().unwrap_or((0.0, 0.0));
+        let (base_m, grid) = (mesh::base(low_m, high_m), messages::terrain_grid(dem, classes, low_m));
+        Ok(Self { dem, classes, base_m, grid })
+    }
+}
+
 /// A mission to write.
 #[derive(Clone, Copy, Debug)]
 pub struct MissionMcap<'a> {
     /// What happened.
     pub recording: &'a Recording,
     /// Terrain it happened on.
-    pub dem: &'a Grid,
-    /// Roughness classes of the terrain, on the same cells.
-    pub classes: Option<&'a Grid<u8>>,
+    pub terrain: &'a TerrainView<'a>,
     /// Start point, m.
     pub start_m: [f64; 2],
     /// Goal point, m.
@@ -152,9 +177,12 @@ pub fn encode_mission(mission: &MissionMcap) -> Result<(Vec<u8>, McapSummary), M
     let mut writer = options.create(Cursor::new(Vec::new()))?;
     let channels = VIEWER.iter().map(|topic| add_channel(&mut writer, topic)).collect::<Result<Vec<_>, _>>()?;
     let mut content = ContentHash::new("messages");
-    for (sequence, Pending { topic, log_time, data }) in (0..).zip(&messages) {
-        let header =
-            MessageHeader { channel_id: channels[*topic], sequence, log_time: *log_time, publish_time: *log_time };
+    // Counted by topic: the messages of one instant then differ in little but their data.
+    let mut sequences = [0; VIEWER.len()];
+    for Pending { topic, log_time, data } in &messages {
+        let (channel_id, sequence) = (channels[*topic], sequences[*topic]);
+        let header = MessageHeader { channel_id, sequence, log_time: *log_time, publish_time: *log_time };
+        sequences[*topic] += 1;
         writer.write_to_known_channel(&header, data)?;
         content.text(VIEWER[*topic].name);
         content.u64(*log_time);
@@ -170,12 +198,9 @@ pub fn encode_mission(mission: &MissionMcap) -> Result<(Vec<u8>, McapSummary), M
 }
 
 fn check(mission: &MissionMcap) -> Result<(), McapError> {
-    let MissionMcap { recording, dem, classes, .. } = mission;
+    let recording = mission.recording;
     if recording.states.is_empty() {
         return Err(McapError::unfit("it holds no state"));
-    }
-    if classes.is_some_and(|c| (c.rows(), c.cols()) != (dem.rows(), dem.cols())) {
-        return Err(McapError::unfit("the class map has another shape than the terrain"));
     }
     let wheels = recording.vehicle.wheels.len();
     if let Some(sample) = recording.wheels.iter().find(|sample| sample.wheels.len() != wheels) {
