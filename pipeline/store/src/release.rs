@@ -6,7 +6,7 @@ mod verify;
 #[cfg(test)]
 mod tests;
 
-pub use builder::{Head, ReleaseBuilder, beside};
+pub use builder::{Head, Incoming, ReleaseBuilder, beside};
 pub use verify::{Problem, ProblemKind, VerifyReport, verify};
 
 use crate::digest;

@@ -77,11 +77,11 @@ super::table! {
         wheel_torque_n_m: Vec<f32> ["N m"],
         /// Steering angle of each wheel about the body's z axis, left positive, in steps of 1/32.
         wheel_steering_deg: Vec<f32> ["deg"],
-        /// Easting of each wheel's contact point, to 0.1 mm; null without contact.
+        /// Easting of each wheel's contact point, in steps of 1/1024; null without contact.
         wheel_contact_x_m: Vec<f64> ["m"],
-        /// Northing of each wheel's contact point, to 0.1 mm; null without contact.
+        /// Northing of each wheel's contact point, in steps of 1/1024; null without contact.
         wheel_contact_y_m: Vec<f64> ["m"],
-        /// Height of each wheel's contact point, to 0.1 mm; null without contact.
+        /// Height of each wheel's contact point, in steps of 1/1024; null without contact.
         wheel_contact_z_m: Vec<f64> ["m"],
     }
 }

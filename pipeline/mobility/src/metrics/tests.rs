@@ -101,14 +101,14 @@ fn val_samples_hold_wheels_and_controller() {
         time_s: 0.0,
         speed_m_s: 1.0,
         yaw_rate_rad_s: 0.0,
-        cross_track_m: -1.3 / 4096.0,
+        cross_track_m: -1.3 / 1024.0,
         heading_error_rad: 0.1,
         distance_to_goal_m: 40.0,
     };
     let wheel = WheelState {
         angle_rad: 0.0,
         spin_rad_s: 6.0,
-        torque_n_m: 1.0 / 1000.0,
+        torque_n_m: 1.0 / 70.0,
         normal_force_n: 139.99,
         longitudinal_force_n: 0.01,
         lateral_force_n: -0.01,
@@ -129,23 +129,23 @@ fn val_samples_hold_wheels_and_controller() {
         imu_rate_hz: RATE_HZ,
         states: states(|_| 0.0, |_| 0.0, |_| 0.0)[..2].to_vec(),
         imu: vec![],
-        wheels: vec![WheelSample { time_s: 0.0, wheels: vec![wheel, lifted], chassis_force_n: 0.02 }],
+        wheels: vec![WheelSample { time_s: 0.0, wheels: vec![wheel, lifted], chassis_force_n: 0.2 }],
         commands: vec![command],
         events: vec![],
     };
     let classes = Grid::new(Geometry::square(1, 1, 1.0), vec![0]);
     let rows = sample_rows("a", &Mission::between(0, [0.0; 2], [40.0, 0.0]), &recording, &classes);
     let [first, last] = &rows[..] else { panic!("{} rows", rows.len()) };
-    assert_eq!(first.cross_track_m, -1.0 / 4096.0);
-    assert_eq!(first.heading_error_deg, 733.0 / 128.0);
-    assert_eq!((first.distance_to_goal_m, first.chassis_force_n), (40.0, 1.0 / 32.0));
+    assert_eq!(first.cross_track_m, -1.0 / 1024.0);
+    assert_eq!(first.heading_error_deg, 183.0 / 32.0);
+    assert_eq!((first.distance_to_goal_m, first.chassis_force_n), (40.0, 1.0 / 4.0));
     assert_eq!(first.wheel_normal_force_n, [140.0, 0.0]);
     assert_eq!(first.wheel_longitudinal_force_n, [0.0; 2]);
     assert!(first.wheel_lateral_force_n.iter().all(|v| v.to_bits() == 0));
     assert_eq!((&first.wheel_slip_ratio[..], &first.wheel_spin_rad_s[..]), (&[0.25; 2][..], &[6.0; 2][..]));
-    assert_eq!(first.wheel_torque_n_m, [1.0 / 512.0; 2]);
-    assert_eq!(first.wheel_steering_deg, [733.0 / 128.0; 2]);
-    assert!((first.wheel_contact_x_m[0] - wheel.contact_m[0]).abs() <= 0.5 / 16384.0);
+    assert_eq!(first.wheel_torque_n_m, [1.0 / 64.0; 2]);
+    assert_eq!(first.wheel_steering_deg, [183.0 / 32.0; 2]);
+    assert!((first.wheel_contact_x_m[0] - wheel.contact_m[0]).abs() <= 0.5 / 1024.0);
     assert!(first.wheel_contact_x_m[1].is_nan());
     assert_eq!((first.wheel_contact_y_m[0], first.wheel_contact_z_m[0]), (2.0, 3.0));
     assert!(last.cross_track_m.is_nan() && last.chassis_force_n.is_nan());

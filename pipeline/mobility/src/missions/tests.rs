@@ -72,12 +72,12 @@ fn stat_starts_and_headings_are_uniform() {
     assert!((mean(&|m| m.heading_rad) - PI).abs() < five_se(PI * PI / 3.0));
 }
 
-/// Maps that share their draws: the rules hold on each, the same draw is the same mission, and most missions are shared by
-/// maps that differ in a tenth of their rows.
+/// Maps that share their draws: the rules hold on each, the same draw is the same mission, and missions are shared by maps
+/// that differ in a quarter of the rows inside the border.
 #[test]
 fn val_shared_draws_are_shared_missions() {
     let (a, mut b) = (checkerboard(), checkerboard());
-    b.values[..1009 * 100].fill(HIGH);
+    b.values[..1009 * 300].fill(HIGH);
     let [of_a, of_b] =
         [&a, &b].map(|map| draw_missions(map, &settings(|p| p.count = 100), StartCells::All, &streams()).unwrap());
     for (map, missions) in [(&a, &of_a), (&b, &of_b)] {
@@ -88,7 +88,8 @@ fn val_shared_draws_are_shared_missions() {
     }
     let same_draw = of_a.iter().zip(&of_b).filter(|(a, b)| a.draws == b.draws);
     assert!(same_draw.clone().all(|(a, b)| a == b));
-    assert!((60..100).contains(&same_draw.count()));
+    let shared = same_draw.count();
+    assert!((20..100).contains(&shared), "{shared}");
 }
 
 /// Null: starts drawn from all cells are as uniform over the low ones as those drawn from the low ones. Left half low, right

@@ -111,7 +111,7 @@ pub(crate) const MATERIALS: [Material; 6] = [
         preset: SurfacePreset::Ice,
         name: "ice",
         friction: friction(0.1, 0.05, 0.015),
-        summary: "ice",
+        summary: "smooth ice near its melting point",
         source: "wheels: Wong (2008), peak adhesion on ice; chassis assumed; rolling resistance as on concrete (Wong, 2008)",
     },
     Material {

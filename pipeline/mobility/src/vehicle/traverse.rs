@@ -24,16 +24,6 @@ pub enum TraverseError {
     /// The surface differs by roughness class, and the ground was prepared without classes.
     #[error("drive on a surface that differs by roughness class: the ground was prepared without a class map")]
     NoSurface,
-    /// The simulation of a vehicle with extreme numbers went beyond all bounds.
-    #[error(
-        "drive `{vehicle}`: its motion went beyond all bounds at {time_s} s; raise `step_rate_hz` or soften the vehicle"
-    )]
-    Diverged {
-        /// Name of the vehicle.
-        vehicle: String,
-        /// Time since the start, s.
-        time_s: f64,
-    },
     /// Start or goal is not a point.
     #[error("drive from {start_m:?} to {goal_m:?}: start and goal must be finite and apart")]
     NoLine {
@@ -65,10 +55,10 @@ pub fn drive(
     if !(length_m.is_finite() && length_m > 0.0 && mission.heading_rad.is_finite()) {
         return Err(TraverseError::NoLine { start_m, goal_m });
     }
-    match settled(ground, vehicle, settings, mission) {
+    Ok(match settled(ground, vehicle, settings, mission) {
         Some(simulation) => Run::new(simulation, ground, vehicle, settings, mission).finish(),
-        None => Ok(nowhere(vehicle, settings.parameters(), mission)),
-    }
+        None => nowhere(vehicle, settings.parameters(), mission),
+    })
 }
 
 /// The vehicle at rest on the start, wheels locked; `None` where the ground is undefined.
@@ -94,8 +84,7 @@ pub(crate) fn settled<'a>(
         simulation.step(&brakes);
     }
     simulation.zero_angles();
-    // What is not finite any more is told by the run.
-    (!simulation.undefined || !simulation.body.is_finite()).then_some(simulation)
+    (!simulation.undefined).then_some(simulation)
 }
 
 /// A vehicle whose suspension still moves is given this many times `settle_s` to come to rest.
@@ -148,7 +137,7 @@ fn nowhere(vehicle: &Vehicle, parameters: &TraverseParameters, mission: &Mission
         angular_velocity_rad_s: [0.0; 3],
     };
     let text = format!(
-        "the start ({:.2}, {:.2}) m lies off the terrain or beside cells without data",
+        "the start ({:.2}, {:.2}) m lies off the terrain, beside cells without data, or on extreme ground",
         mission.start_m[0], mission.start_m[1]
     );
     let event = Event { time_s: 0.0, kind: EventKind::OutOfBounds, text };
@@ -220,21 +209,28 @@ impl<'a> Run<'a> {
     }
 
     /// Steps to the outcome.
-    fn finish(mut self) -> Result<Recording, TraverseError> {
+    fn finish(mut self) -> Recording {
         loop {
             if !self.simulation.body.is_finite() {
-                return Err(TraverseError::Diverged { vehicle: self.vehicle.name().to_owned(), time_s: self.time_s() });
+                return self.diverged();
             }
             self.on_clock();
             if let Some((kind, text)) = self.outcome() {
                 self.recording.events.push(Event { time_s: self.time_s(), kind, text });
-                return Ok(self.recording);
+                return self.recording;
             }
             let (command, steering) = (&self.controller.command, &self.simulation.steering);
             actuation::servos(self.vehicle, command, steering, &mut self.servos);
             self.simulation.step(&self.servos);
             self.steps += 1;
         }
+    }
+
+    /// The recording up to where the numbers of ground or vehicle were too large to go on with.
+    fn diverged(mut self) -> Recording {
+        let text = "the motion went beyond all bounds: the ground or a number of the vehicle is extreme".to_owned();
+        self.recording.events.push(Event { time_s: self.time_s(), kind: EventKind::OutOfBounds, text });
+        self.recording
     }
 
     fn parameters(&self) -> &'a TraverseParameters {

@@ -2,7 +2,7 @@
 //!
 //! Records are read one at a time, in order of their ids, so that memory does not grow with the number of items.
 
-use super::cache::{Record, load_record};
+use super::cache::{Record, StoredFile, load_record};
 use super::execute::Failure;
 use super::progress::Progress;
 use crate::error::Error;
@@ -11,7 +11,7 @@ use sastrugi_schemas::Record as Row;
 use sastrugi_schemas::manifest::{FailedItem, ItemNote, Origin};
 use sastrugi_schemas::study::StudyHead;
 use sastrugi_schemas::tables::{ParameterRow, SampleRow};
-use sastrugi_store::release::{self, Head, Release, ReleaseBuilder, ReleaseError};
+use sastrugi_store::release::{self, Head, Incoming, Release, ReleaseBuilder, ReleaseError};
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
 use std::fs::{File, TryLockError};
@@ -119,8 +119,7 @@ fn add_artifacts(builder: &mut ReleaseBuilder, contents: &Contents<'_>) -> Resul
     for (_, folder) in contents.items.iter() {
         let Some(folder) = folder else { continue };
         let record = record(folder)?;
-        for file in &record.files {
-            let Some(path) = &file.product.release_path else { continue };
+        let released = |file: &StoredFile| {
             let origin = Origin {
                 stage: record.item.stage.clone(),
                 item: record.item.id.clone(),
@@ -129,10 +128,14 @@ fn add_artifacts(builder: &mut ReleaseBuilder, contents: &Contents<'_>) -> Resul
                 parents: record.ingredients.parents.keys().cloned().collect(),
                 stream: record.ingredients.stream.clone(),
             };
-            let sha256 = builder.add_file(path, &folder.join(&file.product.file), origin).map_err(release_error)?;
-            if sha256 != file.sha256 {
-                return Err(damaged(folder, &record.item, &file.product.file));
-            }
+            let path = file.product.release_path.clone()?;
+            Some(Incoming { path, source: folder.join(&file.product.file), origin })
+        };
+        let (incoming, files): (Vec<Incoming>, Vec<&StoredFile>) =
+            record.files.iter().filter_map(|file| Some((released(file)?, file))).unzip();
+        let copied = builder.add_files(incoming).map_err(release_error)?;
+        if let Some((file, _)) = files.into_iter().zip(&copied).find(|(file, sha256)| file.sha256 != **sha256) {
+            return Err(damaged(folder, &record.item, &file.product.file));
         }
         for note in record.notes {
             let ItemRef { stage, id: item } = record.item.clone();
@@ -228,21 +231,25 @@ fn made_by(stage: &str) -> Origin {
     Origin { stage: stage.to_owned(), ..Origin::default() }
 }
 
-/// `missions`, `replicates` and `samples`: all runs on one terrain together, sorted by key. Only one terrain's rows are held.
+/// `missions`, `replicates` and `samples`: all runs on one terrain together, sorted by key. Only as many terrains' rows
+/// are held as there are threads.
 fn add_missions(builder: &mut ReleaseBuilder, contents: &Contents<'_>) -> Result<(), Error> {
     let mut terrains: BTreeMap<&str, Vec<&PathBuf>> = BTreeMap::new();
     for (item, folder) in contents.results(&[traverse::STAGE]) {
         terrains.entry(traverse::terrain_of(&item.id)).or_default().push(folder);
     }
-    for (terrain, folders) in &terrains {
+    let samples = |terrain: &str| -> Result<Vec<SampleRow>, Failed> {
         let mut samples: Vec<SampleRow> = Vec::new();
-        for folder in folders {
+        for folder in terrains.get(terrain).into_iter().flatten() {
             let path = folder.join(traverse::SAMPLES);
-            samples.extend(sastrugi_store::parquet::read_table::<SampleRow>(&path).map_err(Error::failed)?);
+            let read = sastrugi_store::parquet::read_table::<SampleRow>(&path);
+            samples.extend(read.map_err(|e| Failed(Error::failed(e)))?);
         }
         samples.sort_by(|a, b| (&a.mission_id, a.sample).cmp(&(&b.mission_id, b.sample)));
-        builder.write_table(terrain, samples, made_by(traverse::STAGE)).map_err(release_error)?;
-    }
+        Ok(samples)
+    };
+    let parts: Vec<&str> = terrains.keys().copied().collect();
+    builder.write_parts(&parts, samples, &made_by(traverse::STAGE)).map_err(|Failed(error)| error)?;
     add_by_terrain(builder, &terrains, |rows| rows.missions, |a, b| a.mission_id.cmp(&b.mission_id))?;
     add_by_terrain(
         builder,
@@ -264,6 +271,15 @@ fn add_parameters(builder: &mut ReleaseBuilder, contents: &Contents<'_>) -> Resu
         Ok(rows)
     };
     write_parts(builder, runs.into_values().map(sorted), traverse::STAGE)
+}
+
+/// An error of a part of a table.
+struct Failed(Error);
+
+impl From<ReleaseError> for Failed {
+    fn from(error: ReleaseError) -> Self {
+        Self(release_error(error))
+    }
 }
 
 /// One table whose first key is the terrain, its rows taken terrain by terrain and sorted there by the other keys.

@@ -4,6 +4,7 @@ use super::{MANIFEST, Release, ReleaseError, SUMS, TABLES, check_path};
 use crate::atomic::sync_folder;
 use crate::digest;
 use crate::parquet::{TableMetadata, TableWriter};
+use rayon::prelude::*;
 use sastrugi_schemas::Record;
 use sastrugi_schemas::manifest::{Artifact, FORMAT, FailedItem, ItemNote, Manifest, Origin, PROGRAM};
 use std::collections::BTreeSet;
@@ -50,6 +51,23 @@ pub struct ReleaseBuilder {
     notes: Vec<ItemNote>,
 }
 
+/// A file to be copied into a release.
+#[derive(Clone, Debug)]
+pub struct Incoming {
+    /// Path in the release.
+    pub path: String,
+    /// File to copy.
+    pub source: PathBuf,
+    /// Where it comes from.
+    pub origin: Origin,
+}
+
+fn copy(source: &Path, target: &Path) -> Result<(u64, String), ReleaseError> {
+    let mut from = File::open(source).map_err(ReleaseError::io(source))?;
+    let mut to = File::create(target).map_err(ReleaseError::io(target))?;
+    digest::copy(&mut from, &mut to).map_err(ReleaseError::io(target))
+}
+
 impl ReleaseBuilder {
     /// Starts a release beside its place: in `.sastrugi-assembling-<dest>`, which is emptied when a killed run left it.
     ///
@@ -79,23 +97,25 @@ impl ReleaseBuilder {
         &self.staging
     }
 
-    /// Copies a file into the release; returns its SHA-256.
+    /// Copies files into the release, several at a time; returns their SHA-256 in the same order.
     ///
     /// # Errors
-    /// The path is not usable, or a file cannot be read or written.
-    pub fn add_file(&mut self, path: &str, source: &Path, origin: Origin) -> Result<String, ReleaseError> {
-        let target = self.target(path)?;
-        let mut from = File::open(source).map_err(ReleaseError::io(source))?;
-        let mut to = File::create(&target).map_err(ReleaseError::io(&target))?;
-        let (bytes, sha256) = digest::copy(&mut from, &mut to).map_err(ReleaseError::io(&target))?;
-        self.list(Artifact { path: path.to_owned(), bytes, sha256: sha256.clone(), origin });
-        Ok(sha256)
+    /// A path is not usable, or a file cannot be read or written.
+    pub fn add_files(&mut self, files: Vec<Incoming>) -> Result<Vec<String>, ReleaseError> {
+        let targets = files.iter().map(|file| self.claim(&file.path)).collect::<Result<Vec<PathBuf>, _>>()?;
+        let copied: Result<Vec<(u64, String)>, ReleaseError> =
+            files.par_iter().zip(&targets).map(|(file, target)| copy(&file.source, target)).collect();
+        let list = |(file, (bytes, sha256)): (Incoming, (u64, String))| {
+            self.artifacts.push(Artifact { path: file.path, bytes, sha256: sha256.clone(), origin: file.origin });
+            sha256
+        };
+        Ok(files.into_iter().zip(copied?).map(list).collect())
     }
 
     /// Writes a text file into the release.
     ///
     /// # Errors
-    /// As [`ReleaseBuilder::add_file`].
+    /// As [`ReleaseBuilder::add_files`].
     pub fn write_text(&mut self, path: &str, text: &str, origin: Origin) -> Result<(), ReleaseError> {
         let target = self.target(path)?;
         fs::write(&target, text).map_err(ReleaseError::io(&target))?;
@@ -107,7 +127,7 @@ impl ReleaseBuilder {
     /// Lists a file that was written into [`ReleaseBuilder::staging`] by someone else (the report).
     ///
     /// # Errors
-    /// As [`ReleaseBuilder::add_file`].
+    /// As [`ReleaseBuilder::add_files`].
     pub fn adopt(&mut self, path: &str, origin: Origin) -> Result<(), ReleaseError> {
         let target = self.target(path)?;
         let (bytes, sha256) = digest::of_file(&target).map_err(ReleaseError::io(&target))?;
@@ -140,6 +160,38 @@ impl ReleaseBuilder {
         self.adopt(&path, Origin { content_sha256, records: Some(summary.rows), ..origin })
     }
 
+    /// Writes one file `part-<part>.parquet` of a table for each part, several at a time; `rows` makes the rows of a part,
+    /// sorted by key. A part without rows has no file.
+    ///
+    /// # Errors
+    /// Those of `rows`; the rows are not sorted, or a file cannot be written.
+    pub fn write_parts<R: Record, E: From<ReleaseError> + Send>(
+        &mut self,
+        parts: &[&str],
+        rows: impl Fn(&str) -> Result<Vec<R>, E> + Sync,
+        origin: &Origin,
+    ) -> Result<(), E> {
+        let path = |part: &str| format!("{TABLES}/{}/part-{part}.parquet", R::TABLE.name);
+        let targets = parts.iter().map(|part| self.claim(&path(part))).collect::<Result<Vec<PathBuf>, _>>()?;
+        let metadata = self.head.table_metadata();
+        let write = |(part, target): (&&str, &PathBuf)| {
+            let rows = rows(part)?;
+            if rows.is_empty() {
+                return Ok(None);
+            }
+            let mut writer = TableWriter::<R>::create(target, &metadata).map_err(ReleaseError::from)?;
+            rows.iter().try_for_each(|row| writer.push(row)).map_err(ReleaseError::from)?;
+            let summary = writer.finish().map_err(ReleaseError::from)?;
+            let (bytes, sha256) = digest::of_file(target).map_err(ReleaseError::io(target))?;
+            let content_sha256 = Some(summary.content_sha256);
+            let origin = Origin { content_sha256, records: Some(summary.rows), ..origin.clone() };
+            Ok(Some(Artifact { path: path(part), bytes, sha256, origin }))
+        };
+        let written: Result<Vec<Option<Artifact>>, E> = parts.par_iter().zip(&targets).map(write).collect();
+        self.artifacts.extend(written?.into_iter().flatten());
+        Ok(())
+    }
+
     /// Lists an item that failed.
     pub fn failed(&mut self, item: FailedItem) {
         self.failed.push(item);
@@ -153,6 +205,13 @@ impl ReleaseBuilder {
     fn list(&mut self, artifact: Artifact) {
         self.paths.insert(artifact.path.clone());
         self.artifacts.push(artifact);
+    }
+
+    /// Where a file goes that is listed later.
+    fn claim(&mut self, path: &str) -> Result<PathBuf, ReleaseError> {
+        let target = self.target(path)?;
+        self.paths.insert(path.to_owned());
+        Ok(target)
     }
 
     /// Writes the manifest as far as it goes, for readers of the folder under construction (the report); sealing writes it
@@ -270,13 +329,13 @@ fn put_in_place(staging: &Path, dest: &Path) -> Result<(), ReleaseError> {
 
 /// Brings every file and folder of a tree to disk.
 fn sync_tree(folder: &Path) -> Result<(), ReleaseError> {
-    for entry in fs::read_dir(folder).map_err(ReleaseError::io(folder))? {
-        let path = entry.map_err(ReleaseError::io(folder))?.path();
+    let entries =
+        fs::read_dir(folder).and_then(Iterator::collect::<Result<Vec<_>, _>>).map_err(ReleaseError::io(folder))?;
+    entries.par_iter().map(std::fs::DirEntry::path).try_for_each(|path| {
         if path.is_dir() {
-            sync_tree(&path)?;
-        } else {
-            File::open(&path).and_then(|f| f.sync_all()).map_err(ReleaseError::io(&path))?;
+            return sync_tree(&path);
         }
-    }
+        File::open(&path).and_then(|f| f.sync_all()).map_err(ReleaseError::io(&path))
+    })?;
     sync_folder(folder).map_err(ReleaseError::io(folder))
 }
