@@ -118,7 +118,7 @@ pub(crate) const MATERIALS: [Material; 6] = [
         preset: SurfacePreset::Rock,
         name: "rock",
         friction: friction(0.8, 0.5, 0.015),
-        summary: "dry rock",
+        summary: "dry rock, as grippy as concrete",
         source: "wheels and rolling resistance: as dry concrete (Wong, 2008: 0.8 to 0.9, 0.013); chassis assumed",
     },
 ];
