@@ -369,7 +369,7 @@ pub struct Roughness {
 pub struct Traverse {
     /// DEM, metric, with cells that the vehicle's wheels can feel.
     pub dem: PathBuf,
-    /// Vehicle (see `kinds`), or a vehicle file of your own (.toml with a table [parameters]).
+    /// Vehicle (see `kinds`), or a vehicle file of your own (.toml with a table `parameters`).
     #[arg(long, value_name = "V", default_value = "husky_a200")]
     pub vehicle: String,
     /// Number of missions.
