@@ -12,13 +12,7 @@ use std::process::Command;
 
 /// The readers' Python; `None` (after a message) where there is none.
 fn python() -> Option<PathBuf> {
-    let python = sastrugi_fixtures::workspace_root().join(".cache/readers/bin/python");
-    if python.exists() {
-        return Some(python);
-    }
-    assert!(std::env::var_os("CI").is_none(), "the independent readers are missing: run ./test with a network");
-    eprintln!("SKIPPED: the independent readers are missing; ./test installs them");
-    None
+    sastrugi_tests::python("readers", "./test")
 }
 
 fn check(python: &Path, script: &str, arguments: &[&Path]) -> Called {

@@ -40,13 +40,7 @@ fn study() -> String {
 
 /// The peer's Python; `None` (after a message) where there is none.
 fn python() -> Option<PathBuf> {
-    let python = sastrugi_fixtures::workspace_root().join(".cache/peer/bin/python");
-    if python.exists() {
-        return Some(python);
-    }
-    assert!(std::env::var_os("CI").is_none(), "the independent engine is missing: run ./test --full with a network");
-    eprintln!("SKIPPED: the independent engine is missing; ./test --full installs it");
-    None
+    sastrugi_tests::python("peer", "./test --full")
 }
 
 fn script(python: &Path, name: &str, arguments: &[&Path]) -> Called {

@@ -179,3 +179,17 @@ pub fn write(folder: &Path, name: &str, text: &str) -> PathBuf {
     std::fs::write(&path, text).expect("a file can be written");
     path
 }
+
+/// Python of the environment `.cache/<environment>`, which `command` sets up; `None` (after a message) where there is none.
+///
+/// # Panics
+/// Where there is none and CI is set: a check that does not run must not pass there.
+pub fn python(environment: &str, command: &str) -> Option<PathBuf> {
+    let python = sastrugi_fixtures::workspace_root().join(".cache").join(environment).join("bin/python");
+    if python.exists() {
+        return Some(python);
+    }
+    assert!(std::env::var_os("CI").is_none(), "{environment}: not installed; run {command} with a network");
+    eprintln!("SKIPPED: {environment} is not installed; {command} does it");
+    None
+}
