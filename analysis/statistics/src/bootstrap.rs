@@ -53,8 +53,8 @@ pub fn redraw<T>(
     (0..replicates).map(|_| once()).collect()
 }
 
-/// Percentile cluster-bootstrap interval of a statistic of the numbers of the clusters in each sample (each number once: the
-/// estimate). `None` when any sample has fewer than two clusters, or by [`Interval::percentile`].
+/// Percentile cluster-bootstrap interval (Davison and Hinkley, 1997, section 3.8) of a statistic of the numbers of the clusters
+/// in each sample (each number once: the estimate). Fewer than about ten clusters give intervals that are too short. `None` when any sample has fewer than two clusters, or by [`Interval::percentile`].
 pub fn cluster_interval(
     samples: &[usize],
     replicates: usize,
@@ -69,18 +69,6 @@ pub fn cluster_interval(
     Interval::percentile(statistic(&once), &redraw(samples, replicates, stream, &statistic), level)
 }
 
-/// Median of all values with a percentile cluster-bootstrap interval (Davison and Hinkley, 1997, section 3.8): as many
-/// clusters as there are, drawn with replacement, whole, `replicates` times. Fewer than about ten clusters give
-/// intervals that are too short; one cluster gives none (`None`), as do no values.
-///
-/// Values that are not finite are left out. Cost: `replicates` medians of the whole sample.
-pub fn cluster_median(clusters: &[Vec<f64>], replicates: usize, level: f64, stream: &mut Stream) -> Option<Interval> {
-    let clusters: Vec<Vec<f64>> = clusters.iter().map(|c| sums::finite(c)).filter(|c| !c.is_empty()).collect();
-    cluster_interval(&[clusters.len()], replicates, level, stream, |drawn| {
-        sums::median(&drawn[0].iter().flat_map(|&c| clusters[c].iter().copied()).collect::<Vec<_>>())
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -88,6 +76,14 @@ mod tests {
 
     fn stream(purpose: &str) -> Stream {
         Streams::for_seed(1, "bootstrap-test").stream(purpose)
+    }
+
+    /// Median of all values of the clusters.
+    fn cluster_median(clusters: &[Vec<f64>], replicates: usize, level: f64, stream: &mut Stream) -> Option<Interval> {
+        let clusters: Vec<Vec<f64>> = clusters.iter().map(|c| sums::finite(c)).filter(|c| !c.is_empty()).collect();
+        cluster_interval(&[clusters.len()], replicates, level, stream, |drawn| {
+            sums::median(&drawn[0].iter().flat_map(|&c| clusters[c].iter().copied()).collect::<Vec<_>>())
+        })
     }
 
     #[test]

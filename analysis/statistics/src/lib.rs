@@ -12,7 +12,7 @@ pub mod multiple;
 pub mod normal;
 pub mod summary;
 
-pub use bootstrap::{Interval, cluster_interval, cluster_median};
+pub use bootstrap::{Interval, cluster_interval};
 pub use components::Components;
 pub use incidence::{Ending, Incidence};
 pub use multiple::holm;
