@@ -57,35 +57,56 @@ fn gold_shards_change_nothing() {
     }
 }
 
-/// Kills a run with SIGKILL at moments spread over its time (the moments need no seed: any of them must do), then lets it
-/// finish.
+/// Runs `study.toml` of a folder, killed with SIGKILL after each of the pauses and started again, and lets it finish.
+fn run_with_kills(folder: &Path, whole: &BTreeMap<String, String>, pauses: &[Duration]) -> BTreeMap<String, String> {
+    for pause in pauses {
+        let mut child = Command::new(program())
+            .args(["run", "study.toml", "-o", "release", "--quiet"])
+            .current_dir(folder)
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        std::thread::sleep(*pause);
+        child.kill().unwrap();
+        child.wait().unwrap();
+        if folder.join("release").exists() {
+            assert_same(whole, &sums(&folder.join("release")), "a release that exists is whole");
+        }
+    }
+    run(folder, &[])
+}
+
+/// Kills at moments spread over the run's time (the moments need no seed: any of them must do).
 #[test]
 fn gold_kills_change_nothing() {
     let whole = run_fresh(&small_study(), &[]);
     let folder = area();
     write(folder.path(), "study.toml", &small_study());
-    for pause_ms in [5, 40, 80, 120, 170, 230, 300, 380, 470, 570, 700, 900] {
-        let mut child = Command::new(program())
-            .args(["run", "study.toml", "-o", "release", "--quiet"])
-            .current_dir(folder.path())
-            .stdout(Stdio::null())
-            .stderr(Stdio::null())
-            .spawn()
-            .unwrap();
-        std::thread::sleep(Duration::from_millis(pause_ms));
-        child.kill().unwrap();
-        child.wait().unwrap();
-        if folder.path().join("release").exists() {
-            assert_same(&whole, &sums(&folder.path().join("release")), "a release that exists is whole");
-        }
-    }
-    assert_same(&whole, &run(folder.path(), &[]), "after kills");
+    let pauses = [5, 40, 80, 120, 170, 230, 300, 380, 470, 570, 700, 900].map(Duration::from_millis);
+    assert_same(&whole, &run_with_kills(folder.path(), &whole, &pauses), "after kills");
     let left: Vec<String> = std::fs::read_dir(folder.path())
         .unwrap()
         .map(|e| e.unwrap().file_name().to_string_lossy().into_owned())
         .filter(|name| !["release", "release.work", "study.toml"].contains(&name.as_str()))
         .collect();
     assert_eq!(left, Vec::<String>::new(), "nothing half-written stays");
+}
+
+/// The published traversal study, whole: 1, 2 and 8 threads, and killed while it makes terrains, drives and (on most
+/// machines) assembles the release.
+#[test]
+#[ignore = "slow: ./test --full"]
+fn gold_the_traversal_study_is_the_same_everywhere() {
+    let study = std::fs::read_to_string(sastrugi_fixtures::study("majhor_2024.toml")).unwrap();
+    let one = run_fresh(&study, &["--threads", "1"]);
+    for threads in ["2", "8"] {
+        assert_same(&one, &run_fresh(&study, &["--threads", threads]), threads);
+    }
+    let folder = area();
+    write(folder.path(), "study.toml", &study);
+    let killed = run_with_kills(folder.path(), &one, &[10, 20, 22].map(Duration::from_secs));
+    assert_same(&one, &killed, "after kills");
 }
 
 /// glibc is told that the CPU has neither FMA nor AVX2: its mathematical functions then change bits, ours must not.

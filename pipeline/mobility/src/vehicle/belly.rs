@@ -9,8 +9,9 @@
 //!
 //! along and across the normal `n`, with a bristle of deflection `s` in the tangent plane of its own (`ds/dt = v_t`), so
 //! that a hung vehicle stays where it hangs. Points lie in rectangular tiles no wider than a wheel; a tile above the
-//! ceiling of the ground is left out as a whole.
+//! ceiling of the ground is left out as a whole, and so is one that cannot have come down since it was last looked at.
 
+use super::clearance::Clearance;
 use super::contact::CULLING_MARGIN_M;
 use super::ground::Ground;
 use super::params::{BellyParameters, VehicleParameters};
@@ -85,7 +86,11 @@ impl Belly {
 
     /// No deflection at any point.
     pub(crate) fn at_rest(&self) -> Bristles {
-        Bristles { deflections: vec![[0.0; 3]; self.points.len()], bent: vec![false; self.tiles.len()] }
+        Bristles {
+            deflections: vec![[0.0; 3]; self.points.len()],
+            bent: vec![false; self.tiles.len()],
+            clearance: Clearance::new(self.tiles.len(), self.extent_m),
+        }
     }
 }
 
@@ -103,6 +108,7 @@ pub(crate) struct Bristles {
     deflections: Vec<Vec3>,
     /// Whether any point of a tile may be deflected.
     bent: Vec<bool>,
+    clearance: Clearance,
 }
 
 /// Motion of the body that carries the points.
@@ -138,15 +144,24 @@ impl Belly {
         bristles: &mut Bristles,
     ) -> Load {
         let mut load = Load::default();
-        for (tile, bent) in self.tiles.iter().zip(&mut bristles.bent) {
-            let deflections = &mut bristles.deflections[tile.points.clone()];
-            if tile.is_clear(ground, motion) {
+        let Bristles { deflections, bent, clearance } = bristles;
+        clearance.moved(ground, motion.position, &motion.axes);
+        for (index, (tile, bent)) in self.tiles.iter().zip(bent).enumerate() {
+            if clearance.is_clear(index) {
+                continue;
+            }
+            let deflections = &mut deflections[tile.points.clone()];
+            let above_m = tile.above_ceiling_m(ground, motion);
+            if above_m > CULLING_MARGIN_M {
                 if *bent {
                     deflections.fill([0.0; 3]);
                     *bent = false;
                 }
+                clearance.found(index, above_m);
                 continue;
             }
+            // Next to the edge of the ground a small move may leave it.
+            let mut least_m = if above_m == f64::NEG_INFINITY { above_m } else { f64::INFINITY };
             for (&point, deflection) in self.points[tile.points.clone()].iter().zip(deflections) {
                 let arm = motion.axes.to_map(point);
                 let at = add(motion.position, arm);
@@ -158,23 +173,27 @@ impl Belly {
                     load.force = add(load.force, force);
                     load.moment = add(load.moment, cross(arm, force));
                     *bent = true;
+                    least_m = f64::NEG_INFINITY;
                 } else {
                     *deflection = [0.0; 3];
                     load.undefined |= overlap.is_nan();
+                    least_m = least_m.min(-overlap);
                 }
             }
+            clearance.found(index, least_m);
         }
         load
     }
 }
 
 impl Tile {
-    /// True when no point of the tile can touch.
-    fn is_clear(&self, ground: &Ground, motion: &Motion) -> bool {
+    /// How far all points of the tile are above the highest ground near them at least, m; minus infinity where that is not
+    /// known.
+    fn above_ceiling_m(&self, ground: &Ground, motion: &Motion) -> f64 {
         let centre = add(motion.position, motion.axes.to_map(self.centre));
         let Axes { x, y, z } = motion.axes;
         let drop = x[2].abs() * self.half_size[0] + y[2].abs() * self.half_size[1] + z[2].abs() * self.half_size[2];
-        centre[2] - drop - CULLING_MARGIN_M > ground.ceiling(centre[0], centre[1])
+        centre[2] - drop - ground.ceiling(centre[0], centre[1])
     }
 }
 

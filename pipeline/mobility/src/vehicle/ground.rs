@@ -64,6 +64,8 @@ pub struct Ground {
     heights: Vec<f32>,
     /// Upper bound of the heights in reach of a point of the bilinear cell that starts here.
     ceiling: Vec<f32>,
+    /// See [`Ground::steepness`].
+    steepness: f64,
     reach_m: f64,
     extent_m: f64,
     surface: Option<SurfaceMap>,
@@ -108,6 +110,7 @@ impl Ground {
             bounds: [geometry.x(0), geometry.y(geometry.rows - 1), geometry.x(geometry.cols - 1), geometry.y(0)],
             ceiling: ceiling(&heights, cols, reach),
             heights,
+            steepness: steepness(dem),
             reach_m: vehicle.reach_m(),
             extent_m: vehicle.extent_m(),
             surface: None,
@@ -175,6 +178,12 @@ impl Ground {
         self.ceiling.get(k).map_or(f64::INFINITY, |&z| f64::from(z))
     }
 
+    /// What a point that moves by 1 m can lose of its height above the ground, m; infinite for ground with holes.
+    #[inline(always)]
+    pub(crate) fn steepness(&self) -> f64 {
+        self.steepness
+    }
+
     /// The same ground without a bound: every contact point is looked at.
     #[cfg(test)]
     pub(crate) fn without_ceiling(mut self) -> Self {
@@ -234,6 +243,24 @@ fn framed(dem: &Grid, rim: [usize; 2]) -> (Vec<f32>, usize) {
         }
     }
     (heights, cols)
+}
+
+/// `sqrt(1 + L^2)` with the steepest slopes of the bilinear surface along either axis, `L^2 = Lx^2 + Ly^2`: both are slopes
+/// between neighbouring cell centres.
+fn steepness(dem: &Grid) -> f64 {
+    if dem.finite_count() < dem.values.len() {
+        return f64::INFINITY;
+    }
+    let [cell_x, cell_y] = dem.geometry.cell;
+    // What overflows single precision is infinite here too.
+    let steepest = |a: &[f64], b: &[f64], cell: f64| {
+        a.iter().zip(b).fold(0.0f64, |most, (&a, &b)| most.max((f64::from(a as f32) - f64::from(b as f32)).abs()))
+            / cell
+    };
+    let along_x = (0..dem.rows()).map(|row| steepest(dem.row(row), &dem.row(row)[1..], cell_x));
+    let along_y = (1..dem.rows()).map(|row| steepest(dem.row(row - 1), dem.row(row), cell_y));
+    let (x, y) = (along_x.fold(0.0, f64::max), along_y.fold(0.0, f64::max));
+    (1.0 + x * x + y * y).sqrt()
 }
 
 /// Largest height within `reach` cells of each bilinear cell and one cell more; infinite where one is not finite.

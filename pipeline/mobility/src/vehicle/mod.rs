@@ -25,6 +25,7 @@ mod actuation;
 mod articulated;
 mod belly;
 mod body;
+mod clearance;
 mod contact;
 mod controller;
 mod drive;

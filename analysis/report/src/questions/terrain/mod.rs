@@ -1,4 +1,4 @@
-//! Which terrains the release holds: relief, classes, spectra, heights, by group.
+//! Which terrains the release holds: relief, classes, spectra, heights, by group; and the figures of every surface.
 
 mod classes;
 mod reliefs;
@@ -23,7 +23,7 @@ const GROUPS_MAX: usize = 12;
 fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     let groups = data.terrain_groups();
     if groups.is_empty() {
-        return Ok(Vec::new());
+        return Ok(vec![Block::FoldedTable(surfaces(data))]);
     }
     let drawn = &groups[..groups.len().min(GROUPS_MAX)];
     let mut blocks = vec![Block::Text(introduction(&groups)), Block::Table(medians(&groups))];
@@ -39,6 +39,7 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     push(&mut blocks, "Spectra", families.iter().flat_map(|f| spectra::spectra(data, f)).collect());
     push(&mut blocks, "Heights", families.iter().flat_map(|f| spectra::distributions(data, f)).collect());
     blocks.push(Block::FoldedTable(all(data)));
+    blocks.push(Block::FoldedTable(surfaces(data)));
     Ok(blocks)
 }
 
@@ -117,6 +118,32 @@ fn medians(groups: &[Group<TerrainRow>]) -> TableBlock {
         numbers.row([text(&group.name), count(group.rows.len())].into_iter().chain(figures));
     }
     TableBlock { id: "terrain-medians".into(), caption: "Terrain by group (medians over terrains)".into(), numbers }
+}
+
+/// Figures of every surface of the release.
+fn surfaces(data: &Data) -> TableBlock {
+    let names = [
+        "surface_id",
+        "stage",
+        "fit_id",
+        "cell_x_m",
+        "valid_share",
+        "sq_m",
+        "sa_m",
+        "ssk",
+        "sku",
+        "sz_m",
+        "sdq",
+        "sal_m",
+        "aspect_ratio",
+        "direction_deg",
+        "hurst_exponent",
+        "hurst_standard_error",
+        "hurst_lag_min_m",
+        "hurst_lag_max_m",
+    ];
+    let numbers = Numbers::select("tables/surfaces", &data.surfaces, &names);
+    TableBlock { id: "surfaces".into(), caption: "All surfaces (ISO 25178)".into(), numbers }
 }
 
 fn all(data: &Data) -> TableBlock {

@@ -51,34 +51,7 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
         blocks.push(Block::Text(format!("The first {TEXTURES_MAX} of {} textures are drawn.", textures.len())));
     }
     blocks.push(Block::FoldedTable(all(data)));
-    blocks.push(Block::FoldedTable(surfaces(data)));
     Ok(blocks)
-}
-
-/// Figures of every surface of the release.
-fn surfaces(data: &Data) -> TableBlock {
-    let names = [
-        "surface_id",
-        "stage",
-        "fit_id",
-        "cell_x_m",
-        "valid_share",
-        "sq_m",
-        "sa_m",
-        "ssk",
-        "sku",
-        "sz_m",
-        "sdq",
-        "sal_m",
-        "aspect_ratio",
-        "direction_deg",
-        "hurst_exponent",
-        "hurst_standard_error",
-        "hurst_lag_min_m",
-        "hurst_lag_max_m",
-    ];
-    let numbers = Numbers::select("tables/surfaces", &data.surfaces, &names);
-    TableBlock { id: "surfaces".into(), caption: "All surfaces (ISO 25178)".into(), numbers }
 }
 
 fn heading(texture: &TerrainRow) -> String {
