@@ -5,6 +5,7 @@ pub mod class;
 pub mod coregistration;
 pub mod fit;
 pub mod kind;
+pub mod log;
 pub mod manifest;
 pub mod study;
 pub mod tables;

@@ -4,7 +4,7 @@
 
 mod traverse;
 
-use sastrugi_tests::{area, sastrugi_in, small_study, sums, write};
+use sastrugi_tests::{area, rows, sastrugi_in, small_study, sums, write};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
@@ -320,4 +320,34 @@ fn val_merge_refuses_what_does_not_fit() {
     refused(&["a", "c"], "another study");
     flip(&first_product(&path.join("b/items")));
     refused(&["a", "b"], "missing or damaged");
+}
+
+/// `analyze` says of a recording what the release's table says of the mission, bit for bit.
+#[test]
+fn val_a_recording_is_judged_as_its_mission() {
+    let folder = area();
+    release_in(folder.path());
+    let missions = rows(&folder.path().join("release"), "missions");
+    assert!(!missions.is_empty());
+    for mission in &missions {
+        let text = |column: &str| mission[column].as_str().unwrap().to_owned();
+        let call = sastrugi_in(folder.path(), &["analyze", &format!("release/{}", text("path")), "--json"]);
+        assert_eq!(call.code, 0, "{}", call.stderr);
+        let found: Value = serde_json::from_str(&call.stdout).unwrap();
+        let log = &found[0]["log"];
+        assert_eq!(log["outcome"].as_str().unwrap(), text("outcome"));
+        for column in [
+            "path_length_m",
+            "rms_vertical_acceleration_m_s2",
+            "rms_pitch_rate_deg_s",
+            "rms_roll_rate_deg_s",
+            "rms_body_pitch_rate_deg_s",
+            "rms_body_roll_rate_deg_s",
+            "max_pitch_deg",
+            "max_roll_deg",
+            "sample_rate_hz",
+        ] {
+            assert_eq!(log[column].as_f64(), mission[column].as_f64(), "{}: {column}", text("path"));
+        }
+    }
 }

@@ -156,3 +156,51 @@ fn find<'a>(answer: &'a Value, name: &str) -> Option<&'a Value> {
     let map = answer.as_object()?;
     map.iter().find(|(key, _)| key.ends_with(name)).map(|(_, v)| v).or_else(|| map.values().find_map(|v| find(v, name)))
 }
+
+/// Logs by the writers of mcap-ros2-support, rosbags and mcap-protobuf-support have the figures that numpy takes from the same
+/// motion (interpolation and differences alike; angles to the rounding of the interpolated quaternions' lengths), whichever
+/// messages carry it; bad ones are refused by name.
+#[test]
+fn val_logs_of_other_writers_are_judged_alike() {
+    let Some(python) = python() else { return };
+    let folder = area();
+    let made = check(&python, "make_logs.py", &[folder.path()]);
+    assert_eq!(made.code, 0, "{}", made.stderr);
+    let expected: Value = serde_json::from_str(&made.stdout).unwrap();
+    for (name, figures) in expected.as_object().unwrap() {
+        let call = sastrugi_in(folder.path(), &["analyze", &format!("{name}.mcap"), "--json"]);
+        assert_eq!(call.code, 0, "{name}: {}", call.stderr);
+        let found: Value = serde_json::from_str(&call.stdout).unwrap();
+        for (figure, value) in figures.as_object().unwrap() {
+            let (ours, theirs) = (found[0]["log"][figure].as_f64().unwrap(), value.as_f64().unwrap());
+            assert!((ours / theirs - 1.0).abs() < 1e-6, "{name}: {figure} is {ours}, not {theirs}");
+        }
+    }
+    let call = sastrugi_in(folder.path(), &["analyze", "truncated.mcap", "--json"]);
+    assert_eq!(call.code, 3, "{}", call.stderr);
+    let found: Value = serde_json::from_str(&call.stdout).unwrap();
+    let row = &found[0]["log"];
+    assert!(row["broken"].as_str().unwrap().starts_with("the file breaks off after "), "{row}");
+    assert!((10.0..20.0).contains(&row["time_s"].as_f64().unwrap()), "{row}");
+    let refusals = [
+        ("no_pose", "no pose stream: it takes Odometry"),
+        ("backwards", "on /odom, time goes back by "),
+        ("damaged", "the file is damaged after "),
+        ("text", "this is no MCAP file"),
+        ("missing", "No such file"),
+    ];
+    for (name, why) in refusals {
+        let call = sastrugi_in(folder.path(), &["analyze", &format!("{name}.mcap")]);
+        assert_eq!(call.code, 65, "{name}: {}", call.stderr);
+        assert!(call.stderr.contains(why) && call.stderr.contains(name), "{name}: {}", call.stderr);
+    }
+    // One good log among bad ones is judged, and the table read back.
+    let several = ["analyze", "odometry.mcap", "tf.mcap", "text.mcap", "--group", "field", "-o", "logs.parquet"];
+    let call = sastrugi_in(folder.path(), &several);
+    assert_eq!(call.code, 3, "{}", call.stderr);
+    let table = check(&python, "show_table.py", &[&folder.path().join("logs.parquet")]);
+    assert_eq!(table.code, 0, "{}", table.stderr);
+    let rows: Value = serde_json::from_str(&table.stdout).unwrap();
+    assert_eq!(rows.as_array().unwrap().len(), 2);
+    assert_eq!((rows[0]["log_id"].as_str(), rows[0]["group"].as_str()), (Some("odometry.mcap"), Some("field")));
+}

@@ -78,6 +78,14 @@ pub enum Verb {
         sastrugi traverse bar.tif --set-missions length_m=2 --set-missions border_m=0.5 \\\n    \
         --set-roughness closing_radius_m=0 --replicates 8 -o drive")]
     Traverse(Traverse),
+    /// Take the traversal metrics from MCAP logs of any vehicle: ours, ROS 2 or Foxglove.
+    #[command(
+        after_help = "Reads Odometry, PoseStamped, TFMessage, Imu (ROS 2, CDR), PoseInFrame, Odometry, FrameTransforms \
+        (Foxglove, protobuf) and our own messages.\nExit code 3: a log breaks off, or some of several could not be judged.\n\n\
+        Examples:\n  sastrugi analyze drive.mcap\n  sastrugi analyze bags/*.mcap --group field -o field.parquet\n  \
+        sastrugi analyze drive.mcap --topic /odometry/filtered --dem site.tif --offset 0,0,-12.5"
+    )]
+    Analyze(Analyze),
     /// Write the report of a release: one offline HTML page, figures as SVG, numbers as JSON.
     #[command(after_help = "Example:\n  sastrugi report release -o release-report")]
     Report(Report),
@@ -116,6 +124,7 @@ impl Verb {
             Self::Texture(args) => Some(&args.output),
             Self::Convert(args) => Some(&args.output),
             Self::Roughness(args) => args.classes.as_deref(),
+            Self::Analyze(args) => args.output.as_deref(),
             _ => None,
         }
     }
@@ -405,6 +414,44 @@ pub struct Report {
     pub release: PathBuf,
     /// Folder to write, never inside of the release; ./NAME-report when absent.
     #[arg(short, long, value_name = "DIR")]
+    pub output: Option<PathBuf>,
+}
+
+/// `analyze`.
+#[derive(Debug, Args)]
+pub struct Analyze {
+    /// MCAP logs.
+    #[arg(required = true, value_name = "MCAP")]
+    pub logs: Vec<PathBuf>,
+    /// Topic of the poses; the best one when absent.
+    #[arg(long, value_name = "TOPIC")]
+    pub topic: Option<String>,
+    /// Frame to follow where poses come as transforms.
+    #[arg(long, value_name = "FRAME", default_value = "base_link")]
+    pub body: String,
+    /// Frame in which it moves; the root of the transforms when absent.
+    #[arg(long, value_name = "FRAME")]
+    pub fixed: Option<String>,
+    /// Sampling rate of the figures, Hz; slower logs keep their own.
+    #[arg(long, value_name = "HZ", default_value_t = 20.0, allow_negative_numbers = true)]
+    pub rate: f64,
+    /// Band of the vertical acceleration, Hz.
+    #[arg(long, value_name = "LOW,HIGH", default_value = "0.2,8", allow_hyphen_values = true)]
+    pub band: String,
+    /// How heights and angles are differentiated: second_difference or gradient.
+    #[arg(long, value_name = "D", default_value = "second_difference")]
+    pub differentiator: String,
+    /// DEM of the ground: clearance, and classes under the path.
+    #[arg(long, value_name = "DEM")]
+    pub dem: Option<PathBuf>,
+    /// What to add to the log's positions to get the DEM's, m.
+    #[arg(long, value_name = "X,Y,Z", default_value = "0,0,0", allow_hyphen_values = true)]
+    pub offset: String,
+    /// Label of the logs in the table.
+    #[arg(long, value_name = "NAME")]
+    pub group: Option<String>,
+    /// Write the table `logs`, as Parquet.
+    #[arg(short, long, value_name = "PARQUET")]
     pub output: Option<PathBuf>,
 }
 

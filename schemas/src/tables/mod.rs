@@ -8,6 +8,7 @@ pub mod covariance;
 pub mod fits;
 pub mod height_distribution;
 pub mod likelihood_profile;
+pub mod logs;
 pub mod missions;
 pub mod parameters;
 pub mod profile_psd;
@@ -25,6 +26,7 @@ pub use covariance::CovarianceRow;
 pub use fits::FitRow;
 pub use height_distribution::HeightDistributionRow;
 pub use likelihood_profile::LikelihoodProfileRow;
+pub use logs::LogRow;
 pub use missions::MissionRow;
 pub use parameters::ParameterRow;
 pub use profile_psd::ProfilePsdRow;
@@ -83,7 +85,7 @@ pub struct Table {
 }
 
 /// All tables, in the order of the report and of `schema`.
-pub const ALL: [&Table; 17] = [
+pub const ALL: [&Table; 18] = [
     &TerrainRow::TABLE,
     &SurfaceRow::TABLE,
     &FitRow::TABLE,
@@ -101,6 +103,7 @@ pub const ALL: [&Table; 17] = [
     &ReplicateRow::TABLE,
     &SampleRow::TABLE,
     &ParameterRow::TABLE,
+    &LogRow::TABLE,
 ];
 
 /// The table of that name.

@@ -1,5 +1,6 @@
 //! One module per group of verbs: arguments in, a printed result and an exit code out.
 
+mod analyze;
 mod compare;
 mod files;
 mod generate;
@@ -29,6 +30,7 @@ pub fn dispatch(arguments: &Arguments) -> Verdict {
         Verb::Fit(args) => generate::fit(args, common),
         Verb::Texture(args) => generate::texture(args, common),
         Verb::Roughness(args) => generate::roughness(args, common),
+        Verb::Analyze(args) => analyze::analyze(args, common),
         Verb::Compare(args) => compare::compare(args, common),
         Verb::Convert(args) => files::convert(args, common),
         Verb::Info(args) => files::info(args, common),

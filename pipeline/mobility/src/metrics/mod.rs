@@ -17,6 +17,7 @@
 //! Euler angles are roll about x forward, pitch about y left (nose down positive), yaw about z up, applied in the order
 //! yaw, pitch, roll. Source: Majhor and Bos, section 2.4, which leaves the differentiator open. Cost: one pass per figure.
 
+pub mod log;
 mod rows;
 #[cfg(test)]
 mod tests;

@@ -1,5 +1,6 @@
 //! Verbs that work on single files: the same kernels as in a study, without a study.
 
+pub mod analyze;
 pub mod compare;
 pub mod fit;
 pub mod parameters;
@@ -10,6 +11,7 @@ pub mod texture;
 pub mod traverse;
 
 pub use reading::{Read, Reading, read, read_as_it_is, transects};
+pub use sastrugi_mobility::metrics::log::LogSettings;
 
 use crate::error::Error;
 use sastrugi_numeric::Grid;

@@ -3,12 +3,15 @@
 //! Messages stand in the order of their time; chunks are compressed with Zstandard on one thread and carry checksums;
 //! bytes follow from the recording alone. The map frame is the terrain's own coordinates.
 
+mod log;
 mod mesh;
 mod messages;
 mod protobuf;
 
 #[cfg(test)]
 mod tests;
+
+pub use log::read_log;
 
 use crate::digest::ContentHash;
 use crate::{PROGRAM, atomic};

@@ -1,0 +1,202 @@
+//! Logs of any origin: poses, transforms, inertial measurements and events out of an MCAP file.
+//!
+//! Read are our own messages and Foxglove's (protobuf), and those of ROS 2 (CDR); see [`decode`]. The file is streamed, with
+//! its chunks' checksums; memory holds one chunk's window and what is kept. A file that breaks off is read up to there.
+
+mod foxglove;
+mod ros2;
+
+use super::McapError;
+use mcap::records::Record;
+use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
+use sastrugi_schemas::log::{ImuStream, Log, PoseStream, TimedForce, TimedPose, TransformStream};
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
+/// Longest record outside of chunks, bytes: more than any message that is read here, less than harm.
+const RECORD_MAX: usize = 1 << 30;
+
+/// What one message says.
+enum Said {
+    /// A pose in a frame, of a body (empty where the message does not say).
+    Pose { frame: String, body: String, pose: TimedPose },
+    /// Poses of children in parents.
+    Transforms(Vec<Transform>),
+    /// A measurement in a frame.
+    Imu { frame: String, sample: TimedForce },
+    /// An event by name.
+    Event(i64, String),
+}
+
+/// A pose of a child frame in its parent.
+struct Transform {
+    parent: String,
+    child: String,
+    pose: TimedPose,
+}
+
+/// Decodes a message; `None` for bytes that are no such message. The time is that of the log, for messages without a stamp.
+type Decoder = fn(&[u8], i64) -> Option<Said>;
+
+/// How messages of a schema in an encoding are read; `None` for those that say nothing about motion.
+fn decoder(schema: &str, encoding: &str) -> Option<Decoder> {
+    match encoding {
+        "protobuf" => foxglove::decoder(schema),
+        "cdr" => ros2::decoder(schema),
+        _ => None,
+    }
+}
+
+/// True for messages that are read in their usual encoding.
+fn is_known(schema: &str) -> bool {
+    foxglove::decoder(schema).is_some() || ros2::decoder(schema).is_some()
+}
+
+/// Reads a log.
+///
+/// # Errors
+/// [`McapError::Io`]; [`McapError::Unusable`] for a file that is no MCAP, whose checksums are wrong, or that holds a message
+/// that does not decode as its schema says. A file that only ends too early is no error: see [`Log::broken`].
+pub fn read_log(path: &Path) -> Result<Log, McapError> {
+    let unusable = |reason: String| McapError::Unusable { path: path.to_owned(), reason };
+    let io = |source| McapError::Io { path: path.to_owned(), source };
+    let mut file = File::open(path).map_err(io)?;
+    let options = LinearReaderOptions::default()
+        .with_validate_chunk_crcs(true)
+        .with_validate_data_section_crc(true)
+        .with_record_length_limit(RECORD_MAX);
+    let mut reader = LinearReader::new_with_options(options);
+    let mut gathered = Gathered::default();
+    while let Some(event) = reader.next_event() {
+        match event {
+            Ok(LinearReadEvent::ReadRequest(wanted)) => {
+                let read = file.read(reader.insert(wanted)).map_err(io)?;
+                reader.notify_read(read);
+            }
+            Ok(LinearReadEvent::Record { data, opcode }) => {
+                let damaged = |e| unusable(format!("the file is damaged after {} messages: {e}", gathered.messages));
+                let record = mcap::parse_record(opcode, data).map_err(damaged)?;
+                gathered.take(&record).map_err(unusable)?;
+            }
+            Err(mcap::McapError::UnexpectedEof) if gathered.begun => {
+                gathered.log.broken = Some(gathered.broken());
+                break;
+            }
+            Err(mcap::McapError::BadMagic | mcap::McapError::UnexpectedEof) => {
+                return Err(unusable("this is no MCAP file".to_owned()));
+            }
+            Err(error) => {
+                return Err(unusable(format!("the file is damaged after {} messages: {error}", gathered.messages)));
+            }
+        }
+    }
+    Ok(gathered.log)
+}
+
+/// A channel whose messages are read.
+struct Known {
+    topic: String,
+    schema: String,
+    decoder: Decoder,
+    /// Where its poses or measurements are kept.
+    place: Option<usize>,
+}
+
+#[derive(Default)]
+struct Gathered {
+    log: Log,
+    /// The header has been read.
+    begun: bool,
+    messages: u64,
+    first_ns: Option<u64>,
+    last_ns: u64,
+    schemas: BTreeMap<u16, String>,
+    channels: BTreeMap<u16, Known>,
+    /// Transforms by topic, parent and child.
+    links: BTreeMap<(String, String, String), usize>,
+}
+
+impl Gathered {
+    /// Where the file breaks off.
+    fn broken(&self) -> String {
+        let seconds = self.last_ns.saturating_sub(self.first_ns.unwrap_or(self.last_ns)) as f64 * 1e-9;
+        format!("the file breaks off after {} messages, {seconds:.3} s after the first", self.messages)
+    }
+
+    fn take(&mut self, record: &Record<'_>) -> Result<(), String> {
+        self.begun = true;
+        match record {
+            Record::Schema { header, .. } => {
+                self.schemas.insert(header.id, header.name.clone());
+            }
+            Record::Channel(channel) => self.channel(channel),
+            Record::Message { header, data } => {
+                self.messages += 1;
+                self.first_ns.get_or_insert(header.log_time);
+                self.last_ns = header.log_time;
+                return self.message(header.channel_id, header.log_time, data);
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn channel(&mut self, channel: &mcap::records::Channel) {
+        let Some(schema) = self.schemas.get(&channel.schema_id) else { return };
+        if self.channels.contains_key(&channel.id) {
+            return;
+        }
+        let (topic, encoding) = (&channel.topic, &channel.message_encoding);
+        if let Some(decoder) = decoder(schema, encoding) {
+            let known = Known { topic: topic.clone(), schema: schema.clone(), decoder, place: None };
+            self.channels.insert(channel.id, known);
+        } else if is_known(schema) {
+            let unread = format!("{topic} ({schema} in the encoding `{encoding}`)");
+            if !self.log.unread.contains(&unread) {
+                self.log.unread.push(unread);
+            }
+        }
+    }
+
+    fn message(&mut self, channel: u16, log_time: u64, data: &[u8]) -> Result<(), String> {
+        let Some(known) = self.channels.get_mut(&channel) else { return Ok(()) };
+        let time_ns = i64::try_from(log_time).unwrap_or(i64::MAX);
+        let said = (known.decoder)(data, time_ns).ok_or_else(|| {
+            format!("message {} on {} does not decode as a {}", self.messages, known.topic, known.schema)
+        })?;
+        let Log { poses, transforms, imus, events, .. } = &mut self.log;
+        match said {
+            Said::Pose { frame, body, pose } => {
+                let place = *known.place.get_or_insert_with(|| {
+                    let (topic, schema) = (known.topic.clone(), known.schema.clone());
+                    poses.push(PoseStream { topic, schema, frame, body, poses: Vec::new() });
+                    poses.len() - 1
+                });
+                poses[place].poses.push(pose);
+            }
+            Said::Imu { frame, sample } => {
+                let place = *known.place.get_or_insert_with(|| {
+                    let (topic, schema) = (known.topic.clone(), known.schema.clone());
+                    imus.push(ImuStream { topic, schema, frame, samples: Vec::new() });
+                    imus.len() - 1
+                });
+                imus[place].samples.push(sample);
+            }
+            Said::Transforms(all) => {
+                for Transform { parent, child, pose } in all {
+                    let key = (known.topic.clone(), parent, child);
+                    let place = *self.links.entry(key).or_insert_with_key(|(topic, parent, child)| {
+                        let [topic, parent, child] = [topic, parent, child].map(Clone::clone);
+                        transforms.push(TransformStream { topic, parent, child, poses: Vec::new() });
+                        transforms.len() - 1
+                    });
+                    transforms[place].poses.push(pose);
+                }
+            }
+            Said::Event(time_ns, name) => events.push((time_ns, name)),
+        }
+        Ok(())
+    }
+}
