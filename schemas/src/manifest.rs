@@ -28,6 +28,9 @@ pub struct Manifest {
     pub license: String,
     /// Every file of the release but this one and SHA256SUMS, by path.
     pub artifacts: Vec<Artifact>,
+    /// Measured data that files come from, in the study's order.
+    #[serde(default)]
+    pub sources: Vec<Source>,
     /// Items that failed, by stage and item.
     pub failed: Vec<FailedItem>,
     /// Sentences that readers of an item's files must know, in order of the items.
@@ -70,6 +73,26 @@ pub struct Origin {
     /// Words of its random streams, joined by `/`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stream: Option<String>,
+    /// Ids of the measured data it comes from, itself or through its parents.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub sources: Vec<String>,
+}
+
+/// Measured data: what its maker asks of everything that comes from it.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Source {
+    /// Id of the DEM in the study.
+    pub id: String,
+    /// Licence, as the study states it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub license: Option<String>,
+    /// Whom to name.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub attribution: Option<String>,
+    /// How to cite it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub citation: Option<String>,
 }
 
 /// A sentence about an item: a conversion, a rounded size, a warning of a fit.

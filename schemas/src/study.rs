@@ -21,7 +21,16 @@ pub struct StudyHead {
     pub seed: u64,
     /// Date of the study, YYYY-MM-DD: the only date in any output.
     pub date: String,
-    /// Licence of the release as an SPDX expression.
+    /// Version of the dataset, as its readers cite it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub version: Option<String>,
+    /// Page of the dataset, `https://...`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub url: Option<String>,
+    /// DOI of the dataset, `10.<registrant>/<suffix>`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub doi: Option<String>,
+    /// Licence of the release as an SPDX expression; it must be one that the licences of its DEMs permit.
     #[serde(default = "default_license")]
     pub license: String,
     /// People or groups that made the study.
@@ -95,12 +104,15 @@ pub struct DemItem {
     /// Take only the ground points (class 2) of a point cloud.
     #[serde(default)]
     pub ground_only: Option<bool>,
-    /// Licence of the data.
+    /// Licence of the data as an SPDX identifier, or `public domain`.
     #[serde(default)]
     pub license: Option<String>,
     /// Whom to name as the source.
     #[serde(default)]
     pub attribution: Option<String>,
+    /// How the data asks to be cited.
+    #[serde(default)]
+    pub citation: Option<String>,
 }
 
 /// `[[terrain]]` around a generator's parameters.

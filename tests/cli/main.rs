@@ -4,6 +4,7 @@
 
 mod bad_input;
 mod compare;
+mod metadata;
 mod minus;
 mod sources;
 mod verbs;

@@ -134,7 +134,7 @@ pub fn run(loaded: &Loaded, request: &RunRequest<'_>, progress: &dyn Progress) -
         None => {
             let items = (0..graph.len()).map(|p| located(graph, &cache, &execution, p)).collect();
             let contents =
-                Contents { head: &loaded.study.head, study: &loaded.released, items, failures: &execution.failures };
+                Contents { study: &loaded.study, text: &loaded.released, items, failures: &execution.failures };
             assemble(contents, request.output, progress)?;
         }
     }
@@ -233,8 +233,7 @@ pub fn merge(shards: &[PathBuf], output: &Path, progress: &dyn Progress) -> Resu
     let joined = shard::join(shards)?;
     let study = Study::parse(&joined.study, Path::new(""), &registry::section_names()).map_err(Error::failed)?;
     let items = joined.items.len();
-    let contents =
-        Contents { head: &study.head, study: &joined.study, items: joined.items, failures: &joined.failures };
+    let contents = Contents { study: &study, text: &joined.study, items: joined.items, failures: &joined.failures };
     assemble(contents, output, progress)?;
     Ok(RunSummary { output: output.to_owned(), items, computed: 0, failures: joined.failures })
 }

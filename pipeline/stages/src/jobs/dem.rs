@@ -5,6 +5,7 @@ use super::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work};
 use crate::registry::{BuildError, Builder, Heightfield, InputPlace};
 use crate::revision::Room;
 use crate::runner::graph::Node;
+use crate::study::terms::{self, Objection};
 use sastrugi_numeric::{Geometry, Grid, resample};
 use sastrugi_schemas::study::DemItem;
 use sastrugi_store::dem::{self, Claimed, Crs, Dem, ReadOptions};
@@ -98,6 +99,9 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
         entry.check_keys::<DemItem>(&params, &json!({}))?;
         builder.claim(&entry, STAGE, &item.id)?;
         check(&item).map_err(|(key, message)| entry.error(key, format!("`{key}` {message}")))?;
+        if let Some(Objection::Conflict(why)) = terms::objection(&item, &builder.study.head.license) {
+            return Err(entry.error("license", format!("`license` {why}")).into());
+        }
         let id = item.id.clone();
         let original = Original::of(&format!("dem/{id}"), &builder.study.folder, &item.file)?;
         let claimed = dem::claimed(&builder.study.folder.join(&item.file), &ReadOptions { cell_m: item.cell_m });
@@ -166,6 +170,7 @@ fn recipe(item: &DemItem) -> Value {
         "ground_only": item.ground_only,
         "license": item.license,
         "attribution": item.attribution,
+        "citation": item.citation,
     })
 }
 

@@ -5,11 +5,12 @@
 use super::cache::{Record, StoredFile, load_record};
 use super::execute::Failure;
 use super::progress::Progress;
+use super::sources::Sources;
 use crate::error::Error;
 use crate::jobs::{ItemRef, Rows, fit, roughness, scoreboard, texture, traverse};
+use crate::study::Study;
 use sastrugi_schemas::Record as Row;
 use sastrugi_schemas::manifest::{FailedItem, ItemNote, Origin};
-use sastrugi_schemas::study::StudyHead;
 use sastrugi_schemas::tables::{ParameterRow, SampleRow};
 use sastrugi_store::release::{self, Head, Incoming, Release, ReleaseBuilder, ReleaseError};
 use std::cmp::Ordering;
@@ -19,11 +20,11 @@ use std::path::{Path, PathBuf};
 
 /// What goes into a release.
 pub struct Contents<'a> {
-    /// The study's head.
-    pub head: &'a StudyHead,
-    /// The study as it is released.
-    pub study: &'a str,
-    /// Every item, with the folder of its result.
+    /// The study.
+    pub study: &'a Study,
+    /// Its text as it is released.
+    pub text: &'a str,
+    /// Every item, parents before children, with the folder of its result.
     pub items: Vec<(ItemRef, Option<PathBuf>)>,
     /// Items without a result.
     pub failures: &'a [Failure],
@@ -34,21 +35,28 @@ pub struct Contents<'a> {
 /// # Errors
 /// A destination that is not ours, results that cannot be read, or a file system that refuses.
 pub fn assemble(mut contents: Contents<'_>, dest: &Path, progress: &dyn Progress) -> Result<Release, Error> {
+    let sources = Sources::of(&contents)?;
     contents.items.sort();
     let _lock = DestinationLock::take(dest)?;
+    let study = &contents.study.head;
     let head = Head {
-        name: contents.head.name.clone(),
-        study_sha256: sastrugi_store::digest::of_text(contents.study),
-        seed: contents.head.seed,
+        name: study.name.clone(),
+        study_sha256: sastrugi_store::digest::of_text(contents.text),
+        seed: study.seed,
         version: env!("CARGO_PKG_VERSION").to_owned(),
-        license: contents.head.license.clone(),
+        license: study.license.clone(),
     };
     let mut builder = ReleaseBuilder::beside(dest, head).map_err(release_error)?;
     progress.phase("assembling artifacts");
-    add_artifacts(&mut builder, &contents)?;
+    add_artifacts(&mut builder, &contents, &sources)?;
+    builder.name_sources(sources.list.clone());
+    for note in &sources.notes {
+        progress.phase(&format!("{}/{}: {}", note.stage, note.item, note.note));
+        builder.note(note.clone());
+    }
     progress.phase("writing tables");
     add_tables(&mut builder, &contents)?;
-    add_documents(&mut builder, &contents)?;
+    add_documents(&mut builder, &contents, &sources)?;
     progress.phase("writing the report");
     add_report(&mut builder, progress)?;
     progress.phase("writing checksums");
@@ -110,12 +118,13 @@ impl Contents<'_> {
     }
 }
 
-fn record(folder: &Path) -> Result<Record, Error> {
+/// The record of a result.
+pub(super) fn record(folder: &Path) -> Result<Record, Error> {
     load_record(folder)
         .ok_or_else(|| Error::Failed(format!("{}: the result was changed while it was used", folder.display())))
 }
 
-fn add_artifacts(builder: &mut ReleaseBuilder, contents: &Contents<'_>) -> Result<(), Error> {
+fn add_artifacts(builder: &mut ReleaseBuilder, contents: &Contents<'_>, sources: &Sources) -> Result<(), Error> {
     for (_, folder) in contents.items.iter() {
         let Some(folder) = folder else { continue };
         let record = record(folder)?;
@@ -127,6 +136,7 @@ fn add_artifacts(builder: &mut ReleaseBuilder, contents: &Contents<'_>) -> Resul
                 records: file.product.records,
                 parents: record.ingredients.parents.keys().cloned().collect(),
                 stream: record.ingredients.stream.clone(),
+                sources: sources.behind(&record.item),
             };
             let path = file.product.release_path.clone()?;
             Some(Incoming { path, source: folder.join(&file.product.file), origin })
@@ -300,12 +310,13 @@ fn add_by_terrain<R: Row>(
     write_parts(builder, terrains.values().map(sorted), traverse::STAGE)
 }
 
-fn add_documents(builder: &mut ReleaseBuilder, contents: &Contents<'_>) -> Result<(), Error> {
+fn add_documents(builder: &mut ReleaseBuilder, contents: &Contents<'_>, sources: &Sources) -> Result<(), Error> {
+    let (head, list) = (&contents.study.head, &sources.list);
     let documents = [
-        ("study.toml", contents.study.to_owned()),
-        ("README.md", super::documents::readme(contents)),
-        ("CITATION.cff", super::documents::citation(contents.head)),
-        ("LICENSE", super::documents::license(contents.head)),
+        ("study.toml", contents.text.to_owned()),
+        ("README.md", super::documents::readme(contents, list)),
+        ("CITATION.cff", super::documents::citation(head, list)),
+        ("LICENSE", super::documents::license(head, list)),
     ];
     for (path, text) in documents {
         builder.write_text(path, &text, Origin::default()).map_err(release_error)?;

@@ -2,6 +2,7 @@
 
 pub mod entry;
 pub mod keys;
+pub mod terms;
 pub mod text;
 
 pub use entry::Entry;
@@ -80,7 +81,14 @@ fn read_head(root: &Map<String, Value>, text: &StudyText) -> Result<StudyHead, S
     if head.title.is_empty() {
         head.title.clone_from(&head.name);
     }
-    let checks = [check_id("name", &head.name), check_date(&head.date), check_license(&head.license)];
+    let checks = [
+        check_id("name", &head.name),
+        check_date(&head.date),
+        check_license(&head.license),
+        check_version(head.version.as_deref()),
+        check_url(head.url.as_deref()),
+        check_doi(head.doi.as_deref()),
+    ];
     checks.into_iter().collect::<Result<Vec<()>, _>>().map_err(|e| section_error(text, "study", e))?;
     Ok(head)
 }
@@ -174,6 +182,46 @@ fn check_license(license: &str) -> Result<(), ParameterError> {
     Ok(())
 }
 
+fn check_version(version: Option<&str>) -> Result<(), ParameterError> {
+    match version {
+        Some(v) if v.trim().is_empty() => {
+            Err(ParameterError::new("version", "is empty; it is a text such as \"1.0.0\""))
+        }
+        _ => Ok(()),
+    }
+}
+
+fn check_url(url: Option<&str>) -> Result<(), ParameterError> {
+    let right = |url: &str| {
+        let rest = url.strip_prefix("https://").or_else(|| url.strip_prefix("http://"));
+        rest.is_some_and(|rest| !rest.is_empty() && !rest.contains(|c: char| c.is_whitespace() || c.is_control()))
+    };
+    match url {
+        Some(url) if !right(url) => {
+            Err(ParameterError::new("url", format!("is \"{url}\"; it must be an address, https://...")))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// DOIs are `10.`, four to nine digits, `/`, and a suffix (the pattern of the Citation File Format).
+fn check_doi(doi: Option<&str>) -> Result<(), ParameterError> {
+    let right = |doi: &str| {
+        let (registrant, suffix) = doi.strip_prefix("10.")?.split_once('/')?;
+        let parts = registrant.split_once('.').map_or(registrant, |(first, _)| first);
+        let digits = (4..=9).contains(&parts.len()) && registrant.bytes().all(|b| b.is_ascii_digit() || b == b'.');
+        let plain = !suffix.is_empty() && suffix.bytes().all(|b| b.is_ascii_alphanumeric() || b"._;()/:-".contains(&b));
+        (digits && plain).then_some(())
+    };
+    match doi {
+        Some(doi) if right(doi).is_none() => {
+            let rule = "it must be a plain DOI such as 10.5281/zenodo.1234567, without https://doi.org/";
+            Err(ParameterError::new("doi", format!("is \"{doi}\"; {rule}")))
+        }
+        _ => Ok(()),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -197,6 +245,13 @@ mod tests {
     }
 
     #[test]
+    fn val_a_head_that_is_cited_by_version_and_doi() {
+        let more = "version = \"1.2\"\nurl = \"https://example.org/a\"\ndoi = \"10.5281/zenodo.1234567\"\n";
+        let head = parse(&format!("{HEAD}{more}")).unwrap().head;
+        assert_eq!((head.version.as_deref(), head.doi.as_deref()), (Some("1.2"), Some("10.5281/zenodo.1234567")));
+    }
+
+    #[test]
     fn val_refusals_name_the_place() {
         let at = |text: &str, words: &str, place: &str| {
             let (message, span) = refusal(text);
@@ -207,6 +262,11 @@ mod tests {
         at(&HEAD.replace("seed", "sead"), "unknown key `sead`", "sead");
         at(&HEAD.replace("\"x\"", "\"X y\""), "a-z", "\"X y\"");
         at(&HEAD.replace("seed = 1", "seed = -1"), "seed", "-1");
+        at(&format!("{HEAD}version = \" \"\n"), "1.0.0", "\" \"");
+        at(&format!("{HEAD}url = \"example.org\"\n"), "https://", "\"example.org\"");
+        for doi in ["https://doi.org/10.5281/zenodo.1", "10.5281", "10.52/a", "10.5281/a b", "10.5281/"] {
+            at(&format!("{HEAD}doi = \"{doi}\"\n"), "plain DOI", &format!("\"{doi}\""));
+        }
         at(&format!("{HEAD}[roughness]\nlow_max = 2.0\n"), "above low_max", "[roughness]");
         at(&format!("{HEAD}[[terain]]\nid = \"a\"\n"), "unknown section `terain`", "terain");
         at(&format!("{HEAD}[extra]\n"), "unknown section", "extra");

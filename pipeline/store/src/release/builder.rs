@@ -6,7 +6,7 @@ use crate::digest;
 use crate::parquet::{TableMetadata, TableWriter};
 use rayon::prelude::*;
 use sastrugi_schemas::Record;
-use sastrugi_schemas::manifest::{Artifact, FORMAT, FailedItem, ItemNote, Manifest, Origin, PROGRAM};
+use sastrugi_schemas::manifest::{Artifact, FORMAT, FailedItem, ItemNote, Manifest, Origin, PROGRAM, Source};
 use std::collections::BTreeSet;
 use std::ffi::OsString;
 use std::fmt::Write as _;
@@ -47,6 +47,7 @@ pub struct ReleaseBuilder {
     head: Head,
     artifacts: Vec<Artifact>,
     paths: BTreeSet<String>,
+    sources: Vec<Source>,
     failed: Vec<FailedItem>,
     notes: Vec<ItemNote>,
 }
@@ -87,6 +88,7 @@ impl ReleaseBuilder {
             head,
             artifacts: vec![],
             paths: BTreeSet::new(),
+            sources: vec![],
             failed: vec![],
             notes: vec![],
         })
@@ -197,6 +199,11 @@ impl ReleaseBuilder {
         self.failed.push(item);
     }
 
+    /// Names the measured data that files come from.
+    pub fn name_sources(&mut self, sources: Vec<Source>) {
+        self.sources = sources;
+    }
+
     /// Lists a sentence that readers of an item's files must know.
     pub fn note(&mut self, note: ItemNote) {
         self.notes.push(note);
@@ -231,8 +238,21 @@ impl ReleaseBuilder {
         self.failed.sort_by(|a, b| (&a.stage, &a.item).cmp(&(&b.stage, &b.item)));
         let Head { name, study_sha256, seed, version, license } = self.head.clone();
         let (artifacts, failed, notes) = (self.artifacts.clone(), self.failed.clone(), self.notes.clone());
+        let sources = self.sources.clone();
         let program = PROGRAM.to_owned();
-        Manifest { program, version, format: FORMAT, name, study_sha256, seed, license, artifacts, failed, notes }
+        Manifest {
+            program,
+            version,
+            format: FORMAT,
+            name,
+            study_sha256,
+            seed,
+            license,
+            artifacts,
+            sources,
+            failed,
+            notes,
+        }
     }
 
     /// Where a file of the release goes; its folder is made.
