@@ -6,5 +6,6 @@ mod bad_input;
 mod compare;
 mod metadata;
 mod minus;
+mod pack;
 mod sources;
 mod verbs;

@@ -89,6 +89,11 @@ pub enum Verb {
     /// Write the report of a release: one offline HTML page, figures as SVG, numbers as JSON.
     #[command(after_help = "Example:\n  sastrugi report release -o release-report")]
     Report(Report),
+    /// Put a release into one archive, whose bytes are the same wherever it is packed.
+    #[command(
+        after_help = "A damaged release is not packed: exit code 4.\n\nExample:\n  sastrugi pack release -o release.tar"
+    )]
+    Pack(Pack),
     /// Say whether two DEMs or two fits are statistically the same, or a texture like its site.
     #[command(after_help = "Answers per quantity: same (within the bounds), different, cannot tell.\n\nExamples:\n  \
         sastrugi compare site.tif synthetic.tif --outer-scale 2\n  \
@@ -123,6 +128,7 @@ impl Verb {
             Self::Fit(args) => Some(&args.output),
             Self::Texture(args) => Some(&args.output),
             Self::Convert(args) => Some(&args.output),
+            Self::Pack(args) => Some(&args.output),
             Self::Roughness(args) => args.classes.as_deref(),
             Self::Analyze(args) => args.output.as_deref(),
             _ => None,
@@ -453,6 +459,16 @@ pub struct Analyze {
     /// Write the table `logs`, as Parquet.
     #[arg(short, long, value_name = "PARQUET")]
     pub output: Option<PathBuf>,
+}
+
+/// `pack`.
+#[derive(Debug, Args)]
+pub struct Pack {
+    /// Release folder.
+    pub release: PathBuf,
+    /// Archive to write, never inside of the release.
+    #[arg(short, long, value_name = "TAR")]
+    pub output: PathBuf,
 }
 
 /// `compare`.

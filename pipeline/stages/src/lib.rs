@@ -3,6 +3,7 @@
 
 mod error;
 pub mod jobs;
+pub mod packing;
 pub mod registry;
 mod revision;
 pub mod runner;

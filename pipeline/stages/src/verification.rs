@@ -9,7 +9,7 @@ use crate::runner::progress::Progress;
 use crate::studies::{Loaded, RunRequest, load, run};
 use sastrugi_schemas::Record as Row;
 use sastrugi_schemas::tables::SampleRow;
-use sastrugi_store::release::{self, ProblemKind, Release};
+use sastrugi_store::release::{self, Problem, ProblemKind, Release, VerifyReport};
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -60,16 +60,11 @@ pub fn verify(
 ) -> Result<Verification, Error> {
     progress.phase("checking files");
     let report = release::verify(folder).map_err(release_error)?;
-    let differences: Vec<Difference> = report
-        .problems
-        .iter()
-        .map(|p| Difference { path: p.path.clone(), problem: problem_text(p.kind, &p.message) })
-        .collect();
     let mut verification = Verification {
         files: report.files,
         bytes: report.bytes,
         recomputed: Vec::new(),
-        differences,
+        differences: differences(&report),
         not_comparable: None,
     };
     let Some(recompute) = recompute.filter(|_| verification.differences.is_empty()) else { return Ok(verification) };
@@ -91,6 +86,12 @@ pub fn verify(
         }
     }
     Ok(verification)
+}
+
+/// What is wrong with a release's files.
+pub fn differences(report: &VerifyReport) -> Vec<Difference> {
+    let difference = |p: &Problem| Difference { path: p.path.clone(), problem: problem_text(p.kind, &p.message) };
+    report.problems.iter().map(difference).collect()
 }
 
 fn problem_text(kind: ProblemKind, message: &str) -> String {

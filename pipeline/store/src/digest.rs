@@ -55,6 +55,50 @@ impl ContentHash {
     }
 }
 
+/// A reader or writer that counts and hashes what passes through it.
+#[derive(Debug)]
+pub struct Hashed<T> {
+    inner: T,
+    hash: Sha256,
+    bytes: u64,
+}
+
+impl<T> Hashed<T> {
+    /// Around a reader or writer, from here on.
+    pub fn new(inner: T) -> Self {
+        Self { inner, hash: Sha256::new(), bytes: 0 }
+    }
+
+    /// The reader or writer, the number of bytes that passed, and their SHA-256 in hexadecimal.
+    pub fn finish(self) -> (T, u64, String) {
+        (self.inner, self.bytes, hex(&self.hash.finalize()))
+    }
+
+    fn passed(&mut self, bytes: &[u8]) {
+        self.hash.update(bytes);
+        self.bytes += bytes.len() as u64;
+    }
+}
+
+impl<T: Read> Read for Hashed<T> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let count = self.inner.read(buffer)?;
+        self.passed(&buffer[..count]);
+        Ok(count)
+    }
+}
+
+impl<T: Write> Write for Hashed<T> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let count = self.inner.write(bytes)?;
+        self.passed(&bytes[..count]);
+        Ok(count)
+    }
+    fn flush(&mut self) -> io::Result<()> {
+        self.inner.flush()
+    }
+}
+
 /// Content hash of heights as a release stores them: shape, cell size and single-precision values, no data as one NaN.
 /// (Not the place, which formats state in different ways that round differently.)
 pub fn heights(grid: &Grid) -> String {

@@ -1,12 +1,14 @@
 //! The release folder: assembled aside, sealed with a manifest and checksums, given its name by one rename, and checked.
 
 mod builder;
+mod pack;
 mod verify;
 
 #[cfg(test)]
 mod tests;
 
 pub use builder::{Head, Incoming, ReleaseBuilder, beside};
+pub use pack::{Packed, pack};
 pub use verify::{Problem, ProblemKind, VerifyReport, verify};
 
 use crate::digest;

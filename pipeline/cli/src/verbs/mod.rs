@@ -25,6 +25,7 @@ pub fn dispatch(arguments: &Arguments) -> Verdict {
         Verb::Merge(args) => study::merge(args, common),
         Verb::Verify(args) => study::verify(args, common),
         Verb::Report(args) => study::report(args, common),
+        Verb::Pack(args) => study::pack(args, common),
         Verb::Traverse(args) => study::traverse(args, common),
         Verb::Terrain(args) => generate::terrain(args, common),
         Verb::Fit(args) => generate::fit(args, common),

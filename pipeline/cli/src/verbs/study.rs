@@ -1,15 +1,16 @@
 //! Verbs on studies and releases.
 
 use crate::Verdict;
-use crate::args::{Common, Merge, Place, Plan, Report, Run, Traverse, Verify};
+use crate::args::{Common, Merge, Pack, Place, Plan, Report, Run, Traverse, Verify};
 use crate::failure::{Code, Failure};
 use crate::output::{bytes, columns, print, seconds};
 use crate::progress::Teller;
+use sastrugi_stages::packing;
 use sastrugi_stages::runner::execute::Limits;
 use sastrugi_stages::runner::shard::Part;
 use sastrugi_stages::studies::{self, RunRequest, RunSummary};
 use sastrugi_stages::verbs::{parameters, traverse as drive};
-use sastrugi_stages::verification::{self, Recompute};
+use sastrugi_stages::verification::{self, Difference, Recompute};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -123,12 +124,36 @@ pub fn verify(args: &Verify, common: &Common) -> Verdict {
         0 => text.push_str(": all as they should be"),
         n => text.push_str(&format!(": {n} differences")),
     }
-    verification.differences.iter().for_each(|d| text.push_str(&format!("\n  {}: {}", d.path, d.problem)));
+    text.push_str(&listed(&verification.differences));
     if let Some(why) = &verification.not_comparable {
         text.push_str(&format!("\n{why}; `sastrugi compare` will tell whether the numbers agree"));
     }
     print(common.json, &serde_json::to_value(&verification).map_err(Failure::failed)?, &text)?;
     Ok(if verification.differences.is_empty() { Code::Done } else { Code::Difference })
+}
+
+/// Differences, a line each.
+fn listed(differences: &[Difference]) -> String {
+    differences.iter().map(|d| format!("\n  {}: {}", d.path, d.problem)).collect()
+}
+
+/// `pack`.
+pub fn pack(args: &Pack, common: &Common) -> Verdict {
+    let teller = Teller::new(common.quiet);
+    let packed = packing::pack(&args.release, &args.output, &teller);
+    teller.close();
+    let packing = packed?;
+    let (output, json) = (packing.output.display(), serde_json::to_value(&packing).map_err(Failure::failed)?);
+    let Some(sha256) = &packing.sha256 else {
+        let count = packing.differences.len();
+        let text =
+            format!("{output}: not written: the release has {count} differences{}", listed(&packing.differences));
+        print(common.json, &json, &text)?;
+        return Ok(Code::Difference);
+    };
+    let text = format!("{output}: {} files, {}\n{sha256}  {output}", packing.files, bytes(packing.bytes as f64));
+    print(common.json, &json, &text)?;
+    Ok(Code::Done)
 }
 
 fn parse_recompute(text: &str) -> Result<Recompute, Failure> {

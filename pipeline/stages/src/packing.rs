@@ -1,0 +1,111 @@
+//! A release as one archive with reproducible bytes.
+
+use crate::error::Error;
+use crate::jobs::ItemRef;
+use crate::registry;
+use crate::runner::assemble::release_error;
+use crate::runner::progress::{End, Progress};
+use crate::studies::resolved;
+use crate::study::Study;
+use crate::verification::{Difference, differences};
+use sastrugi_store::release::{self, Packed, Release};
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+
+/// Bytes copied per second, for the progress bar.
+const BYTES_PER_SECOND: f64 = 3e8;
+
+/// What packing came to.
+#[derive(Debug, Serialize)]
+pub struct Packing {
+    /// The archive.
+    pub output: PathBuf,
+    /// Files in it.
+    pub files: u64,
+    /// Its length, bytes.
+    pub bytes: u64,
+    /// SHA-256 of its bytes; absent where the release is damaged, and no archive was written.
+    pub sha256: Option<String>,
+    /// What is wrong with the release.
+    pub differences: Vec<Difference>,
+}
+
+/// Checks a release and writes it to the archive `output`. A damaged one is not packed: its differences are listed.
+///
+/// # Errors
+/// A folder that is no release, an output that lies in it or is a folder, or work that cannot be done.
+pub fn pack(folder: &Path, output: &Path, progress: &dyn Progress) -> Result<Packing, Error> {
+    check_output(folder, output)?;
+    progress.phase("checking files");
+    let report = release::verify(folder).map_err(release_error)?;
+    let mut packing =
+        Packing { output: output.to_owned(), files: 0, bytes: 0, sha256: None, differences: differences(&report) };
+    if !packing.differences.is_empty() {
+        return Ok(packing);
+    }
+    let release = Release::open(folder).map_err(release_error)?;
+    let time_s = unix_seconds(&date_of(folder)?);
+    let files = release.manifest().artifacts.len() + 2;
+    progress.begin(files, 0, report.bytes as f64 / BYTES_PER_SECOND);
+    let added = |path: &str, bytes: u64| {
+        let item = ItemRef::new(&release.manifest().name, path);
+        progress.ended(&item, &End::Done(Vec::new()), bytes as f64 / BYTES_PER_SECOND);
+    };
+    let Packed { files, bytes, sha256 } = release::pack(&release, output, time_s, &added).map_err(release_error)?;
+    (packing.files, packing.bytes, packing.sha256) = (files, bytes, Some(sha256));
+    Ok(packing)
+}
+
+fn check_output(folder: &Path, output: &Path) -> Result<(), Error> {
+    if resolved(output).starts_with(resolved(folder)) {
+        let message = "the archive cannot go into the release, which is sealed; name a file beside it with -o";
+        return Err(Error::Usage(message.to_owned()));
+    }
+    if output.is_dir() {
+        return Err(Error::Usage(format!("{}: is a folder; -o names a file", output.display())));
+    }
+    Ok(())
+}
+
+/// The date of a release, as its study says.
+fn date_of(folder: &Path) -> Result<String, Error> {
+    let path = folder.join("study.toml");
+    let refuse = |why: &dyn std::fmt::Display| Error::Input(format!("{}: {why}", path.display()));
+    let text = std::fs::read_to_string(&path).map_err(|e| refuse(&e))?;
+    let study = Study::parse(&text, folder, &registry::section_names()).map_err(|e| refuse(&e))?;
+    Ok(study.head.date)
+}
+
+/// Midnight UTC of a day YYYY-MM-DD, s since 1970-01-01; days before that count as it, since archives know no earlier ones.
+fn unix_seconds(date: &str) -> u64 {
+    let part =
+        |range: std::ops::Range<usize>| date.get(range).and_then(|text| text.parse::<i64>().ok()).unwrap_or_default();
+    let (year, month, day) = (part(0..4), part(5..7), part(8..10));
+    // Years that begin in March have their leap day at the end; 306 days from March to December.
+    let (year, month) = if month > 2 { (year, month - 3) } else { (year - 1, month + 9) };
+    let days =
+        365 * year + year.div_euclid(4) - year.div_euclid(100) + year.div_euclid(400) + (153 * month + 2) / 5 + day - 1;
+    let days_to_1970 = 719_468;
+    u64::try_from(days - days_to_1970).unwrap_or(0) * 86_400
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Against `date -u -d DATE +%s` of GNU coreutils.
+    #[test]
+    fn val_days_as_seconds() {
+        let known = [
+            ("1970-01-01", 0),
+            ("1969-12-31", 0),
+            ("2000-02-29", 951_782_400),
+            ("2000-03-01", 951_868_800),
+            ("2026-11-21", 1_795_219_200),
+            ("2100-12-31", 4_133_894_400),
+        ];
+        for (date, seconds) in known {
+            assert_eq!(unix_seconds(date), seconds, "{date}");
+        }
+    }
+}
