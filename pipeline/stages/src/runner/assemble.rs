@@ -3,6 +3,7 @@
 //! Records are read one at a time, in order of their ids, so that memory does not grow with the number of items.
 
 use super::cache::{Record, StoredFile, load_record};
+use super::documents::{self, Described};
 use super::execute::Failure;
 use super::progress::Progress;
 use super::sources::Sources;
@@ -13,6 +14,7 @@ use sastrugi_schemas::Record as Row;
 use sastrugi_schemas::manifest::{FailedItem, ItemNote, Origin};
 use sastrugi_schemas::tables::{ParameterRow, SampleRow};
 use sastrugi_store::release::{self, Head, Incoming, Release, ReleaseBuilder, ReleaseError};
+use serde_json::Value;
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
 use std::fs::{File, TryLockError};
@@ -311,17 +313,26 @@ fn add_by_terrain<R: Row>(
 }
 
 fn add_documents(builder: &mut ReleaseBuilder, contents: &Contents<'_>, sources: &Sources) -> Result<(), Error> {
-    let (head, list) = (&contents.study.head, &sources.list);
+    let mut artifacts = builder.artifacts().to_vec();
+    artifacts.sort_by(|a, b| a.path.cmp(&b.path));
+    let (head, failures) = (&contents.study.head, contents.failures);
+    let described = Described { head, sources: &sources.list, artifacts: &artifacts, failures };
     let documents = [
         ("study.toml", contents.text.to_owned()),
-        ("README.md", super::documents::readme(contents, list)),
-        ("CITATION.cff", super::documents::citation(head, list)),
-        ("LICENSE", super::documents::license(head, list)),
+        ("README.md", documents::readme(&described)),
+        ("CITATION.cff", documents::citation(&described)),
+        ("LICENSE", documents::license(&described)),
+        ("croissant.json", json_text(&documents::croissant(&described))?),
+        ("ro-crate-metadata.json", json_text(&documents::ro_crate(&described))?),
     ];
     for (path, text) in documents {
         builder.write_text(path, &text, Origin::default()).map_err(release_error)?;
     }
     Ok(())
+}
+
+fn json_text(value: &Value) -> Result<String, Error> {
+    serde_json::to_string_pretty(value).map(|text| text + "\n").map_err(Error::failed)
 }
 
 fn add_report(builder: &mut ReleaseBuilder, progress: &dyn Progress) -> Result<(), Error> {

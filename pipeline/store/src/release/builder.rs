@@ -99,6 +99,11 @@ impl ReleaseBuilder {
         &self.staging
     }
 
+    /// The files listed so far, in no order.
+    pub fn artifacts(&self) -> &[Artifact] {
+        &self.artifacts
+    }
+
     /// Copies files into the release, several at a time; returns their SHA-256 in the same order.
     ///
     /// # Errors

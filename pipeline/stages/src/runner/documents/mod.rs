@@ -1,59 +1,175 @@
 //! The documents of a release for people and catalogues: what it is, how to cite it, under which licence.
 
-use super::assemble::Contents;
-use sastrugi_schemas::manifest::Source;
+mod croissant;
+mod ro_crate;
+
+pub use croissant::croissant;
+pub use ro_crate::ro_crate;
+
+use super::execute::Failure;
+use sastrugi_schemas::manifest::{Artifact, Source};
 use sastrugi_schemas::study::StudyHead;
 use sastrugi_schemas::tables;
+use serde_json::Value;
 use std::fmt::Write as _;
 
-/// `README.md`.
-pub fn readme(contents: &Contents<'_>, sources: &[Source]) -> String {
-    let head = &contents.study.head;
-    let mut text = format!("# {}\n\n", head.title);
+/// What the documents tell of.
+pub struct Described<'a> {
+    /// The study's head.
+    pub head: &'a StudyHead,
+    /// Measured data.
+    pub sources: &'a [Source],
+    /// Files of the release, sorted by path: all but the documents, the report and what seals it.
+    pub artifacts: &'a [Artifact],
+    /// Items without a result.
+    pub failures: &'a [Failure],
+}
+
+/// Folders of a release.
+const FOLDERS: [(&str, &str); 9] = [
+    ("dem/", "measured inputs, and the same in metres (`.metric.tif`)"),
+    ("mask/", "masks of the fits"),
+    ("terrain/", "generated heightfields, GeoTIFF, float32 metres, no data -9999"),
+    ("texture/", "synthesised textures, GeoTIFF, float32 metres, no data -9999"),
+    ("classes/", "roughness classes: 0 low, 1 semi, 2 high, 255 none; `.raw.tif` before closing"),
+    ("fit/", "covariance fits (JSON), with background, residual and the cells used"),
+    ("mcap/", "one recording per mission"),
+    ("tables/", "Parquet, units and descriptions in the column metadata"),
+    ("report/", "report: `index.html`, one offline page"),
+];
+/// Names under which dataset hubs know licences, where they are not the SPDX identifier in lower case.
+const HUB_NAMES: [(&str, &str); 3] = [("PDDL-1.0", "pddl"), ("ODC-By-1.0", "odc-by"), ("ODbL-1.0", "odbl")];
+/// Starts of identifiers that dataset hubs know in lower case.
+const HUB_FAMILIES: [&str; 4] = ["CC-BY-", "CC0-", "MIT", "Apache-"];
+
+impl<'a> Described<'a> {
+    /// Files of a table, in order.
+    fn parts(&self, table: &str) -> impl Iterator<Item = &'a Artifact> {
+        let folder = format!("tables/{table}/");
+        self.artifacts.iter().filter(move |artifact| artifact.path.starts_with(&folder))
+    }
+
+    /// Who made the release.
+    fn creators(&self) -> impl Iterator<Item = &'a str> {
+        let names = self.head.creators.iter().map(String::as_str);
+        names.chain(self.head.creators.is_empty().then_some("unnamed"))
+    }
+
+    /// Tables that have a file.
+    fn tables(&self) -> impl Iterator<Item = &'static tables::Table> {
+        tables::ALL.into_iter().filter(|table| self.parts(table.name).next().is_some())
+    }
+
+    fn has(&self, folder: &str) -> bool {
+        folder == "report/" || self.artifacts.iter().any(|artifact| artifact.path.starts_with(folder))
+    }
+}
+
+/// `README.md`: a dataset card, whose head lets hubs show the tables.
+pub fn readme(described: &Described<'_>) -> String {
+    let head = described.head;
+    let mut text = format!("{}# {}\n\n", card(described), head.title);
     if !head.description.is_empty() {
         let _ = writeln!(text, "{}\n", head.description);
     }
+    let version = head.version.as_ref().map_or_else(String::new, |v| format!(" version {v},"));
+    let page = page(head).map_or_else(String::new, |page| format!(" {page}"));
     let _ = writeln!(
         text,
-        "Study `{}`, seed {}, {}. Licence: {}. Made with sastrugi {}; `sastrugi verify .` checks every file, and \
-         `sastrugi verify . --recompute all` makes it again and compares the bytes.\n",
+        "Study `{}`,{version} seed {}, {}. Licence: {}. Made with sastrugi {}; `sastrugi verify .` checks every file, and \
+         `sastrugi verify . --recompute all` makes it again and compares the bytes.{page}\n",
         head.name,
         head.seed,
         head.date,
         head.license,
         env!("CARGO_PKG_VERSION")
     );
+    text.push_str("| where | what |\n|---|---|\n| `study.toml` | the study: everything here follows from it |\n");
+    for (folder, what) in FOLDERS.iter().filter(|(folder, _)| described.has(folder)) {
+        let _ = writeln!(text, "| `{folder}` | {what} |");
+    }
     text.push_str(
-        "| where | what |\n|---|---|\n\
-         | `report/index.html` | report, one offline page |\n\
-         | `study.toml` | the study: everything here follows from it |\n\
-         | `dem/` | measured inputs, and the same in metres (`.metric.tif`) |\n\
-         | `mask/` | masks of the fits |\n\
-         | `terrain/`, `texture/` | heightfields, GeoTIFF, float32 metres, no data -9999 |\n\
-         | `classes/` | roughness classes: 0 low, 1 semi, 2 high, 255 none; `.raw.tif` before closing |\n\
-         | `fit/` | covariance fits (JSON), with background, residual and the cells used |\n\
-         | `mcap/` | one recording per mission |\n\
-         | `tables/` | Parquet, units and descriptions in the column metadata |\n\
-         | `manifest.json`, `SHA256SUMS` | what each file is made from, and its checksum |\n\n",
+        "| `croissant.json` | the tables in Croissant, for data loaders |\n\
+         | `ro-crate-metadata.json` | which stage made what from what |\n\
+         | `manifest.json`, `SHA256SUMS` | what each file is made from, and its checksum |\n\n\
+         | table | a row is |\n|---|---|\n",
     );
-    text.push_str("| table | a row is |\n|---|---|\n");
-    for table in tables::ALL {
+    for table in described.tables() {
         let _ = writeln!(text, "| `{}` | {} |", table.name, table.description);
     }
-    if !sources.is_empty() {
-        text.push_str(&sources_section(sources));
+    if !described.sources.is_empty() {
+        text.push_str(&sources_section(described.sources));
     }
-    if !contents.failures.is_empty() {
+    if !described.failures.is_empty() {
         let _ = writeln!(
             text,
             "\n{} items failed; `manifest.json` lists them with their parameters:\n",
-            contents.failures.len()
+            described.failures.len()
         );
-        for failure in contents.failures {
+        for failure in described.failures {
             let _ = writeln!(text, "- `{}`: {}", failure.item, failure.message);
         }
     }
     text
+}
+
+/// The head of a dataset card: YAML between two lines of hyphens.
+fn card(described: &Described<'_>) -> String {
+    let head = described.head;
+    let mut text = format!("---\npretty_name: {}\n{}", quoted(&head.title), hub_license(&head.license));
+    text.push_str("tags:\n  - terrain\n  - elevation\n  - robotics\n  - synthetic\n  - sastrugi\n");
+    let mut tables = described.tables().peekable();
+    if tables.peek().is_some() {
+        text.push_str("configs:\n");
+    }
+    for table in tables {
+        let _ = writeln!(text, "  - config_name: {0}\n    data_files: \"tables/{0}/*.parquet\"", table.name);
+    }
+    text + "---\n\n"
+}
+
+/// Hubs know a list of licences by names of their own; others are named beside `other`.
+fn hub_license(license: &str) -> String {
+    let known = HUB_NAMES.iter().find(|(spdx, _)| *spdx == license).map(|(_, name)| (*name).to_owned());
+    let plain = || HUB_FAMILIES.iter().any(|f| license.starts_with(f)) && is_spdx_identifier(license);
+    match known.or_else(|| plain().then(|| license.to_lowercase())) {
+        Some(name) => format!("license: {name}\n"),
+        None => format!("license: other\nlicense_name: {}\nlicense_link: LICENSE\n", quoted(license)),
+    }
+}
+
+/// Where a licence can be read: its page in the SPDX list, or the licence as it is stated.
+fn address_of_license(license: &str) -> String {
+    if is_spdx_identifier(license) { format!("https://spdx.org/licenses/{license}") } else { license.to_owned() }
+}
+
+/// Adds what measured data asks for to its description in the words of schema.org.
+fn add_terms(work: &mut Value, source: &Source) {
+    let terms = [
+        ("license", source.license.as_deref().map(address_of_license)),
+        ("creditText", source.attribution.clone()),
+        ("citation", source.citation.clone()),
+    ];
+    for (key, value) in terms.into_iter().filter_map(|(key, value)| Some((key, value?))) {
+        work[key] = Value::String(value);
+    }
+}
+
+/// Where the dataset is found, if anywhere.
+fn page(head: &StudyHead) -> Option<String> {
+    head.doi.as_ref().map(|doi| format!("https://doi.org/{doi}")).or_else(|| head.url.clone())
+}
+
+/// One line to cite the dataset by.
+fn citation_line(head: &StudyHead) -> String {
+    let version = head.version.as_ref().map_or_else(String::new, |v| format!(", version {v}"));
+    let page = page(head).map_or_else(String::new, |page| format!(", {page}"));
+    let year = head.date.get(..4).unwrap_or_default();
+    format!("{} ({year}): {}{version}{page}", authors(head), head.title)
+}
+
+fn authors(head: &StudyHead) -> String {
+    if head.creators.is_empty() { "unnamed".to_owned() } else { head.creators.join(", ") }
 }
 
 /// Measured data with what their makers ask for.
@@ -75,7 +191,8 @@ fn sentence(source: &Source) -> String {
 }
 
 /// `CITATION.cff`, in the Citation File Format 1.2.0.
-pub fn citation(head: &StudyHead, sources: &[Source]) -> String {
+pub fn citation(described: &Described<'_>) -> String {
+    let (head, sources) = (described.head, described.sources);
     let mut text = format!(
         "cff-version: 1.2.0\nmessage: \"If you use this dataset, please cite it as below.\"\ntype: dataset\ntitle: {}\ndate-released: {}\n",
         quoted(&head.title),
@@ -92,9 +209,7 @@ pub fn citation(head: &StudyHead, sources: &[Source]) -> String {
     line("url", head.url.as_deref());
     line("license", is_spdx_identifier(&head.license).then_some(head.license.as_str()));
     text.push_str("authors:\n");
-    let unnamed = ["unnamed".to_owned()];
-    let authors = if head.creators.is_empty() { &unnamed[..] } else { &head.creators };
-    for author in authors {
+    for author in described.creators() {
         let _ = writeln!(text, "  - name: {}", quoted(author));
     }
     if !sources.is_empty() {
@@ -121,17 +236,17 @@ fn is_spdx_identifier(license: &str) -> bool {
 }
 
 /// `LICENSE`.
-pub fn license(head: &StudyHead, sources: &[Source]) -> String {
+pub fn license(described: &Described<'_>) -> String {
+    let (head, sources) = (described.head, described.sources);
     let version = head.version.as_ref().map_or_else(String::new, |v| format!(", version {v}"));
-    let page = head.doi.as_ref().map(|doi| format!("https://doi.org/{doi}")).or_else(|| head.url.clone());
     let mut text = format!(
         "SPDX-License-Identifier: {0}\n\n{1}{version} ({2}) by {3} is licensed under {0}. Its text is found by that identifier in the SPDX licence list.\n",
         head.license,
         head.title,
         head.date,
-        if head.creators.is_empty() { "unnamed".to_owned() } else { head.creators.join(", ") }
+        authors(head)
     );
-    if let Some(page) = page {
+    if let Some(page) = page(head) {
         let _ = writeln!(text, "{page}");
     }
     if !sources.is_empty() {

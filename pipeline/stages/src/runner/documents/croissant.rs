@@ -1,0 +1,197 @@
+//! `croissant.json`: every table in Croissant 1.1 (MLCommons, "Croissant Format Specification", version 1.1), so that data
+//! loaders find its columns with type, unit and description, and its files with their hashes.
+
+use super::{Described, add_terms, address_of_license, citation_line, page};
+use sastrugi_schemas::manifest::{Artifact, Source};
+use sastrugi_schemas::tables::{self, Column, ColumnType, Table};
+use serde_json::{Value, json};
+
+const PARQUET: &str = "application/x-parquet";
+/// Files beside the tables: name, pattern of their paths, media type, what they are.
+const RASTERS: [(&str, &str, &str, &str); 4] = [
+    ("terrain", "terrain/*.tif", "image/tiff", "Generated heightfields, GeoTIFF, float32 metres"),
+    ("texture", "texture/*.tif", "image/tiff", "Synthesised textures, GeoTIFF, float32 metres"),
+    ("dem", "dem/*.metric.tif", "image/tiff", "Measured heights in metres, GeoTIFF"),
+    ("mcap", "mcap/*.mcap", "application/octet-stream", "Recordings of the missions, MCAP"),
+];
+
+/// The text of `croissant.json`.
+pub fn croissant(described: &Described<'_>) -> Value {
+    let head = described.head;
+    let tables: Vec<Value> = tables::ALL.into_iter().filter_map(|table| record_set(table, described)).collect();
+    let mut dataset = json!({
+        "@context": context(),
+        "@type": "sc:Dataset",
+        "conformsTo": "http://mlcommons.org/croissant/1.1",
+        "name": head.title,
+        "description": if head.description.is_empty() { &head.title } else { &head.description },
+        "license": address_of_license(&head.license),
+        "creator": described.creators().map(|name| json!({ "@type": "sc:Person", "name": name })).collect::<Vec<_>>(),
+        "datePublished": head.date,
+        "citeAs": citation_line(head),
+        "url": page(head).unwrap_or_else(|| "./".to_owned()),
+        "version": head.version.as_deref().unwrap_or("0.0.0"),
+        "distribution": distribution(described),
+        "recordSet": tables,
+    });
+    if !described.sources.is_empty() {
+        dataset["isBasedOn"] = described.sources.iter().map(work).collect();
+    }
+    dataset
+}
+
+/// Measured data as a work of its own.
+fn work(source: &Source) -> Value {
+    let mut work = json!({ "@type": "sc:CreativeWork", "name": source.id });
+    add_terms(&mut work, source);
+    work
+}
+
+/// Every file of a table with its hash; tables of several files, and rasters, as sets besides.
+fn distribution(described: &Described<'_>) -> Vec<Value> {
+    let parts = |table: &&'static Table| described.parts(table.name);
+    let mut files: Vec<Value> = tables::ALL.iter().flat_map(parts).map(file_object).collect();
+    let several = tables::ALL.iter().filter(|table| described.parts(table.name).count() > 1);
+    files.extend(several.map(|table| {
+        let includes = format!("tables/{}/*.parquet", table.name);
+        file_set(&set_id(table), &includes, PARQUET, table.description)
+    }));
+    let there = |folder: &str| described.artifacts.iter().any(|a| a.path.starts_with(&format!("{folder}/")));
+    let rasters = RASTERS.iter().filter(|(folder, ..)| there(folder));
+    files.extend(
+        rasters.map(|(folder, includes, media, what)| file_set(&format!("{folder}-files"), includes, media, what)),
+    );
+    files
+}
+
+fn file_object(artifact: &Artifact) -> Value {
+    json!({
+        "@type": "cr:FileObject",
+        "@id": artifact.path,
+        "name": artifact.path,
+        "contentUrl": artifact.path,
+        "contentSize": format!("{} B", artifact.bytes),
+        "encodingFormat": PARQUET,
+        "sha256": artifact.sha256,
+    })
+}
+
+fn file_set(id: &str, includes: &str, media: &str, description: &str) -> Value {
+    json!({
+        "@type": "cr:FileSet",
+        "@id": id,
+        "name": id,
+        "description": description,
+        "encodingFormat": media,
+        "includes": includes,
+    })
+}
+
+fn set_id(table: &Table) -> String {
+    format!("{}-files", table.name)
+}
+
+/// A table's columns; nothing for a table without a file.
+fn record_set(table: &Table, described: &Described<'_>) -> Option<Value> {
+    let mut parts = described.parts(table.name);
+    let first = parts.next()?;
+    let source = match parts.next() {
+        None => json!({ "fileObject": { "@id": first.path } }),
+        Some(_) => json!({ "fileSet": { "@id": set_id(table) } }),
+    };
+    let keys = table.columns.iter().filter(|column| column.key);
+    Some(json!({
+        "@type": "cr:RecordSet",
+        "@id": table.name,
+        "name": table.name,
+        "description": table.description,
+        "key": keys.map(|column| json!({ "@id": field_id(table, column) })).collect::<Vec<_>>(),
+        "field": table.columns.iter().map(|column| field(table, column, &source)).collect::<Vec<_>>(),
+    }))
+}
+
+fn field_id(table: &Table, column: &Column) -> String {
+    format!("{}/{}", table.name, column.name)
+}
+
+fn field(table: &Table, column: &Column, source: &Value) -> Value {
+    let (data_type, is_list) = match column.column_type {
+        ColumnType::Text => ("sc:Text", false),
+        ColumnType::F64 => ("cr:Float64", false),
+        ColumnType::I64 => ("cr:Int64", false),
+        ColumnType::Bool => ("sc:Boolean", false),
+        ColumnType::F32List => ("cr:Float32", true),
+        ColumnType::F64List => ("cr:Float64", true),
+    };
+    let mut source = source.clone();
+    source["extract"] = json!({ "column": column.name });
+    let mut field = json!({
+        "@type": "cr:Field",
+        "@id": field_id(table, column),
+        "name": column.name,
+        "description": column.description,
+        "dataType": data_type,
+        "source": source,
+    });
+    if !column.unit.is_empty() {
+        field["unitText"] = json!(column.unit);
+    }
+    if is_list {
+        field["isArray"] = json!(true);
+        field["arrayShape"] = json!("-1");
+    }
+    field
+}
+
+/// The context of the specification, word for word.
+fn context() -> Value {
+    let croissant = [
+        "arrayShape",
+        "citeAs",
+        "column",
+        "containedIn",
+        "equivalentProperty",
+        "extract",
+        "field",
+        "fileProperty",
+        "fileObject",
+        "fileSet",
+        "format",
+        "includes",
+        "isArray",
+        "isLiveDataset",
+        "jsonPath",
+        "key",
+        "md5",
+        "parentField",
+        "path",
+        "recordSet",
+        "references",
+        "regex",
+        "repeated",
+        "replace",
+        "samplingRate",
+        "separator",
+        "source",
+        "subField",
+        "transform",
+    ];
+    let mut context = json!({
+        "@language": "en",
+        "@vocab": "https://schema.org/",
+        "sc": "https://schema.org/",
+        "cr": "http://mlcommons.org/croissant/",
+        "rai": "http://mlcommons.org/croissant/RAI/",
+        "dct": "http://purl.org/dc/terms/",
+        "conformsTo": "dct:conformsTo",
+        "data": { "@id": "cr:data", "@type": "@json" },
+        "examples": { "@id": "cr:examples", "@type": "@json" },
+        "dataType": { "@id": "cr:dataType", "@type": "@vocab" },
+        "description": { "@container": "@language" },
+        "name": { "@container": "@language" },
+    });
+    for word in croissant {
+        context[word] = json!(format!("cr:{word}"));
+    }
+    context
+}

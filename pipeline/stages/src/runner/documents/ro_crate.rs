@@ -1,0 +1,199 @@
+//! `ro-crate-metadata.json`: what made what, as an RO-Crate 1.1 (<https://w3id.org/ro/crate/1.1>) of the profile Process Run
+//! Crate 0.5 (<https://w3id.org/ro/wfrun/process/0.5>): one `CreateAction` per stage. Folders stand for their files;
+//! `manifest.json` has the parents, stream and hash of each.
+
+use super::{Described, FOLDERS, add_terms, address_of_license, citation_line, page};
+use sastrugi_schemas::manifest::{Artifact, PROGRAM as PROGRAM_NAME, Source};
+use sastrugi_schemas::tables;
+use serde_json::{Value, json};
+use std::collections::{BTreeMap, BTreeSet};
+
+const CRATE: &str = "https://w3id.org/ro/crate/1.1";
+const PROFILE: &str = "https://w3id.org/ro/wfrun/process/0.5";
+const PROGRAM: &str = "#sastrugi";
+const STUDY: &str = "study.toml";
+/// Files of the release itself: path, media type, what it is.
+const OWN_FILES: [(&str, &str, &str); 7] = [
+    (STUDY, "application/toml", "The study: everything else follows from it"),
+    ("README.md", "text/markdown", "What the release holds"),
+    ("CITATION.cff", "application/yaml", "How to cite it"),
+    ("LICENSE", "text/plain", "Its licence, and those of the measured data in it"),
+    ("croissant.json", "application/ld+json", "Its tables in Croissant"),
+    ("manifest.json", "application/json", "Every file with its parents, random stream and hashes"),
+    ("SHA256SUMS", "text/plain", "Checksum of every file"),
+];
+
+/// The text of `ro-crate-metadata.json`.
+pub fn ro_crate(described: &Described<'_>) -> Value {
+    let stages = Stages::of(described);
+    let mut parts: Vec<Value> = OWN_FILES.iter().map(own_file).collect();
+    parts.extend(stages.entities(described));
+    let mut graph = vec![descriptor(), root(described, &parts, &stages)];
+    graph.extend(parts);
+    graph.push(json!({ "@id": PROFILE, "@type": "CreativeWork", "name": "Process Run Crate", "version": "0.5" }));
+    graph.push(program());
+    graph.extend(described.creators().map(|name| json!({ "@id": person(name), "@type": "Person", "name": name })));
+    graph.extend(described.sources.iter().map(work));
+    graph.extend(stages.actions());
+    // Words of schema.org that came after the crate's context was frozen.
+    let later = json!({ "sha256": "https://schema.org/sha256", "creditText": "https://schema.org/creditText" });
+    json!({ "@context": [format!("{CRATE}/context"), later], "@graph": graph })
+}
+
+fn descriptor() -> Value {
+    json!({
+        "@id": "ro-crate-metadata.json",
+        "@type": "CreativeWork",
+        "about": { "@id": "./" },
+        "conformsTo": { "@id": CRATE },
+    })
+}
+
+fn root(described: &Described<'_>, parts: &[Value], stages: &Stages) -> Value {
+    let head = described.head;
+    let mut root = json!({
+        "@id": "./",
+        "@type": "Dataset",
+        "name": head.title,
+        "description": if head.description.is_empty() { &head.title } else { &head.description },
+        "datePublished": head.date,
+        "license": address_of_license(&head.license),
+        "author": described.creators().map(|name| json!({ "@id": person(name) })).collect::<Vec<_>>(),
+        "creditText": citation_line(head),
+        "conformsTo": { "@id": PROFILE },
+        "hasPart": parts.iter().map(|part| json!({ "@id": part["@id"] })).collect::<Vec<_>>(),
+        "mentions": stages.made.keys().map(|stage| json!({ "@id": action_id(stage) })).collect::<Vec<_>>(),
+        "isBasedOn": described.sources.iter().map(|s| json!({ "@id": source_id(s) })).collect::<Vec<_>>(),
+    });
+    let optional = [
+        ("version", head.version.clone()),
+        ("identifier", head.doi.as_ref().map(|doi| format!("https://doi.org/{doi}"))),
+        ("url", page(head)),
+    ];
+    for (key, value) in optional {
+        if let Some(value) = value {
+            root[key] = json!(value);
+        }
+    }
+    root
+}
+
+fn own_file((path, media, description): &(&str, &str, &str)) -> Value {
+    json!({ "@id": path, "@type": "File", "name": path, "description": description, "encodingFormat": media })
+}
+
+fn program() -> Value {
+    json!({
+        "@id": PROGRAM,
+        "@type": "SoftwareApplication",
+        "name": PROGRAM_NAME,
+        "softwareVersion": env!("CARGO_PKG_VERSION"),
+    })
+}
+
+fn person(name: &str) -> String {
+    format!("#person-{}", word(name))
+}
+
+fn source_id(source: &Source) -> String {
+    format!("#source-{}", source.id)
+}
+
+/// A name as part of an identifier.
+fn word(name: &str) -> String {
+    name.chars().map(|c| if c.is_alphanumeric() { c } else { '-' }).collect()
+}
+
+fn work(source: &Source) -> Value {
+    let mut work = json!({ "@id": source_id(source), "@type": "CreativeWork", "name": source.id });
+    add_terms(&mut work, source);
+    work
+}
+
+/// What each stage made, and from what, in entities of the crate.
+#[derive(Default)]
+struct Stages {
+    made: BTreeMap<String, BTreeSet<String>>,
+    used: BTreeMap<String, BTreeSet<String>>,
+}
+
+impl Stages {
+    fn of(described: &Described<'_>) -> Self {
+        let mut stages = Self::default();
+        let released = described.artifacts.iter().filter(|a| !a.origin.stage.is_empty());
+        let mut parents: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
+        for artifact in released {
+            let stage = artifact.origin.stage.as_str();
+            stages.made.entry(stage.to_owned()).or_default().insert(entity(artifact));
+            let above = artifact.origin.parents.iter().filter_map(|parent| parent.split('/').next());
+            // Tables that several stages fill are made from what those stages made.
+            let filling = stage.split('+').filter(|part| *part != stage);
+            parents.entry(stage).or_default().extend(above.chain(filling));
+        }
+        for (stage, parents) in parents {
+            let used = parents.iter().filter_map(|parent| stages.made.get(*parent)).flatten().cloned();
+            stages.used.insert(stage.to_owned(), [STUDY.to_owned()].into_iter().chain(used).collect());
+        }
+        let tables = stages.made.values().flatten().filter(|e| e.starts_with("tables/")).cloned().collect();
+        stages.made.insert("report".to_owned(), BTreeSet::from(["report/".to_owned()]));
+        stages.used.insert("report".to_owned(), tables);
+        stages
+    }
+
+    /// Folders and measured files.
+    fn entities(&self, described: &Described<'_>) -> Vec<Value> {
+        let all: BTreeSet<&String> = self.made.values().flatten().collect();
+        all.into_iter().map(|id| described_entity(id, described)).collect()
+    }
+
+    fn actions(&self) -> impl Iterator<Item = Value> {
+        let ids = |set: Option<&BTreeSet<String>>| -> Vec<Value> {
+            set.into_iter().flatten().map(|id| json!({ "@id": id })).collect()
+        };
+        self.made.iter().map(move |(stage, made)| {
+            json!({
+                "@id": action_id(stage),
+                "@type": "CreateAction",
+                "name": format!("stage {stage}"),
+                "instrument": { "@id": PROGRAM },
+                "object": ids(self.used.get(stage)),
+                "result": ids(Some(made)),
+            })
+        })
+    }
+}
+
+fn action_id(stage: &str) -> String {
+    format!("#stage-{}", word(stage))
+}
+
+/// What stands for a file: itself where it was given, else its folder.
+fn entity(artifact: &Artifact) -> String {
+    let path = &artifact.path;
+    let words: Vec<&str> = path.split('/').collect();
+    match words[..] {
+        ["dem" | "mask", ..] => path.clone(),
+        ["tables", table, ..] => format!("tables/{table}/"),
+        [folder, _, ..] => format!("{folder}/"),
+        _ => path.clone(),
+    }
+}
+
+fn described_entity(id: &str, described: &Described<'_>) -> Value {
+    if let Some(artifact) = described.artifacts.iter().find(|a| a.path == id) {
+        let mut file = json!({
+            "@id": id,
+            "@type": "File",
+            "name": id,
+            "contentSize": artifact.bytes.to_string(),
+            "sha256": artifact.sha256,
+        });
+        let sources = described.sources.iter().filter(|s| artifact.origin.sources.contains(&s.id));
+        file["isBasedOn"] = sources.map(|s| json!({ "@id": source_id(s) })).collect();
+        return file;
+    }
+    let name = id.trim_end_matches('/');
+    let table = name.strip_prefix("tables/").and_then(tables::by_name).map(|table| table.description);
+    let folder = || FOLDERS.iter().find(|(folder, _)| *folder == id).map(|(_, what)| *what);
+    json!({ "@id": id, "@type": "Dataset", "name": name, "description": table.or_else(folder).unwrap_or_default() })
+}

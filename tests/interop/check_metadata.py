@@ -1,0 +1,147 @@
+"""Opens the descriptions of a release with the programs they are meant for.
+
+    python check_metadata.py RELEASE    croissant.json with mlcroissant (every record of every record set, against the rows of the
+                                        tables), ro-crate-metadata.json with rocrate, CITATION.cff with cffconvert, the head of
+                                        README.md as a dataset hub reads it
+"""
+
+import fnmatch
+import hashlib
+import logging
+import re
+import warnings
+
+import mlcroissant
+import pyarrow.parquet as pq
+from cffconvert.cli.create_citation import create_citation
+from rocrate.rocrate import ROCrate
+from ruamel.yaml import YAML
+
+from common import expect, manifest, run
+
+PARTS = ["train", "validation", "test"]
+
+
+def plain(value):
+    """A value as Parquet has it."""
+    if isinstance(value, bytes):
+        return value.decode()
+    if isinstance(value, list):
+        return [plain(element) for element in value]
+    if value is None or isinstance(value, (bool, str)):
+        return value
+    return value.item() if hasattr(value, "item") else value
+
+
+def same(theirs, ours):
+    if isinstance(ours, list):
+        return len(theirs) == len(ours) and all(map(same, theirs, ours))
+    if ours is None:
+        return theirs is None or theirs != theirs
+    return theirs == ours
+
+
+def tables(release):
+    """Rows of every table, in order of its files."""
+    rows = {}
+    for folder in sorted((release / "tables").iterdir()):
+        parts = sorted(folder.glob("*.parquet"))
+        rows[folder.name] = [row for part in parts for row in pq.read_table(part).to_pylist()]
+    return rows
+
+
+def check_records(dataset, name, rows):
+    records = list(dataset.records(name))
+    expect(len(records) == len(rows), f"croissant.json, {name}: {len(records)} records instead of {len(rows)}")
+    columns = list(rows[0])
+    keys = [f"{name}/{column}" for column in columns]
+    expect(list(records[0]) == keys, f"croissant.json, {name}: columns {list(records[0])} instead of {keys}")
+    for number, (record, row) in enumerate(zip(records, rows, strict=True)):
+        for column in columns:
+            theirs = plain(record[f"{name}/{column}"])
+            expect(same(theirs, row[column]), f"croissant.json, {name}, row {number}, {column}: {theirs} is not {row[column]}")
+    return len(records)
+
+
+def check_croissant(release):
+    dataset = mlcroissant.Dataset(release / "croissant.json")
+    issues = dataset.metadata.ctx.issues
+    expect(not issues.errors, f"croissant.json: {issues.report()}")
+    expected = tables(release)
+    sets = {record_set.id for record_set in dataset.metadata.record_sets}
+    expect(sets - {"splits"} == set(expected), f"croissant.json: record sets {sorted(sets)}")
+    counts = {name: check_records(dataset, name, rows) for name, rows in expected.items()}
+    if "splits" in sets:
+        parts = [record["splits/name"] for record in dataset.records("splits")]
+        expect(sorted(map(plain, parts)) == sorted(PARTS), f"croissant.json: splits {parts}")
+    files = {file.content_url: file.sha256 for file in dataset.metadata.file_objects}
+    for part in sorted((release / "tables").glob("*/*.parquet")):
+        path = str(part.relative_to(release))
+        sha256 = hashlib.sha256(part.read_bytes()).hexdigest()
+        expect(files.pop(path, None) == sha256, f"croissant.json: the hash of {path} is wrong or missing")
+    expect(not files, f"croissant.json names {sorted(files)}")
+    return {"records": counts, "warnings": sorted(issues.warnings)}
+
+
+def check_crate(release):
+    crate = ROCrate(release)
+    root = crate.root_dataset
+    for key in ["name", "description", "license", "datePublished"]:
+        expect(root.get(key), f"ro-crate-metadata.json: the root has no {key}")
+    for entity in crate.data_entities:
+        expect((release / entity.id).exists(), f"ro-crate-metadata.json: there is no {entity.id}")
+    actions = crate.get_by_type("CreateAction")
+    expect(actions, "ro-crate-metadata.json: no action")
+    for action in actions:
+        for key in ["instrument", "object", "result"]:
+            linked = action.get(key)
+            linked = linked if isinstance(linked, list) else [linked]
+            expect(linked, f"ro-crate-metadata.json: {action.id} has no {key}")
+            unknown = [entity for entity in linked if isinstance(entity, str) or entity is None]
+            expect(not unknown, f"ro-crate-metadata.json: {action.id}: {key} {unknown} is not described")
+    stages = {artifact["stage"] for artifact in manifest(release)["artifacts"]} - {""}
+    named = {action["name"].removeprefix("stage ") for action in actions}
+    expect(named == stages, f"ro-crate-metadata.json: actions {sorted(named)}, stages {sorted(stages)}")
+    return {"entities": len(crate.get_entities()), "actions": sorted(named)}
+
+
+def check_citation(release):
+    citation = create_citation(str(release / "CITATION.cff"), None)
+    citation.validate()
+    return citation.as_bibtex()
+
+
+def check_card(release):
+    text = (release / "README.md").read_text()
+    head = re.match(r"---\n(.*?)\n---\n", text, re.DOTALL)
+    expect(head, "README.md has no head")
+    card = YAML(typ="safe").load(head[1])
+    for key in ["pretty_name", "license", "tags", "configs"]:
+        expect(card.get(key), f"README.md: its head has no {key}")
+    there = {str(path.relative_to(release)) for path in (release / "tables").glob("*/*.parquet")}
+    for config in card["configs"]:
+        found = {path for path in there if fnmatch.fnmatch(path, config["data_files"])}
+        name = config["config_name"]
+        expect(found and all(path.split("/")[1] == name for path in found), f"README.md: {name} names {sorted(found)}")
+        there -= found
+    expect(not there, f"README.md does not name {sorted(there)}")
+    return {"configs": len(card["configs"]), "license": card["license"]}
+
+
+def check_release(release):
+    return {
+        "croissant": check_croissant(release),
+        "crate": check_crate(release),
+        "citation": check_citation(release),
+        "card": check_card(release),
+    }
+
+
+def check_files(paths):
+    raise SystemExit(f"{paths[0]} is no release")
+
+
+if __name__ == "__main__":
+    logging.disable(logging.WARNING)
+    warnings.simplefilter("ignore")
+    run(check_release, check_files)
