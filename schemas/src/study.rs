@@ -45,6 +45,10 @@ pub struct StudyHead {
     /// Whether groups share their random draws.
     #[serde(default)]
     pub pairing: Pairing,
+    /// Shares of the parts `train`, `validation` and `test` among the terrains of every group, as `[0.7, 0.15, 0.15]`; they add
+    /// up to 1. Terrains without a group take no part where others have one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub split: Option<[f64; 3]>,
 }
 
 fn default_license() -> String {

@@ -1,7 +1,8 @@
 //! What a release says of itself: licences, sources, citation.
 
-use sastrugi_tests::{area, sastrugi_in, small_study, write};
+use sastrugi_tests::{area, rows, sastrugi_in, small_study, sums, write};
 use serde_json::Value;
+use std::collections::BTreeMap;
 use std::path::Path;
 
 fn read(folder: &Path, name: &str) -> String {
@@ -63,4 +64,46 @@ fn val_what_the_data_asks_for_goes_with_everything_made_from_it() {
         let named = artifact["sources"].as_array().is_some_and(|s| s == &["site"]);
         assert_eq!(named, of_site, "{path}: {artifact}");
     }
+}
+
+/// A part for every terrain, in tables and shards alike; the same release from one run, from shards, and computed again.
+#[test]
+fn val_terrains_are_split_the_same_everywhere() {
+    let folder = area();
+    let path = folder.path();
+    let two = "[study]\nname = \"two\"\nseed = 5\ndate = \"2026-01-01\"\nsplit = [0.5, 0.25, 0.25]\n\n\
+        [[terrain]]\nid = \"a\"\nkind = \"multifractal\"\ngroup = \"a\"\ncount = 4\nsize_px = [200, 200]\n\n\
+        [[terrain]]\nid = \"b\"\nkind = \"weierstrass_mandelbrot\"\nsize_px = [64, 64]\n\n\
+        [[missions]]\nid = \"m\"\nterrains = [\"a\"]\ncount = 1\nlength_m = 4.0\nborder_m = 1.5\n\n\
+        [[traverse]]\nid = \"h\"\nmissions = \"m\"\n";
+    write(path, "study.toml", two);
+    let ok = |arguments: &[&str]| {
+        let call = sastrugi_in(path, arguments);
+        assert_eq!(call.code, 0, "{arguments:?}: {}{}", call.stdout, call.stderr);
+    };
+    ok(&["run", "study.toml", "-o", "release", "--quiet"]);
+    let release = path.join("release");
+    let parts: BTreeMap<String, Value> =
+        rows(&release, "terrains").into_iter().map(|row| (text(&row["terrain_id"]), row["split"].clone())).collect();
+    let count = |part: &str| parts.values().filter(|p| *p == part).count();
+    assert_eq!((count("train"), count("validation"), count("test"), parts["b"].clone()), (2, 1, 1, Value::Null));
+    let missions = rows(&release, "missions");
+    assert!(!missions.is_empty());
+    for mission in missions {
+        assert_eq!(mission["split"], parts[&text(&mission["terrain_id"])], "{mission:?}");
+    }
+    ok(&["verify", "release", "--recompute", "20", "--quiet"]);
+    for shard in ["1/2", "2/2"] {
+        ok(&["run", "study.toml", "-o", &format!("part{}", &shard[..1]), "--shard", shard, "--quiet"]);
+    }
+    ok(&["merge", "part1", "part2", "-o", "merged", "--quiet"]);
+    assert_eq!(sums(&release), sums(&path.join("merged")));
+    // Another split makes nothing again.
+    write(path, "study.toml", &two.replace("[0.5, 0.25, 0.25]", "[0.25, 0.25, 0.5]"));
+    let plan = sastrugi_in(path, &["plan", "study.toml", "-o", "release"]);
+    assert!(plan.stdout.contains("0 to compute"), "{}", plan.stdout);
+}
+
+fn text(value: &Value) -> String {
+    value.as_str().unwrap().to_owned()
 }

@@ -30,7 +30,12 @@ fn disguise(folder: &Path) {
             disguise(&path);
             continue;
         }
-        File::options().write(true).open(&path).unwrap().set_modified(SystemTime::UNIX_EPOCH + Duration::from_secs(1)).unwrap();
+        File::options()
+            .write(true)
+            .open(&path)
+            .unwrap()
+            .set_modified(SystemTime::UNIX_EPOCH + Duration::from_secs(1))
+            .unwrap();
         fs::set_permissions(&path, Permissions::from_mode(0o600)).unwrap();
     }
 }
@@ -91,6 +96,7 @@ fn val_only_whole_releases_are_packed() {
     fs::write(path.join("release/README.md"), "changed").unwrap();
     refused(&["pack", "release", "-o", "a.tar"], 4, "README.md");
     assert!(!path.join("a.tar").exists());
-    let left = fs::read_dir(path).unwrap().filter(|e| e.as_ref().unwrap().file_name().to_string_lossy().starts_with('.'));
+    let left =
+        fs::read_dir(path).unwrap().filter(|e| e.as_ref().unwrap().file_name().to_string_lossy().starts_with('.'));
     assert_eq!(left.count(), 0);
 }

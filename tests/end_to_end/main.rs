@@ -24,6 +24,8 @@ fn val_a_release_has_its_layout() {
         "README.md",
         "CITATION.cff",
         "LICENSE",
+        "croissant.json",
+        "ro-crate-metadata.json",
         "study.toml",
         "manifest.json",
         "dem/site.tif",

@@ -24,14 +24,24 @@ fn check(python: &Path, script: &str, arguments: &[&Path]) -> Called {
 fn val_readers_agree_with_a_release() {
     let Some(python) = python() else { return };
     let folder = area();
-    write(folder.path(), "study.toml", &small_study());
+    write(folder.path(), "study.toml", &described_study());
     let call = sastrugi_in(folder.path(), &["run", "study.toml", "-o", "release", "--quiet"]);
     assert_eq!(call.code, 0, "{}", call.stderr);
     let release = folder.path().join("release");
-    for script in ["check_dems.py", "check_tables.py", "check_mcap.py"] {
+    for script in ["check_dems.py", "check_tables.py", "check_mcap.py", "check_metadata.py"] {
         let call = check(&python, script, &[&release]);
         assert_eq!(call.code, 0, "{script}: {}{}", call.stdout, call.stderr);
     }
+}
+
+/// The small study with all that a release can say of itself: version and DOI, terms of its data, a split.
+fn described_study() -> String {
+    let head = "seed = 7\ntitle = \"Small: \\\"rough\\\" & smooth\"\nversion = \"1.0.0\"\ndoi = \"10.5281/zenodo.1234567\"\n\
+        creators = [\"A. Person\", \"A group\"]\nsplit = [0.4, 0.3, 0.3]\n";
+    let dem =
+        "id = \"site\"\nlicense = \"public domain\"\nattribution = \"NASA and USGS\"\ncitation = \"SRTM (2000)\"\n";
+    let study = small_study().replace("seed = 7\n", head).replace("id = \"site\"\n", dem);
+    study.replace("count = 2\n", "count = 3\n").replace("group = \"b\"\n", "")
 }
 
 /// Every measured DEM reads as rasterio (or numpy) reads it.

@@ -28,7 +28,7 @@ fn allowed() -> BTreeMap<&'static str, BTreeSet<&'static str>> {
 }
 
 /// Crates that only one room may name.
-const SOLE_USERS: [(&str, &str); 12] = [
+const SOLE_USERS: [(&str, &str); 13] = [
     ("arrow-array", "store"),
     ("arrow-schema", "store"),
     ("parquet", "store"),
@@ -38,6 +38,7 @@ const SOLE_USERS: [(&str, &str); 12] = [
     ("geotiff-reader", "store"),
     ("geotiff-writer", "store"),
     ("tiff", "store"),
+    ("tar", "store"),
     ("clap", "cli"),
     ("indicatif", "cli"),
     ("miette", "cli"),

@@ -7,6 +7,7 @@ pub mod packing;
 pub mod registry;
 mod revision;
 pub mod runner;
+pub mod splits;
 pub mod studies;
 pub mod study;
 pub mod verbs;

@@ -2,6 +2,7 @@
 
 use crate::jobs::{self, ItemRef, Job};
 use crate::runner::graph::{Graph, InputFile, Node};
+use crate::splits::{self, Splits};
 use crate::study::{Entry, Study, StudyError};
 use sastrugi_numeric::{Geometry, Streams};
 use sastrugi_schemas::Kind;
@@ -296,6 +297,8 @@ pub struct Plan {
     pub graph: Graph,
     /// Where input files go in the release.
     pub inputs: Vec<InputPlace>,
+    /// Which terrains are for training, validation and test.
+    pub splits: Splits,
 }
 
 /// Builds the graph of a study. Input files are hashed, nothing else is read.
@@ -316,7 +319,8 @@ pub fn build(study: &Study) -> Result<Plan, BuildError> {
     for section in &SECTIONS {
         (section.add)(&mut builder)?;
     }
-    Ok(Plan { graph: builder.graph, inputs: builder.inputs })
+    let splits = splits::draw(study, &builder.heightfields, &builder.graph)?;
+    Ok(Plan { graph: builder.graph, inputs: builder.inputs, splits })
 }
 
 /// An input file: its length in bytes, and its hash.

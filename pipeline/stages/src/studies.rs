@@ -10,6 +10,7 @@ use crate::runner::graph::Graph;
 use crate::runner::plan::{PlanSummary, plan};
 use crate::runner::progress::Progress;
 use crate::runner::shard::{self, Part};
+use crate::splits::Splits;
 use crate::study::Study;
 use sastrugi_store::release;
 use serde::Serialize;
@@ -26,6 +27,8 @@ pub struct Loaded {
     pub graph: Graph,
     /// The study's text as released: input files by their place in the release.
     pub released: String,
+    /// Which terrains are for training, validation and test.
+    pub splits: Splits,
 }
 
 /// Reads a study file.
@@ -58,7 +61,7 @@ pub fn load_text(text: &str, name: &str, folder: &Path) -> Result<Loaded, Error>
         return Err(Error::Usage(format!("{name}: the study has no items; add [[terrain]], [[dem]] ...")));
     }
     let released = released_text(text, &study, &plan);
-    Ok(Loaded { study, graph: plan.graph, released })
+    Ok(Loaded { study, graph: plan.graph, released, splits: plan.splits })
 }
 
 /// The study with its input files at their places in the release; every other byte stays.
@@ -130,11 +133,16 @@ pub fn run(loaded: &Loaded, request: &RunRequest<'_>, progress: &dyn Progress) -
         return Err(all_failed(&execution.failures));
     }
     match request.part {
-        Some(part) => shard::write(request.output, graph, &cache, part, &loaded.released, &execution.failures)?,
+        Some(part) => shard::write(request.output, loaded, &cache, part, &execution.failures)?,
         None => {
             let items = (0..graph.len()).map(|p| located(graph, &cache, &execution, p)).collect();
-            let contents =
-                Contents { study: &loaded.study, text: &loaded.released, items, failures: &execution.failures };
+            let contents = Contents {
+                study: &loaded.study,
+                text: &loaded.released,
+                splits: &loaded.splits,
+                items,
+                failures: &execution.failures,
+            };
             assemble(contents, request.output, progress)?;
         }
     }
@@ -233,7 +241,13 @@ pub fn merge(shards: &[PathBuf], output: &Path, progress: &dyn Progress) -> Resu
     let joined = shard::join(shards)?;
     let study = Study::parse(&joined.study, Path::new(""), &registry::section_names()).map_err(Error::failed)?;
     let items = joined.items.len();
-    let contents = Contents { study: &study, text: &joined.study, items: joined.items, failures: &joined.failures };
+    let contents = Contents {
+        study: &study,
+        text: &joined.study,
+        splits: &joined.splits,
+        items: joined.items,
+        failures: &joined.failures,
+    };
     assemble(contents, output, progress)?;
     Ok(RunSummary { output: output.to_owned(), items, computed: 0, failures: joined.failures })
 }

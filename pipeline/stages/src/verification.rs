@@ -6,6 +6,7 @@ use crate::runner::assemble::release_error;
 use crate::runner::cache::{Cache, Record};
 use crate::runner::execute::{Limits, execute};
 use crate::runner::progress::Progress;
+use crate::splits;
 use crate::studies::{Loaded, RunRequest, load, run};
 use sastrugi_schemas::Record as Row;
 use sastrugi_schemas::tables::SampleRow;
@@ -178,7 +179,8 @@ fn recompute_some(
         release.manifest().artifacts.iter().map(|a| (a.path.as_str(), a.sha256.as_str())).collect();
     for position in chosen {
         let item = &graph.node(position).item;
-        let Some(record) = cache.load(item, graph.key(position)) else { continue };
+        let Some(mut record) = cache.load(item, graph.key(position)) else { continue };
+        splits::fill(&mut record.rows, &loaded.splits);
         verification.recomputed.push(item.to_string());
         verification.differences.extend(compare_files(&there, &record));
         let samples = cache.result_folder(item, &record.key).join(traverse::SAMPLES);

@@ -1,7 +1,7 @@
 //! Files: DEM formats, point clouds, masks, transects, atomic writes, Parquet tables, MCAP recordings, and the release folder with its
 //! checksums.
 //!
-//! The only room that names `arrow`, `parquet`, `mcap`, `foxglove`, `prost`, `geotiff-*`, `tiff`, `png` and `las`. Nothing
+//! The only room that names `arrow`, `parquet`, `mcap`, `foxglove`, `prost`, `geotiff-*`, `tiff`, `png`, `las` and `tar`. Nothing
 //! here computes: heights, rows and recordings come in and go out as they are. Only point clouds are gridded
 //! ([`points`]) and polygons made masks ([`mask`]).
 //!

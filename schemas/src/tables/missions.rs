@@ -14,6 +14,8 @@ super::table! {
         /// What differs from the study's plain run: the swept parameters of terrain and traverse, as `surface.wheel_friction
         /// = 0.7`; null for the plain run.
         variant: Option<String> [""],
+        /// `train`, `validation` or `test` (`[study] split`); null where the study parts no terrains, or not this one.
+        split: Option<String> [""],
         /// Missions with the same `pair_id` lead from the same start to the same goal, on one terrain or (with `pairing =
         /// "common"`) on terrains that share their random draws.
         pair_id: String [""],

@@ -12,6 +12,8 @@ super::table! {
         /// What differs from other terrains of the group: the swept parameters, as `z_scale_percent = 1.0`; null for plain
         /// terrains.
         variant: Option<String> [""],
+        /// `train`, `validation` or `test` (`[study] split`); null where the study parts no terrains, or not this one.
+        split: Option<String> [""],
         /// `terrain`, `dem` or `texture`: the stage that made it.
         stage: String [""],
         /// Generator, or the file format of a measured DEM.

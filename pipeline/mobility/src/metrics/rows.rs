@@ -51,6 +51,7 @@ pub fn mission_row(
         mission_id: mission.id(),
         group: labels.group.clone(),
         variant: labels.variant.clone(),
+        split: None,
         pair_id: labels.pair_id.clone(),
         traverse_id: labels.traverse_id.clone(),
         vehicle: recording.vehicle.name.clone(),

@@ -41,6 +41,8 @@ impl RoughnessJob {
             terrain_id: self.id.clone(),
             group: self.field.group.clone(),
             variant: self.field.variant.clone(),
+            // Known when a release is assembled: another split must not make anything again.
+            split: None,
             stage: self.field.item.stage.clone(),
             kind: self.field.kind.clone(),
             params: self.field.parameters.to_string(),

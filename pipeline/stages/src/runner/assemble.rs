@@ -9,6 +9,7 @@ use super::progress::Progress;
 use super::sources::Sources;
 use crate::error::Error;
 use crate::jobs::{ItemRef, Rows, fit, roughness, scoreboard, texture, traverse};
+use crate::splits::{self, Splits};
 use crate::study::Study;
 use sastrugi_schemas::Record as Row;
 use sastrugi_schemas::manifest::{FailedItem, ItemNote, Origin};
@@ -26,6 +27,8 @@ pub struct Contents<'a> {
     pub study: &'a Study,
     /// Its text as it is released.
     pub text: &'a str,
+    /// Which terrains are for training, validation and test.
+    pub splits: &'a Splits,
     /// Every item, parents before children, with the folder of its result.
     pub items: Vec<(ItemRef, Option<PathBuf>)>,
     /// Items without a result.
@@ -126,6 +129,13 @@ pub(super) fn record(folder: &Path) -> Result<Record, Error> {
         .ok_or_else(|| Error::Failed(format!("{}: the result was changed while it was used", folder.display())))
 }
 
+/// The rows of a result as they are released.
+fn rows_of(contents: &Contents<'_>, folder: &Path) -> Result<Rows, Error> {
+    let mut rows = record(folder)?.rows;
+    splits::fill(&mut rows, contents.splits);
+    Ok(rows)
+}
+
 fn add_artifacts(builder: &mut ReleaseBuilder, contents: &Contents<'_>, sources: &Sources) -> Result<(), Error> {
     for (_, folder) in contents.items.iter() {
         let Some(folder) = folder else { continue };
@@ -193,7 +203,7 @@ fn add_table<R: Row>(
     stages: &[&str],
     take: impl Fn(Rows) -> Vec<R>,
 ) -> Result<(), Error> {
-    let parts = contents.results(stages).into_iter().map(|(_, folder)| Ok(take(record(folder)?.rows)));
+    let parts = contents.results(stages).into_iter().map(|(_, folder)| Ok(take(rows_of(contents, folder)?)));
     write_parts(builder, parts, &stages.join("+"))
 }
 
@@ -262,9 +272,10 @@ fn add_missions(builder: &mut ReleaseBuilder, contents: &Contents<'_>) -> Result
     };
     let parts: Vec<&str> = terrains.keys().copied().collect();
     builder.write_parts(&parts, samples, &made_by(traverse::STAGE)).map_err(|Failed(error)| error)?;
-    add_by_terrain(builder, &terrains, |rows| rows.missions, |a, b| a.mission_id.cmp(&b.mission_id))?;
+    add_by_terrain(builder, contents, &terrains, |rows| rows.missions, |a, b| a.mission_id.cmp(&b.mission_id))?;
     add_by_terrain(
         builder,
+        contents,
         &terrains,
         |rows| rows.replicates,
         |a, b| (&a.mission_id, a.replicate).cmp(&(&b.mission_id, b.replicate)),
@@ -297,6 +308,7 @@ impl From<ReleaseError> for Failed {
 /// One table whose first key is the terrain, its rows taken terrain by terrain and sorted there by the other keys.
 fn add_by_terrain<R: Row>(
     builder: &mut ReleaseBuilder,
+    contents: &Contents<'_>,
     terrains: &BTreeMap<&str, Vec<&PathBuf>>,
     take: impl Fn(Rows) -> Vec<R>,
     order: impl Fn(&R, &R) -> Ordering,
@@ -304,7 +316,7 @@ fn add_by_terrain<R: Row>(
     let sorted = |folders: &Vec<&PathBuf>| -> Result<Vec<R>, Error> {
         let mut rows = Vec::new();
         for folder in folders {
-            rows.extend(take(record(folder)?.rows));
+            rows.extend(take(rows_of(contents, folder)?));
         }
         rows.sort_by(&order);
         Ok(rows)

@@ -9,6 +9,8 @@ use super::execute::Failure;
 use super::graph::Graph;
 use crate::error::Error;
 use crate::jobs::ItemRef;
+use crate::splits::Splits;
+use crate::studies::Loaded;
 use sastrugi_store::{atomic, digest};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -57,6 +59,9 @@ struct Description {
     items: Vec<(ItemRef, String)>,
     /// Own items without a result.
     failures: Vec<Failure>,
+    /// Which terrains are for training, validation and test; the same in all shards.
+    #[serde(default)]
+    splits: Splits,
 }
 
 /// Every item of a study with its key, in graph order.
@@ -68,14 +73,8 @@ pub fn all_items(graph: &Graph) -> Vec<(ItemRef, String)> {
 ///
 /// # Errors
 /// A folder that is not empty and no shard, or a file system that refuses.
-pub fn write(
-    target: &Path,
-    graph: &Graph,
-    cache: &Cache,
-    part: Part,
-    study: &str,
-    failures: &[Failure],
-) -> Result<(), Error> {
+pub fn write(target: &Path, loaded: &Loaded, cache: &Cache, part: Part, failures: &[Failure]) -> Result<(), Error> {
+    let (graph, study) = (&loaded.graph, loaded.released.as_str());
     check_target(target)?;
     let _lock = DestinationLock::take(target)?;
     let staging = sastrugi_store::release::beside(target, "assembling");
@@ -95,6 +94,7 @@ pub fn write(
         study_sha256: sastrugi_store::digest::of_text(study),
         items: all_items(graph),
         failures: failures.iter().filter(owned).cloned().collect(),
+        splits: loaded.splits.clone(),
     };
     let text = serde_json::to_vec_pretty(&description).map_err(Error::failed)?;
     atomic::write(&staging.join(STUDY), study.as_bytes()).map_err(Error::failed)?;
@@ -145,6 +145,8 @@ pub struct Joined {
     pub items: Vec<(ItemRef, Option<PathBuf>)>,
     /// Items without a result.
     pub failures: Vec<Failure>,
+    /// Which terrains are for training, validation and test.
+    pub splits: Splits,
 }
 
 /// Joins the shards of one study.
@@ -173,7 +175,7 @@ pub fn join(folders: &[PathBuf]) -> Result<Joined, Error> {
         }
         items.push((item.clone(), result));
     }
-    Ok(Joined { study, items, failures: failures.into_values().collect() })
+    Ok(Joined { study, items, failures: failures.into_values().collect(), splits: first.splits.clone() })
 }
 
 /// True when every file has the bytes that it was made with.

@@ -88,6 +88,7 @@ fn read_head(root: &Map<String, Value>, text: &StudyText) -> Result<StudyHead, S
         check_version(head.version.as_deref()),
         check_url(head.url.as_deref()),
         check_doi(head.doi.as_deref()),
+        check_split(head.split.as_ref()),
     ];
     checks.into_iter().collect::<Result<Vec<()>, _>>().map_err(|e| section_error(text, "study", e))?;
     Ok(head)
@@ -178,6 +179,21 @@ fn check_date(date: &str) -> Result<(), ParameterError> {
 fn check_license(license: &str) -> Result<(), ParameterError> {
     if license.trim().is_empty() {
         return Err(ParameterError::new("license", "is empty; it must be an SPDX expression such as CC-BY-4.0"));
+    }
+    Ok(())
+}
+
+fn check_split(split: Option<&[f64; 3]>) -> Result<(), ParameterError> {
+    let Some(shares) = split else { return Ok(()) };
+    let refuse = |rule: &str| Err(ParameterError::new("split", format!("is {shares:?}; {rule}")));
+    if !shares.iter().all(|share| (0.0..=1.0).contains(share)) {
+        return refuse("shares are 0 to 1");
+    }
+    if (shares.iter().sum::<f64>() - 1.0).abs() > 1e-9 {
+        return refuse("its shares must add up to 1, as [0.7, 0.15, 0.15] does");
+    }
+    if shares.iter().filter(|share| **share > 0.0).count() < 2 {
+        return refuse("at least two shares must be above 0");
     }
     Ok(())
 }

@@ -2,10 +2,14 @@
 //! loaders find its columns with type, unit and description, and its files with their hashes.
 
 use super::{Described, add_terms, address_of_license, citation_line, page};
+use crate::splits::PARTS;
 use sastrugi_schemas::manifest::{Artifact, Source};
 use sastrugi_schemas::tables::{self, Column, ColumnType, Table};
 use serde_json::{Value, json};
 
+/// Record set of the parts of a split, and the column that names one.
+const SPLITS: &str = "splits";
+const SPLIT_COLUMN: &str = "split";
 const PARQUET: &str = "application/x-parquet";
 /// Files beside the tables: name, pattern of their paths, media type, what they are.
 const RASTERS: [(&str, &str, &str, &str); 4] = [
@@ -18,7 +22,10 @@ const RASTERS: [(&str, &str, &str, &str); 4] = [
 /// The text of `croissant.json`.
 pub fn croissant(described: &Described<'_>) -> Value {
     let head = described.head;
-    let tables: Vec<Value> = tables::ALL.into_iter().filter_map(|table| record_set(table, described)).collect();
+    let mut tables: Vec<Value> = tables::ALL.into_iter().filter_map(|table| record_set(table, described)).collect();
+    if head.split.is_some() {
+        tables.push(splits());
+    }
     let mut dataset = json!({
         "@context": context(),
         "@type": "sc:Dataset",
@@ -136,11 +143,37 @@ fn field(table: &Table, column: &Column, source: &Value) -> Value {
     if !column.unit.is_empty() {
         field["unitText"] = json!(column.unit);
     }
+    if column.name == SPLIT_COLUMN {
+        field["dataType"] = json!(["sc:Text", "cr:Split"]);
+    }
     if is_list {
         field["isArray"] = json!(true);
         field["arrayShape"] = json!("-1");
     }
     field
+}
+
+/// The parts that the column `split` names.
+fn splits() -> Value {
+    let column = |name: &str, data_type: &str| {
+        let id = format!("{SPLITS}/{name}");
+        json!({ "@type": "cr:Field", "@id": id, "name": name, "dataType": data_type })
+    };
+    let urls = ["cr:TrainingSplit", "cr:ValidationSplit", "cr:TestSplit"];
+    let rows = PARTS
+        .iter()
+        .zip(urls)
+        .map(|(part, url)| json!({ (format!("{SPLITS}/name")): part, (format!("{SPLITS}/url")): url }));
+    json!({
+        "@type": "cr:RecordSet",
+        "@id": SPLITS,
+        "name": SPLITS,
+        "description": "Parts of the terrains: every group has each in the shares that the study asks for",
+        "dataType": "cr:Split",
+        "key": { "@id": format!("{SPLITS}/name") },
+        "field": [column("name", "sc:Text"), column("url", "sc:URL")],
+        "data": rows.collect::<Vec<_>>(),
+    })
 }
 
 /// The context of the specification, word for word.

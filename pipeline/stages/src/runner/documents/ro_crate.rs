@@ -2,7 +2,7 @@
 //! Crate 0.5 (<https://w3id.org/ro/wfrun/process/0.5>): one `CreateAction` per stage. Folders stand for their files;
 //! `manifest.json` has the parents, stream and hash of each.
 
-use super::{Described, FOLDERS, add_terms, address_of_license, citation_line, page};
+use super::{Described, FOLDERS, add_terms, address_of_license, citation_line, is_spdx_identifier, page};
 use sastrugi_schemas::manifest::{Artifact, PROGRAM as PROGRAM_NAME, Source};
 use sastrugi_schemas::tables;
 use serde_json::{Value, json};
@@ -32,6 +32,7 @@ pub fn ro_crate(described: &Described<'_>) -> Value {
     graph.extend(parts);
     graph.push(json!({ "@id": PROFILE, "@type": "CreativeWork", "name": "Process Run Crate", "version": "0.5" }));
     graph.push(program());
+    graph.extend(license(&described.head.license));
     graph.extend(described.creators().map(|name| json!({ "@id": person(name), "@type": "Person", "name": name })));
     graph.extend(described.sources.iter().map(work));
     graph.extend(stages.actions());
@@ -57,7 +58,7 @@ fn root(described: &Described<'_>, parts: &[Value], stages: &Stages) -> Value {
         "name": head.title,
         "description": if head.description.is_empty() { &head.title } else { &head.description },
         "datePublished": head.date,
-        "license": address_of_license(&head.license),
+        "license": { "@id": license_id(&head.license) },
         "author": described.creators().map(|name| json!({ "@id": person(name) })).collect::<Vec<_>>(),
         "creditText": citation_line(head),
         "conformsTo": { "@id": PROFILE },
@@ -80,6 +81,18 @@ fn root(described: &Described<'_>, parts: &[Value], stages: &Stages) -> Value {
 
 fn own_file((path, media, description): &(&str, &str, &str)) -> Value {
     json!({ "@id": path, "@type": "File", "name": path, "description": description, "encodingFormat": media })
+}
+
+/// A licence of the SPDX list by its page there, any other by the file that names it.
+fn license_id(license: &str) -> String {
+    if is_spdx_identifier(license) { address_of_license(license) } else { "LICENSE".to_owned() }
+}
+
+/// The entity of a licence that is no file of the release.
+fn license(license: &str) -> Option<Value> {
+    let id = is_spdx_identifier(license).then(|| license_id(license))?;
+    let description = format!("The licence that the SPDX list calls {license}");
+    Some(json!({ "@id": id, "@type": "CreativeWork", "name": license, "description": description }))
 }
 
 fn program() -> Value {

@@ -1,0 +1,237 @@
+//! Terrains for training, validation and test: one part for each terrain and everything on it, every group in the same shares.
+//!
+//! What must not be torn apart is one unit: terrains that share their random draws (`pairing = "common"`), and a texture and
+//! the heightfield that it lies on. Units are drawn group by group; units whose terrains are of several groups are
+//! drawn together with those of the same groups. A unit's place in the draw comes from its own random stream, so that more
+//! terrains move few others.
+
+use crate::jobs::terrain::common;
+use crate::jobs::{ItemRef, Rows};
+use crate::registry::Heightfield;
+use crate::runner::graph::Graph;
+use crate::study::{Study, StudyError};
+use sastrugi_numeric::Streams;
+use sastrugi_schemas::study::Pairing;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Names of the parts, in the order of `[study] split`.
+pub const PARTS: [&str; 3] = ["train", "validation", "test"];
+/// First word of the random streams after the seed.
+const STAGE: &str = "split";
+
+/// Part of each terrain, by id; terrains without a part are absent.
+pub type Splits = BTreeMap<String, String>;
+
+/// Writes the parts into rows that name a terrain.
+pub fn fill(rows: &mut Rows, splits: &Splits) {
+    rows.terrains.iter_mut().for_each(|row| row.split = splits.get(&row.terrain_id).cloned());
+    rows.missions.iter_mut().for_each(|row| row.split = splits.get(&row.terrain_id).cloned());
+}
+
+/// Terrains that stay together.
+struct Unit {
+    terrains: Vec<String>,
+    /// Labels of its terrains; empty when none has one.
+    groups: BTreeSet<String>,
+    /// Its place in the draw.
+    rank: u64,
+}
+
+/// Draws the part of every terrain, if the study asks for it. Terrains without a group take no part while others have
+/// one, unless they belong to the unit of such a terrain.
+///
+/// # Errors
+/// A group with too few terrains.
+pub fn draw(study: &Study, fields: &BTreeMap<String, Heightfield>, graph: &Graph) -> Result<Splits, StudyError> {
+    let Some(shares) = study.head.split else { return Ok(Splits::new()) };
+    let mut strata: BTreeMap<BTreeSet<String>, Vec<Unit>> = BTreeMap::new();
+    for unit in units(study, fields, graph) {
+        strata.entry(unit.groups.clone()).or_default().push(unit);
+    }
+    if strata.len() > 1 {
+        strata.remove(&BTreeSet::new());
+    }
+    let mut splits = Splits::new();
+    for (groups, mut units) in strata {
+        let counts = counts(units.len(), &shares).ok_or_else(|| too_few(study, &groups, units.len(), &shares))?;
+        units.sort_by(|a, b| (a.rank, &a.terrains).cmp(&(b.rank, &b.terrains)));
+        let parts = PARTS.into_iter().zip(counts).flat_map(|(part, count)| std::iter::repeat_n(part, count));
+        for (unit, part) in units.into_iter().zip(parts) {
+            splits.extend(unit.terrains.into_iter().map(|id| (id, part.to_owned())));
+        }
+    }
+    Ok(splits)
+}
+
+fn too_few(study: &Study, groups: &BTreeSet<String>, count: usize, shares: &[f64; 3]) -> StudyError {
+    let names: Vec<String> = groups.iter().map(|group| format!("\"{group}\"")).collect();
+    let of = if names.is_empty() { "the study".to_owned() } else { format!("group {}", names.join(" with ")) };
+    let parts = shares.iter().filter(|share| **share > 0.0).count();
+    let message = format!(
+        "`split` asks for {parts} parts, but {of} has {count} terrain{} that can be parted; it takes at least one for each part",
+        if count == 1 { "" } else { "s" }
+    );
+    let span = study.span_of(&["study".to_owned(), "split".to_owned()]);
+    StudyError::at(span, message).with_help(Some("terrains without a `group` take no part".to_owned()))
+}
+
+/// How many of `count` units go to each part: shares rounded by the largest remainders, at least one for each share above 0.
+/// Nothing when there are too few.
+fn counts(count: usize, shares: &[f64; 3]) -> Option<[usize; 3]> {
+    let wanted = shares.map(|share| share * count as f64);
+    let mut counts = wanted.map(|w| w.floor() as usize);
+    let mut order = [0, 1, 2];
+    order.sort_by(|&a, &b| wanted[b].fract().total_cmp(&wanted[a].fract()));
+    let left = count.checked_sub(counts.iter().sum())?;
+    order.into_iter().filter(|&k| shares[k] > 0.0).take(left).for_each(|k| counts[k] += 1);
+    for k in 0..3 {
+        if shares[k] > 0.0 && counts[k] == 0 {
+            let largest = (0..3).max_by_key(|&k| (counts[k], std::cmp::Reverse(k)))?;
+            counts[largest] = counts[largest].checked_sub(1).filter(|&rest| rest > 0)?;
+            counts[k] = 1;
+        }
+    }
+    Some(counts)
+}
+
+/// Terrains by what ties them to one another.
+fn units(study: &Study, fields: &BTreeMap<String, Heightfield>, graph: &Graph) -> Vec<Unit> {
+    let mut forest = Forest::default();
+    let makers: BTreeMap<&ItemRef, &str> = fields.iter().map(|(id, field)| (&field.item, id.as_str())).collect();
+    for (id, field) in fields {
+        forest.root(id);
+        let parents = graph.find(&field.item).into_iter().flat_map(|p| &graph.node(p).parents);
+        parents.filter_map(|parent| makers.get(parent)).for_each(|parent| forest.join(id, parent));
+        if let Some(word) = shared_draw(study, field) {
+            forest.join(id, &word);
+        }
+    }
+    let mut units: BTreeMap<String, Unit> = BTreeMap::new();
+    for (id, field) in fields {
+        let root = forest.root(id);
+        let rank = || Streams::for_item(study.head.seed, STAGE, root.trim_start()).stream("rank").bits();
+        let unit = units.entry(root.clone()).or_insert_with(|| Unit {
+            terrains: Vec::new(),
+            groups: BTreeSet::new(),
+            rank: rank(),
+        });
+        unit.terrains.push(id.clone());
+        unit.groups.extend(field.group.clone());
+    }
+    units.into_values().collect()
+}
+
+/// Word of the draws that a heightfield shares with others.
+fn shared_draw(study: &Study, field: &Heightfield) -> Option<String> {
+    // Ids hold no blank, so that none is taken for this word, which comes before all of them.
+    field.replicate.filter(|_| study.head.pairing == Pairing::Common).map(|k| format!(" {}", common(k)))
+}
+
+/// Names that belong together; the first of them in order stands for all.
+#[derive(Default)]
+struct Forest(BTreeMap<String, String>);
+
+impl Forest {
+    fn root(&mut self, name: &str) -> String {
+        let mut at = name.to_owned();
+        loop {
+            let above = self.0.entry(at.clone()).or_insert_with(|| at.clone()).clone();
+            if above == at {
+                return at;
+            }
+            at = above;
+        }
+    }
+
+    fn join(&mut self, a: &str, b: &str) {
+        let (a, b) = (self.root(a), self.root(b));
+        let (first, second) = if a <= b { (a, b) } else { (b, a) };
+        self.0.insert(second, first);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::studies::load_text;
+    use std::path::Path;
+
+    const HEAD: &str = "[study]\nname = \"x\"\nseed = 3\ndate = \"2026-01-01\"\n";
+
+    fn terrain(id: &str, group: &str, count: u32) -> String {
+        let group = if group.is_empty() { String::new() } else { format!("group = \"{group}\"\n") };
+        format!("[[terrain]]\nid = \"{id}\"\nkind = \"multifractal\"\nsize_px = [64, 64]\ncount = {count}\n{group}")
+    }
+
+    fn splits(text: &str) -> Result<Splits, String> {
+        load_text(text, "study", Path::new("")).map(|loaded| loaded.splits).map_err(|e| e.to_string())
+    }
+
+    fn number(splits: &Splits, start: &str) -> [usize; 3] {
+        PARTS.map(|part| splits.iter().filter(|(id, p)| id.starts_with(start) && *p == part).count())
+    }
+
+    #[test]
+    fn val_every_group_has_the_shares() {
+        let text = format!(
+            "{HEAD}split = [0.7, 0.15, 0.15]\n{}{}{}",
+            terrain("a", "a", 20),
+            terrain("b", "b", 7),
+            terrain("c", "", 2)
+        );
+        let drawn = splits(&text).unwrap();
+        assert_eq!((number(&drawn, "a"), number(&drawn, "b"), number(&drawn, "c")), ([14, 3, 3], [5, 1, 1], [0, 0, 0]));
+        assert_eq!(splits(&text).unwrap(), drawn);
+        assert_ne!(splits(&text.replace("seed = 3", "seed = 4")).unwrap(), drawn);
+        assert!(splits(&text.replace("split", "# split")).unwrap().is_empty());
+    }
+
+    #[test]
+    fn val_without_groups_all_are_one_group() {
+        let text = format!("{HEAD}split = [0.5, 0.0, 0.5]\n{}", terrain("a", "", 4));
+        assert_eq!(number(&splits(&text).unwrap(), "a"), [2, 0, 2]);
+    }
+
+    #[test]
+    fn val_paired_terrains_and_textures_on_them_stay_together() {
+        let texture = "[[texture]]\nid = \"t\"\nfit = { model = \"exponential\", sigma_m = 0.01, range_m = 0.3 }\nonto = \"c\"\ngroup = \"a\"\nsize_m = [2.0, 2.0]\ncell_m = 0.1\n";
+        let own = "[[terrain]]\nid = \"c\"\nkind = \"multifractal\"\nsize_px = [64, 64]\n";
+        let text = format!("{HEAD}split = [0.6, 0.2, 0.2]\n{}{own}{texture}", terrain("a", "a", 10));
+        let drawn = splits(&text).unwrap();
+        assert_eq!(drawn["t"], drawn["c"]);
+        let paired = HEAD.to_owned() + "pairing = \"common\"\n";
+        let text = format!("{paired}split = [0.6, 0.2, 0.2]\n{}{}", terrain("a", "a", 10), terrain("b", "b", 10));
+        let drawn = splits(&text).unwrap();
+        assert!((1..=10).all(|k| drawn[&format!("a-{k:04}")] == drawn[&format!("b-{k:04}")]));
+        assert_eq!(number(&drawn, "a"), [6, 2, 2]);
+    }
+
+    #[test]
+    fn val_too_few_terrains_are_refused() {
+        let text = format!("{HEAD}split = [0.7, 0.15, 0.15]\n{}{}", terrain("a", "a", 20), terrain("b", "b", 2));
+        let error = splits(&text).unwrap_err();
+        assert!(error.contains("group \"b\" has 2 terrains") && error.contains("3 parts"), "{error}");
+        for (shares, words) in
+            [("[0.5, 0.5, 0.5]", "add up to 1"), ("[1.2, -0.2, 0.0]", "0 to 1"), ("[1.0, 0.0, 0.0]", "two")]
+        {
+            let error = splits(&format!("{HEAD}split = {shares}\n{}", terrain("a", "a", 20))).unwrap_err();
+            assert!(error.contains(words), "{shares}: {error}");
+        }
+    }
+
+    #[test]
+    fn prop_counts_add_up_and_leave_no_part_empty() {
+        for count in 3..200 {
+            for shares in [[0.7, 0.15, 0.15], [0.98, 0.01, 0.01], [1.0 / 3.0; 3], [0.9, 0.1, 0.0]] {
+                let counts = counts(count, &shares).unwrap();
+                assert_eq!(counts.iter().sum::<usize>(), count);
+                for k in 0..3 {
+                    assert_eq!(counts[k] > 0, shares[k] > 0.0, "{count} {shares:?}");
+                    let near = (counts[k] as f64 - shares[k] * count as f64).abs();
+                    assert!(near < 2.0, "{count} {shares:?}: {counts:?}");
+                }
+            }
+        }
+        assert_eq!((counts(2, &[0.7, 0.15, 0.15]), counts(0, &[0.5, 0.0, 0.5])), (None, None));
+    }
+}
