@@ -37,10 +37,12 @@ pub fn croissant(described: &Described<'_>) -> Value {
         "datePublished": head.date,
         "citeAs": citation_line(head),
         "url": page(head).unwrap_or_else(|| "./".to_owned()),
-        "version": head.version.as_deref().unwrap_or("0.0.0"),
         "distribution": distribution(described),
         "recordSet": tables,
     });
+    if let Some(version) = &head.version {
+        dataset["version"] = json!(version);
+    }
     if !described.sources.is_empty() {
         dataset["isBasedOn"] = described.sources.iter().map(work).collect();
     }
