@@ -1,19 +1,35 @@
-//! Arrays in, numbers out: summaries, the normal distribution, correlation, bootstrap intervals, cumulative incidence, nested
-//! components of variance.
+//! Arrays in, numbers out: summaries, distributions, correlation, bootstrap intervals, cumulative incidence, nested components of
+//! variance, and tests of groups whose missions are nested in terrains.
+//!
+//! What such tests look at is one number per terrain, because missions on one terrain resemble each other:
+//! [`permutation`] (do two groups differ?), [`trend`] (do ordered groups rise or fall?), [`effect`] (by how much?),
+//! [`equivalence`] (by less than a margin?), [`mixed_logistic`] (success, with an intercept of the terrain), [`power`] (how many
+//! terrains would be needed?), [`multiple`] (several tests at once).
 //!
 //! Values that are not finite are not data: callers drop them first (`sastrugi_numeric::sums::finite`). Nothing here
 //! draws a random number except from the stream it is given, and the bits do not depend on the CPU.
 
 pub mod bootstrap;
+pub mod chi_square;
 pub mod components;
 pub mod correlation;
+pub mod effect;
+pub mod equivalence;
 pub mod incidence;
+pub mod mixed_logistic;
 pub mod multiple;
 pub mod normal;
+pub mod permutation;
+pub mod power;
+pub mod student;
 pub mod summary;
+pub mod trend;
 
 pub use bootstrap::{Interval, cluster_interval};
 pub use components::Components;
+pub use effect::Effect;
+pub use equivalence::MeanDifference;
 pub use incidence::{Ending, Incidence};
 pub use multiple::holm;
+pub use permutation::Permutation;
 pub use summary::BoxPlot;

@@ -1,0 +1,78 @@
+use super::*;
+use sastrugi_numeric::Streams;
+
+fn stream(purpose: &str) -> Stream {
+    Streams::for_seed(1, "trend-test").stream(purpose)
+}
+
+/// Data of `tests/statistical/nested_tests.py`.
+fn groups() -> Vec<Vec<f64>> {
+    vec![vec![62.0, 71.5, 55.0, 80.0], vec![58.0, 49.0, 71.5], vec![44.0, 52.5, 40.5]]
+}
+
+fn blocks() -> Vec<Vec<f64>> {
+    vec![
+        vec![71.0, 64.0, 60.0],
+        vec![55.0, 57.0, 41.0],
+        vec![80.0, 62.0, 61.5],
+        vec![66.0, 70.0, 49.0],
+        vec![48.0, 40.0, 44.0],
+    ]
+}
+
+/// scipy 1.17.1: scipy.stats.spearmanr, and the share of all arrangements of its labels. Tolerance 1e-12.
+#[test]
+fn val_groups_of_scipy() {
+    let test = of_groups(&groups(), 5000, &mut stream("groups")).unwrap();
+    assert!(test.exact && test.arrangements == 4200);
+    assert!((test.p - 0.017_142_857_142_857_144).abs() < 1e-12, "{test:?}");
+    assert!((correlation_of_groups(&groups()) + 0.750_317_945_991_113_3).abs() < 1e-12);
+}
+
+/// scipy.stats.page_trend_test of scipy 1.17.1, method "exact", of the values with their sign turned: L = 67, one-sided p =
+/// 0.018132716049382717. L's expectation is 5 x 3 x 4^2 / 4 = 60; by symmetry the two-sided p is twice the one-sided. Tolerance 1e-12.
+#[test]
+fn val_blocks_of_scipy() {
+    let test = of_blocks(&blocks(), 10_000, &mut stream("blocks")).unwrap();
+    assert!(test.exact && test.arrangements == 7776);
+    assert_eq!(test.observed, 7.0);
+    assert!((test.p - 2.0 * 0.018_132_716_049_382_717).abs() < 1e-12, "{test:?}");
+    // Each block's centred ranks have squares of sum 2, its labels too.
+    assert!((correlation_of_blocks(&blocks()) + (7.0) / 10.0).abs() < 1e-12);
+}
+
+/// With two groups the trend is the rank-sum test.
+#[test]
+fn val_two_groups_are_the_rank_sum_test() {
+    let groups = &groups()[..2];
+    let trend = of_groups(groups, 100, &mut stream("two")).unwrap();
+    assert_eq!(Some(trend), crate::permutation::rank_sum(&groups[0], &groups[1], 100, &mut stream("two")));
+}
+
+#[test]
+fn val_degenerate_samples() {
+    let mut s = stream("degenerate");
+    assert_eq!(of_groups(&[], 9, &mut s), None);
+    assert_eq!(of_groups(&[vec![1.0, 2.0]], 9, &mut s), None);
+    assert_eq!(of_blocks(&[vec![1.0]], 9, &mut s), None);
+    assert!(correlation_of_groups(&[vec![1.0], vec![1.0]]).is_nan());
+}
+
+/// Null: three groups of one distribution, blocks with a common part. Level 0.05: 2000 sets of 6 terrains a group, 99
+/// random arrangements. Bounds as in the tests of two groups: false alarm below 7e-7 on either side (binomial, p = 0.05).
+#[test]
+fn stat_level_of_the_trend_tests() {
+    let mut s = stream("level");
+    let mut found = [0; 2];
+    for _ in 0..2000 {
+        let groups: Vec<Vec<f64>> = (0..3).map(|_| (0..6).map(|_| s.normal()).collect()).collect();
+        let mut block = |_| {
+            let common = 3.0 * s.normal();
+            (0..3).map(|_| common + s.normal()).collect()
+        };
+        let blocks: Vec<Vec<f64>> = (0..6).map(&mut block).collect();
+        let tests = [of_groups(&groups, 99, &mut s), of_blocks(&blocks, 99, &mut s)];
+        found.iter_mut().zip(tests).for_each(|(n, t)| *n += usize::from(t.unwrap().p <= 0.05));
+    }
+    assert!(found.iter().all(|n| (57..=151).contains(n)), "{found:?} of 2000");
+}
