@@ -1,6 +1,7 @@
 //! The questions a report answers. Adding one is a folder and a line in [`ALL`].
 
 mod clusters;
+pub mod comparison;
 pub mod covariance;
 mod curves;
 pub mod failures;
@@ -32,13 +33,14 @@ pub struct Question {
 }
 
 /// All questions, in the order of the page.
-pub const ALL: [Question; 9] = [
+pub const ALL: [Question; 10] = [
     failures::QUESTION,
     terrain::QUESTION,
     covariance::QUESTION,
     texture::QUESTION,
     scoreboard::QUESTION,
     missions::QUESTION,
+    comparison::QUESTION,
     published::QUESTION,
     probability::QUESTION,
     sensitivity::QUESTION,

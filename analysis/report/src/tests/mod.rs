@@ -43,7 +43,9 @@ fn prop_a_full_report_is_sound() {
     let (files, summary) = report(&made_up::full(3, 48));
     assert_sound(&files);
     let page = &files["index.html"];
-    for section in ["terrain", "covariance", "texture", "missions", "published", "probability", "sensitivity"] {
+    for section in
+        ["terrain", "covariance", "texture", "missions", "comparison", "published", "probability", "sensitivity"]
+    {
         assert!(page.contains(&format!("<section id=\"{section}\">")), "{section}");
     }
     for figure in &summary.figures {
@@ -184,7 +186,9 @@ fn val_variants_stay_out_of_plain_comparisons() {
     data.missions.retain(|m| m.variant.is_none());
     data.terrains.retain(|t| t.variant.is_none());
     let without = report(&data).0;
-    for name in ["outcomes", "mission-medians", "class-shares", "survivors", "incidence-2.30", "published"] {
+    let compared = ["comparison", "comparison-trend", "comparison-model", "comparison-power"];
+    let others = ["outcomes", "mission-medians", "class-shares", "survivors", "incidence-2.30", "published"];
+    for name in compared.into_iter().chain(others) {
         assert_eq!(rows(&with, name), rows(&without, name), "{name}");
     }
     assert!(with.contains_key("data/sensitivity.json") && !without.contains_key("data/sensitivity.json"));
@@ -192,6 +196,39 @@ fn val_variants_stay_out_of_plain_comparisons() {
     let first = &rows(&with, "sensitivity")[0];
     assert_eq!((first[0].as_str(), first[2].as_i64()), (Some("z_scale_percent = 1.0"), Some(0)));
     assert_eq!(first[5].as_f64(), Some(-87.5));
+}
+
+/// Three terrains a group: 8 arrangements of signs where groups share draws, 20 of terrains where they do not. Missions, 24 a
+/// group, count for nothing.
+#[test]
+fn val_terrains_are_the_units_of_tests() {
+    let mut data = made_up::full(3, 24);
+    let paired = rows(&report(&data).0, "comparison");
+    data.missions.iter_mut().for_each(|m| m.pair_id = format!("{}-{}", m.terrain_id, m.mission_id));
+    let apart = rows(&report(&data).0, "comparison");
+    for (rows, of, arrangements) in [(paired, "3 blocks", 8.0), (apart, "3 + 3 terrains", 20.0)] {
+        assert_eq!(rows.len(), 5 * 3);
+        for row in rows {
+            let (p, adjusted) = (row[10].as_f64().unwrap(), row[11].as_f64().unwrap());
+            let steps = p * arrangements;
+            assert!(row[3] == of && (steps - steps.round()).abs() < 1e-9 && adjusted >= p, "{row:?}");
+            let [shift, low, high, delta] = [4, 5, 6, 7].map(|k| row[k].as_f64().unwrap());
+            assert!(low <= shift && shift <= high && delta.abs() <= 1.0, "{row:?}");
+        }
+    }
+}
+
+/// Without groups, and with one terrain a group, there is nothing to test.
+#[test]
+fn val_groups_without_terrains_are_not_compared() {
+    let mut data = made_up::full(2, 24);
+    data.missions.retain(|m| m.terrain_id.starts_with("d2.30"));
+    assert!(!report(&data).0["index.html"].contains("<section id=\"comparison\">"));
+    let mut data = made_up::full(1, 24);
+    data.missions.retain(|m| !m.terrain_id.starts_with("d2.60"));
+    let files = report(&data).0;
+    assert_sound(&files);
+    assert!(!files.contains_key("data/comparison-power.json"));
 }
 
 /// Figures by group and changes of the paper, each with a verdict that its own row bears out.

@@ -1,0 +1,105 @@
+//! Whether groups of missions differ, by tests whose unit is the terrain.
+
+mod model;
+mod planning;
+mod values;
+mod verdicts;
+
+use super::Question;
+use super::clusters::{LEVEL, Pairing, REPLICATES};
+use crate::ReportError;
+use crate::content::Block;
+use crate::data::{Data, Group};
+use crate::render::number as set;
+use sastrugi_schemas::tables::MissionRow;
+use sastrugi_statistics::normal;
+use std::collections::BTreeSet;
+use values::Figure;
+
+/// Registry entry.
+pub const QUESTION: Question =
+    Question { id: "comparison", name: "Comparison", title: "Do the groups differ?", answer };
+
+/// Level of the tests.
+const ALPHA: f64 = 0.05;
+/// Random arrangements of a test; where there are no more than these, all are looked at.
+const DRAWS: usize = 9999;
+/// Fewest of them: with very many terrains an arrangement takes long, and this many still tell 0.001.
+const DRAWS_MIN: usize = 999;
+/// Values that the arrangements of a test lay anew in all, beyond which there are fewer of them.
+const LAID_MAX: usize = 3_000_000;
+
+fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
+    let groups = data.mission_groups();
+    if groups.len() < 2 {
+        return Ok(Vec::new());
+    }
+    let pairing = Pairing::among(&groups);
+    let figures = values::figures(&groups, &pairing);
+    let verdicts = verdicts::verdicts(data, &figures);
+    if verdicts.iter().all(|v| v.test.is_none()) {
+        return Ok(vec![Block::Warning(
+            "Groups cannot be compared: there are too few terrains for a test. Missions are no substitute, because those on \
+             one terrain resemble each other."
+                .into(),
+        )]);
+    }
+    let mut blocks = vec![
+        Block::Text(verdicts::in_words(&verdicts)),
+        Block::Text(introduction(&pairing)),
+        Block::Text(refusal(&groups, &figures)),
+        Block::Figures(verdicts::drawing(&figures, &verdicts).into_iter().collect()),
+        Block::Table(verdicts::table_of_pairs(&verdicts)),
+        Block::Table(verdicts::table_of_trends(&verdicts)),
+    ];
+    blocks.extend(model::blocks(&groups, &pairing));
+    blocks.extend(planning::blocks(data, &figures, &pairing));
+    Ok(blocks)
+}
+
+/// Random arrangements of a test of so many values.
+fn draws(values: usize) -> usize {
+    (LAID_MAX / values.max(1)).clamp(DRAWS_MIN, DRAWS)
+}
+
+fn introduction(pairing: &Pairing) -> String {
+    let tests = if pairing.is_common() {
+        "Groups share their random draws, so terrains are compared within blocks: signed-rank tests of pairs, shifts and deltas \
+         of differences within blocks, and Page's trend; signs or labels are laid anew within blocks."
+    } else {
+        "Rank-sum tests of pairs, and the rank correlation with the order of the groups as trend; labels are laid anew over the \
+         terrains."
+    };
+    format!(
+        "Exploratory: no hypothesis was registered before the run. Every terrain counts once, by the mean of its missions (success: \
+         of all; other figures: of the successful ones). {tests} p is the share of up to {} random arrangements, or of all where they \
+         are fewer, that are as extreme. The shift is Hodges and Lehmann's, delta is Cliff's; {} % intervals draw terrains or \
+         blocks anew ({REPLICATES} samples, percentiles). Groups are equivalent, at {} %, within any margin above the one in \
+         the last column (two one-sided t tests of means); a margin is a claim only when it was set before.",
+        set::count(DRAWS + 1),
+        set::fixed(100.0 * LEVEL, 0),
+        set::fixed(100.0 * ALPHA, 0),
+    )
+}
+
+/// Why missions are not tested, with what that would do here.
+fn refusal(groups: &[Group<MissionRow>], figures: &[Figure]) -> String {
+    let missions: usize = groups.iter().map(|g| g.rows.len()).sum();
+    let terrains: usize =
+        groups.iter().map(|g| g.rows.iter().map(|m| &m.terrain_id).collect::<BTreeSet<_>>().len()).sum();
+    let per_terrain = missions as f64 / terrains as f64;
+    let words = "Tests that take missions for independent are not given: missions on one terrain resemble each other.";
+    let Some((between, within)) = planning::scatter(&figures[0]).filter(|s| s.0 > 0.0) else { return words.into() };
+    let share = between / (between + within);
+    let inflation = 1.0 + (per_terrain - 1.0) * share;
+    let level = 2.0 * normal::cdf(normal::quantile(0.5 * ALPHA) / inflation.sqrt());
+    format!(
+        "{words} Here {} of the variance of success within groups lies between terrains, so that {} missions a terrain tell as much \
+         as {} independent ones, and a test of missions at {} % would find differences that are not there in about {} of cases.",
+        set::percent(share, 0),
+        set::plain(per_terrain, 3),
+        set::plain(per_terrain / inflation, 2),
+        set::fixed(100.0 * ALPHA, 0),
+        set::percent(level, 0)
+    )
+}
