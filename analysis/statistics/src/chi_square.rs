@@ -1,7 +1,8 @@
-//! The chi-square distribution with whole degrees of freedom, from `libm` alone, so that its bits do not depend on the CPU.
+//! The chi-square distribution with whole degrees of freedom, from `libm` alone, so that its bits do not depend on the
+//! CPU.
 
-/// Probability above `x >= 0` with `freedom >= 1` degrees of freedom (M. Abramowitz and I. Stegun, 1964, 26.4.4 and 26.4.5, as the
-/// recurrence 26.4.8); NaN outside.
+/// Probability above `x >= 0` with `freedom >= 1` degrees of freedom (M. Abramowitz and I. Stegun, 1964, 26.4.4 and
+/// 26.4.5, as the recurrence 26.4.8); NaN outside.
 pub fn above(x: f64, freedom: usize) -> f64 {
     if !(x >= 0.0 && freedom > 0) {
         return f64::NAN;

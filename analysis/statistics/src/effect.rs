@@ -7,9 +7,10 @@
 //! paired delta   #(d_i > 0) - #(d_i < 0), / n
 //! ```
 //!
-//! The shift has the unit of the values; delta is a pure number, 1 when every `y` is above every `x`. They are the estimates that
-//! go with the rank-sum and the signed-rank test. Values are one per terrain, or differences one per block.
-//! Cost: `O(n log n)` for sorting, and some 20 passes (60 with many ties) to find the median of the pairs without listing them.
+//! The shift has the unit of the values; delta is a pure number, 1 when every `y` is above every `x`. They are the
+//! estimates that go with the rank-sum and the signed-rank test. Values are one per terrain, or differences one per
+//! block. Cost: `O(n log n)` for sorting, and some 20 passes (60 with many ties) to find the median of the pairs
+//! without listing them.
 
 use crate::bootstrap::{Interval, redraw};
 use sastrugi_numeric::Stream;
@@ -33,8 +34,8 @@ impl Effect {
         (first.len() > 1 && second.len() > 1).then(|| Self::from(of(first, second), &redrawn, level))?
     }
 
-    /// Of paired groups, from the differences (second less first) within blocks; intervals redraw blocks. `None` with fewer
-    /// than two blocks.
+    /// Of paired groups, from the differences (second less first) within blocks; intervals redraw blocks. `None` with
+    /// fewer than two blocks.
     pub fn of_pairs(differences: &[f64], replicates: usize, level: f64, stream: &mut Stream) -> Option<Self> {
         let of = |d: &[f64]| (paired_shift(d), paired_delta(d));
         let redrawn = redraw(&[differences.len()], replicates, stream, |drawn| of(&taken(differences, &drawn[0])));
@@ -99,7 +100,8 @@ fn sorted(values: &[f64]) -> Vec<f64> {
     sorted
 }
 
-/// Number of pairs with `second - first <= bound`, both ascending. Rounded differences keep their order, so one pass will do.
+/// Number of pairs with `second - first <= bound`, both ascending. Rounded differences keep their order, so one pass
+/// will do.
 fn at_most(first: &[f64], second: &[f64], bound: f64) -> usize {
     let mut reached = 0;
     let of_one = |x: &f64| {
@@ -125,8 +127,9 @@ fn neighbours(first: &[f64], second: &[f64], bound: f64) -> (f64, f64) {
     (below, above)
 }
 
-/// Median of `n` differences within `ends`. `at_most` counts those up to a bound. A bound that parts the lower half from the rest is
-/// found by bisection, down to neighbouring numbers where ties leave none; the differences beside it are the median.
+/// Median of `n` differences within `ends`. `at_most` counts those up to a bound. A bound that parts the lower half
+/// from the rest is found by bisection, down to neighbouring numbers where ties leave none; the differences beside it
+/// are the median.
 fn median(n: usize, ends: (f64, f64), at_most: impl Fn(f64) -> usize, neighbours: impl Fn(f64) -> (f64, f64)) -> f64 {
     let half = n.div_ceil(2);
     let (mut low, mut bound) = (ends.0.next_down(), ends.1);

@@ -1,9 +1,9 @@
 //! Equivalence of two groups: that they differ by less than a margin, claimed with a level (D. Schuirmann, Journal of
 //! Pharmacokinetics and Biopharmaceutics 15, 1987: two one-sided tests).
 //!
-//! Values are means over the missions of a terrain, or their differences within blocks of paired terrains. A test that finds no
-//! difference shows none to be absent; this one turns it round: the null hypothesis is a difference of at least the margin, either
-//! way. The margin is to be set before the data is seen.
+//! Values are means over the missions of a terrain, or their differences within blocks of paired terrains. A test that
+//! finds no difference shows none to be absent; this one turns it round: the null hypothesis is a difference of at
+//! least the margin, either way. The margin is to be set before the data is seen.
 //!
 //! ```text
 //! d = mean y - mean x,   s^2 = var x / n + var y / m        B. Welch, Biometrika 34, 1947, with F. Satterthwaite's degrees
@@ -11,8 +11,8 @@
 //! p = max of P(t > (margin + d) / s), P(t > (margin - d) / s)
 //! ```
 //!
-//! `p <= alpha` exactly where the interval of coverage `1 - 2 alpha` lies within the margins. Terrain means are near enough to
-//! normal for a mean of ten or more; below that the t distribution is an assumption.
+//! `p <= alpha` exactly where the interval of coverage `1 - 2 alpha` lies within the margins. Terrain means are near
+//! enough to normal for a mean of ten or more; below that the t distribution is an assumption.
 
 use crate::bootstrap::Interval;
 use crate::student;
@@ -60,8 +60,8 @@ impl MeanDifference {
         beyond(margin + self.estimate).max(beyond(margin - self.estimate))
     }
 
-    /// The smallest margin within which the groups are equivalent at level `alpha`: the farther end of the interval of coverage
-    /// `1 - 2 alpha`.
+    /// The smallest margin within which the groups are equivalent at level `alpha`: the farther end of the interval of
+    /// coverage `1 - 2 alpha`.
     pub fn smallest_margin(&self, alpha: f64) -> f64 {
         let i = self.interval(1.0 - 2.0 * alpha);
         i.low.abs().max(i.high.abs())
@@ -72,7 +72,8 @@ impl MeanDifference {
     }
 }
 
-/// Equivalence by inclusion: true when an interval (of coverage `1 - 2 alpha` for a claim at level alpha) lies within the margins.
+/// Equivalence by inclusion: true when an interval (of coverage `1 - 2 alpha` for a claim at level alpha) lies within
+/// the margins.
 pub fn within(interval: &Interval, margin: f64) -> bool {
     -margin < interval.low && interval.high < margin
 }

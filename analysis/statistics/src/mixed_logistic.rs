@@ -1,33 +1,35 @@
 //! Logistic model of success with a random intercept of the terrain.
 //!
-//! Missions on one terrain share what the terrain is like. With `x` the covariates of a mission, `b` their coefficients (natural
-//! logarithms of odds), `s >= 0` the standard deviation between terrains on the same scale, and one `u` for each terrain,
+//! Missions on one terrain share what the terrain is like. With `x` the covariates of a mission, `b` their coefficients
+//! (natural logarithms of odds), `s >= 0` the standard deviation between terrains on the same scale, and one `u` for
+//! each terrain,
 //!
 //! ```text
 //! P(success | u) = 1 / (1 + exp(-(x b + s u))),   u normal with mean 0 and variance 1
 //! L(b, s) = product over terrains of  integral over u of  phi(u)  product over missions of  p^y (1 - p)^(1 - y)
 //! ```
 //!
-//! (R. Stiratelli, N. Laird and J. Ware, Biometrics 40, 1984; A. Agresti, Categorical Data Analysis, 2013, section 13.1.)
-//! Estimates maximise `L`. The coefficients compare missions on terrains of equal `u`; on the average over terrains the odds
-//! differ less.
+//! (R. Stiratelli, N. Laird and J. Ware, Biometrics 40, 1984; A. Agresti, Categorical Data Analysis, 2013, section
+//! 13.1.) Estimates maximise `L`. The coefficients compare missions on terrains of equal `u`; on the average over
+//! terrains the odds differ less.
 //!
-//! The integral is taken about the mode of its integrand, as adaptive Gauss-Hermite quadrature does (J. Pinheiro and D. Bates,
-//! Journal of Computational and Graphical Statistics 4, 1995), by the trapezoidal rule, which for such functions converges
-//! geometrically as well (L. Trefethen and J. Weideman, SIAM Review 56, 2014) and needs no nodes: steps of half the width of the
-//! mode, or half the distance to the logistic function's poles where that is less, out to where the integrand has fallen by
-//! exp(-36). It is then exact to about twelve digits. Newton's method uses the exact information, by T. Louis's formula (Journal of
-//! the Royal Statistical Society B 44, 1982):
+//! The integral is taken about the mode of its integrand, as adaptive Gauss-Hermite quadrature does (J. Pinheiro and D.
+//! Bates, Journal of Computational and Graphical Statistics 4, 1995), by the trapezoidal rule, which for such functions
+//! converges geometrically as well (L. Trefethen and J. Weideman, SIAM Review 56, 2014) and needs no nodes: steps of
+//! half the width of the mode, or half the distance to the logistic function's poles where that is less, out to where
+//! the integrand has fallen by exp(-36). It is then exact to about twelve digits. Newton's method uses the exact
+//! information, by T. Louis's formula (Journal of the Royal Statistical Society B 44, 1982):
 //!
 //! ```text
 //! score       = sum over terrains of E[z],   z = derivative of the joint log density, E over u given the outcomes
 //! information = sum over terrains of E[-dz] - Var[z]
 //! ```
 //!
-//! Standard errors are those of the inverse information, intervals Wald's; tests compare likelihoods (chi-square, S. Wilks, 1938).
-//! Both are for many terrains: with fewer than about ten a group they are too sure of themselves. Terrains that share their random draws
-//! are taken as independent, which makes the errors of differences too large rather than too small.
-//! Cost: some 50 evaluations per mission row and step, about ten steps; memory proportional to the rows.
+//! Standard errors are those of the inverse information, intervals Wald's; tests compare likelihoods (chi-square, S.
+//! Wilks, 1938). Both are for many terrains: with fewer than about ten a group they are too sure of themselves.
+//! Terrains that share their random draws are taken as independent, which makes the errors of differences too large
+//! rather than too small. Cost: some 50 evaluations per mission row and step, about ten steps; memory proportional to
+//! the rows.
 
 use crate::chi_square;
 
@@ -71,8 +73,9 @@ pub struct Fit {
 }
 
 impl Fit {
-    /// The model of terrains with their missions. `None` when rows have other numbers of covariates than the first, when there is
-    /// no mission, or when no finite estimate exists: covariates that determine each other or the outcome.
+    /// The model of terrains with their missions. `None` when rows have other numbers of covariates than the first,
+    /// when there is no mission, or when no finite estimate exists: covariates that determine each other or the
+    /// outcome.
     pub fn of(terrains: &[Vec<Missions>]) -> Option<Self> {
         let covariates = terrains.iter().flatten().next()?.covariates.len();
         let usable = |m: &Missions| m.covariates.len() == covariates && m.trials > 0.0;
@@ -179,7 +182,8 @@ impl Likelihood {
         }
     }
 
-    /// Newton's step and twice the gain it promises; where the information is not positive definite it is raised until it is.
+    /// Newton's step and twice the gain it promises; where the information is not positive definite it is raised until
+    /// it is.
     fn step(&self) -> Option<(Vec<f64>, f64)> {
         let scale = (0..self.score.len()).map(|k| self.information[k][k].abs()).fold(1e-3, f64::max);
         let raised = |ridge: f64| {
@@ -211,7 +215,8 @@ struct Point {
     width: f64,
 }
 
-/// The integrand on even steps about its mode. Its logarithm bends by at least that of the normal density, so the points are few.
+/// The integrand on even steps about its mode. Its logarithm bends by at least that of the normal density, so the
+/// points are few.
 fn points(terrain: &[Missions], fixed: &[f64], deviation: f64) -> Vec<Point> {
     let (mode, bend) = mode(terrain, fixed, deviation);
     let width = 0.5 * (1.0 / bend.sqrt()).min(1.0 / deviation.abs().max(1.0));

@@ -1,23 +1,25 @@
-//! Permutation tests of terrains: labels of groups are laid anew over the values, and what was found is compared with what such
-//! labels give.
+//! Permutation tests of terrains: labels of groups are laid anew over the values, and what was found is compared with
+//! what such labels give.
 //!
-//! The unit is what was drawn independently: a terrain, with one number for all its missions. Where groups share their random
-//! draws (common pairing) labels move within a block of paired terrains only. Under the null hypothesis that labels do not
-//! matter every arrangement is as likely as the observed one, whatever the distribution of the values (R. Fisher, The Design
-//! of Experiments, 1935; E. Pitman, 1937). Let `t` be a statistic that is large when the groups differ:
+//! The unit is what was drawn independently: a terrain, with one number for all its missions. Where groups share their
+//! random draws (common pairing) labels move within a block of paired terrains only. Under the null hypothesis that
+//! labels do not matter every arrangement is as likely as the observed one, whatever the distribution of the values (R.
+//! Fisher, The Design of Experiments, 1935; E. Pitman, 1937). Let `t` be a statistic that is large when the groups
+//! differ:
 //!
 //! ```text
 //! p = #{arrangements with t >= t observed} / #{arrangements}      all arrangements, where they are not more than the draws
 //! p = (b + 1) / (m + 1)                                           b of m random arrangements with t >= t observed
 //! ```
 //!
-//! The second form (A. Davison and D. Hinkley, 1997, equation 4.11) counts the observed arrangement as one of them, so that the
-//! test keeps its level with any number of draws. Cost: one evaluation of the statistic per arrangement.
+//! The second form (A. Davison and D. Hinkley, 1997, equation 4.11) counts the observed arrangement as one of them, so
+//! that the test keeps its level with any number of draws. Cost: one evaluation of the statistic per arrangement.
 
 use crate::correlation::ranks;
 use sastrugi_numeric::{Stream, sums};
 
-/// Relative difference below which a statistic counts as equal to the observed one: sums in another order round otherwise.
+/// Relative difference below which a statistic counts as equal to the observed one: sums in another order round
+/// otherwise.
 const EQUAL: f64 = 1e-10;
 
 /// Result of a permutation test.
@@ -33,9 +35,9 @@ pub struct Permutation {
     pub exact: bool,
 }
 
-/// The test of any statistic of labels that move within blocks. `blocks` are the lengths of consecutive runs of `labels`.
-/// `None` when the statistic of the data is not finite, when there is a single arrangement, or when the blocks are not as long
-/// as the labels.
+/// The test of any statistic of labels that move within blocks. `blocks` are the lengths of consecutive runs of
+/// `labels`. `None` when the statistic of the data is not finite, when there is a single arrangement, or when the
+/// blocks are not as long as the labels.
 pub fn within_blocks(
     labels: &[usize],
     blocks: &[usize],
@@ -103,16 +105,16 @@ pub fn paired(
     })
 }
 
-/// Two-sided rank-sum test (F. Wilcoxon, 1945; H. Mann and D. Whitney, 1947), ties sharing their mean rank. The statistic is the
-/// distance of the rank sum of the second group from its expectation.
+/// Two-sided rank-sum test (F. Wilcoxon, 1945; H. Mann and D. Whitney, 1947), ties sharing their mean rank. The
+/// statistic is the distance of the rank sum of the second group from its expectation.
 pub fn rank_sum(first: &[f64], second: &[f64], draws: usize, stream: &mut Stream) -> Option<Permutation> {
     let scores = centred_ranks(&[first, second].concat());
     let labels = labels_of(&[first.len(), second.len()]);
     within_blocks(&labels, &[scores.len()], draws, stream, |labels| linear(labels, &scores).abs())
 }
 
-/// Two-sided signed-rank test (F. Wilcoxon, 1945), ties of the magnitudes sharing their mean rank, zeros ranked and without a
-/// sign (J. Pratt, 1959). The statistic is the magnitude of the sum of signed ranks.
+/// Two-sided signed-rank test (F. Wilcoxon, 1945), ties of the magnitudes sharing their mean rank, zeros ranked and
+/// without a sign (J. Pratt, 1959). The statistic is the magnitude of the sum of signed ranks.
 pub fn signed_rank(differences: &[f64], draws: usize, stream: &mut Stream) -> Option<Permutation> {
     paired(&signed_ranks(differences), draws, stream, |d| sums::sum(d).abs())
 }
@@ -179,8 +181,8 @@ fn advance(labels: &mut [usize], blocks: &[usize]) -> bool {
     each_block(labels, blocks).any(next_in_order)
 }
 
-/// The next arrangement in the order of words (E. Dijkstra, A Discipline of Programming, 1976); false, and the first one, after the
-/// last.
+/// The next arrangement in the order of words (E. Dijkstra, A Discipline of Programming, 1976); false, and the first
+/// one, after the last.
 fn next_in_order(labels: &mut [usize]) -> bool {
     let Some(pivot) = (1..labels.len()).rev().find(|&k| labels[k - 1] < labels[k]) else {
         labels.reverse();

@@ -1,10 +1,10 @@
 //! Power of the terrain-level tests, by simulation: how many terrains and missions the next study needs.
 //!
-//! The mean over `m` missions of a terrain scatters with variance `between + within / m` ([`crate::components`] estimates both).
-//! More missions shrink the second part only, so that beyond some number only more terrains help. Terrain means are drawn as
-//! normal with that variance and the stated difference; each set is tested as the report tests (rank sum or signed rank against
-//! random arrangements, [`crate::permutation`]). The power is the share of sets with `p <= alpha`; its standard
-//! error is at most 1.6 %. Shares near 0 or 1 are less normal than this.
+//! The mean over `m` missions of a terrain scatters with variance `between + within / m` ([`crate::components`]
+//! estimates both). More missions shrink the second part only, so that beyond some number only more terrains help.
+//! Terrain means are drawn as normal with that variance and the stated difference; each set is tested as the report
+//! tests (rank sum or signed rank against random arrangements, [`crate::permutation`]). The power is the share of sets
+//! with `p <= alpha`; its standard error is at most 1.6 %. Shares near 0 or 1 are less normal than this.
 //!
 //! One set of random arrangements serves all simulations of a cell, which leaves the level of each test as it is.
 //! Cost: simulations x arrangements x terrains.

@@ -31,8 +31,8 @@ pub fn quantile(p: f64, freedom: f64) -> f64 {
     if p < 0.5 { -high } else { high }
 }
 
-/// Regularised incomplete beta function I_x(a, b) by its continued fraction (NIST Digital Library of Mathematical Functions,
-/// 8.17.22), evaluated by W. Lentz's method (1976); the symmetry 8.17.4 takes it to where it converges fast.
+/// Regularised incomplete beta function I_x(a, b) by its continued fraction (NIST Digital Library of Mathematical
+/// Functions, 8.17.22), evaluated by W. Lentz's method (1976); the symmetry 8.17.4 takes it to where it converges fast.
 pub(crate) fn incomplete_beta(a: f64, b: f64, x: f64) -> f64 {
     if !(a > 0.0 && b > 0.0 && (0.0..=1.0).contains(&x)) {
         return f64::NAN;

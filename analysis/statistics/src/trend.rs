@@ -6,10 +6,11 @@
 //! T = sum over terrains of (number of the group) (rank - mean rank)
 //! ```
 //!
-//! with ranks among all terrains (then `T` is, but for a factor, Spearman's correlation of group and value; P. Armitage, 1955,
-//! for ordered groups), or among the terrains of a block where groups share their random draws (then `T` is the statistic `L`
-//! of E. Page, Journal of the American Statistical Association 58, 1963, less its expectation). Both tests are two-sided, and by
-//! permutation: see [`crate::permutation`]. With two groups the first is the rank-sum test. Cost: one pass per arrangement.
+//! with ranks among all terrains (then `T` is, but for a factor, Spearman's correlation of group and value; P.
+//! Armitage, 1955, for ordered groups), or among the terrains of a block where groups share their random draws (then
+//! `T` is the statistic `L` of E. Page, Journal of the American Statistical Association 58, 1963, less its
+//! expectation). Both tests are two-sided, and by permutation: see [`crate::permutation`]. With two groups the first is
+//! the rank-sum test. Cost: one pass per arrangement.
 
 use crate::correlation::{pearson, spearman};
 use crate::permutation::{Permutation, centred_ranks, labels_of, linear, within_blocks};

@@ -60,10 +60,10 @@ proptest! {
     }
 }
 
-/// Null: intervals of 95 % hold the truth. 400 sets of 20 terrains a group, values normal, true shift 1; its delta is P(y > x) - P(y <
-/// x) = erf(1/2) = 0.5205. 400 redraws. The percentile bootstrap over 20 terrains covers 93 to 95 %: fewer than 347 hits
-/// of 400 (86.8 %) has a false-alarm probability of 3e-6 (binomial, p = 0.93). For pairs the truth is 1 / sqrt 2 in
-/// units of the scatter of differences, so delta is erf(1/2) as well.
+/// Null: intervals of 95 % hold the truth. 400 sets of 20 terrains a group, values normal, true shift 1; its delta is
+/// P(y > x) - P(y < x) = erf(1/2) = 0.5205. 400 redraws. The percentile bootstrap over 20 terrains covers 93 to 95 %:
+/// fewer than 347 hits of 400 (86.8 %) has a false-alarm probability of 3e-6 (binomial, p = 0.93). For pairs the truth
+/// is 1 / sqrt 2 in units of the scatter of differences, so delta is erf(1/2) as well.
 #[test]
 fn stat_coverage() {
     let mut s = stream("coverage");

@@ -43,9 +43,9 @@ fn val_degenerate_samples() {
     assert!(MeanDifference::between(&[1.0, 2.0], &[3.0, 3.0]).is_some());
 }
 
-/// Null: the true difference is the margin itself, 1. Level 0.05: equivalence is claimed in 5 % of 4000 sets of 10 + 10 (and 10
-/// pairs of) normal terrain means with deviations 0.3 and 0.6. More than 272 of 4000 has a false-alarm probability of 3e-7 (binomial,
-/// p = 0.05), fewer than 134 one of 2e-7: levels of 8 % and 2.5 % would be noticed.
+/// Null: the true difference is the margin itself, 1. Level 0.05: equivalence is claimed in 5 % of 4000 sets of 10 + 10
+/// (and 10 pairs of) normal terrain means with deviations 0.3 and 0.6. More than 272 of 4000 has a false-alarm
+/// probability of 3e-7 (binomial, p = 0.05), fewer than 134 one of 2e-7: levels of 8 % and 2.5 % would be noticed.
 #[test]
 fn stat_level_at_the_margin() {
     let mut s = Streams::for_seed(1, "equivalence-test").stream("level");

@@ -22,8 +22,9 @@ fn dummies(g: usize) -> Vec<f64> {
     vec![1.0, f64::from(u8::from(g == 1)), f64::from(u8::from(g == 2))]
 }
 
-/// scipy 1.17.1: the likelihood by scipy.integrate.quad, its maximum by scipy.optimize.minimize (BFGS, then Nelder-Mead), errors from
-/// its differences (`tests/statistical/nested_tests.py`). Likelihoods agree to 1e-9, estimates to 1e-6, errors to 1e-4.
+/// scipy 1.17.1: the likelihood by scipy.integrate.quad, its maximum by scipy.optimize.minimize (BFGS, then
+/// Nelder-Mead), errors from its differences (`tests/statistical/nested_tests.py`). Likelihoods agree to 1e-9,
+/// estimates to 1e-6, errors to 1e-4.
 #[test]
 fn val_of_scipy() {
     let check = |fit: &Fit, estimates: &[f64], errors: &[f64], log_likelihood: f64| {
@@ -71,8 +72,8 @@ fn prop_rows_may_be_split() {
     assert!((a.coefficients[2] - b.coefficients[2]).abs() < 1e-7 && (a.deviation - b.deviation).abs() < 1e-7);
 }
 
-/// Terrains all alike have no deviation: the estimates are those of the plain model, log odds of the pooled shares, with errors
-/// from the counts.
+/// Terrains all alike have no deviation: the estimates are those of the plain model, log odds of the pooled shares,
+/// with errors from the counts.
 #[test]
 fn val_without_scatter_of_terrains() {
     let of = |g: usize, y: f64| vec![Missions { covariates: vec![1.0, g as f64], successes: y, trials: 20.0 }];
@@ -114,8 +115,8 @@ fn without_group(data: &[Vec<Missions>]) -> Vec<Vec<Missions>> {
     data.iter().map(|t| t.iter().map(|m| Missions { covariates: vec![1.0], ..m.clone() }).collect()).collect()
 }
 
-/// How often, in so many data sets of 20 + 20 terrains with deviation 1, the likelihood ratio test at 0.05 finds a difference where
-/// there is none, and the interval of 95 % holds a difference of 1; and the estimates of that.
+/// How often, in so many data sets of 20 + 20 terrains with deviation 1, the likelihood ratio test at 0.05 finds a
+/// difference where there is none, and the interval of 95 % holds a difference of 1; and the estimates of that.
 fn found_and_held(sets: usize) -> (usize, usize, Vec<f64>) {
     let mut s = Streams::for_seed(1, "mixed-logistic-test").stream("level");
     let (mut found, mut held, mut estimates) = (0, 0, Vec::new());
@@ -130,9 +131,10 @@ fn found_and_held(sets: usize) -> (usize, usize, Vec<f64>) {
     (found, held, estimates)
 }
 
-/// Null: no difference between groups. The test finds one in 5 to 7 % of 300 sets (it is too sure of itself with few terrains): more
-/// than 45 has a false-alarm probability of 5e-7 (binomial, p = 0.07), fewer than 2 one of 3e-6 (p = 0.05). The interval covers 93 to
-/// 95 %: fewer than 256 of 300 has 1e-6 (p = 0.93). A test that pools the missions finds a difference in 21 % of the sets.
+/// Null: no difference between groups. The test finds one in 5 to 7 % of 300 sets (it is too sure of itself with few
+/// terrains): more than 45 has a false-alarm probability of 5e-7 (binomial, p = 0.07), fewer than 2 one of 3e-6 (p =
+/// 0.05). The interval covers 93 to 95 %: fewer than 256 of 300 has 1e-6 (p = 0.93). A test that pools the missions
+/// finds a difference in 21 % of the sets.
 #[test]
 fn stat_level_and_coverage() {
     let (found, held, _) = found_and_held(300);
@@ -140,8 +142,9 @@ fn stat_level_and_coverage() {
     assert!((256..=299).contains(&held), "{held} of 300");
 }
 
-/// The same in 1000 sets: more than 115 has a false-alarm probability of 1e-7, fewer than 22 one of 2e-6, fewer than 884 of the
-/// intervals 5e-8. The mean of the estimates lies within 5 standard errors (6e-7) of the truth, give or take a bias of 2 %.
+/// The same in 1000 sets: more than 115 has a false-alarm probability of 1e-7, fewer than 22 one of 2e-6, fewer than
+/// 884 of the intervals 5e-8. The mean of the estimates lies within 5 standard errors (6e-7) of the truth, give or take
+/// a bias of 2 %.
 #[test]
 #[ignore = "slow: ./test --full"]
 fn stat_level_and_coverage_of_many_sets() {

@@ -51,7 +51,8 @@ fn stat_random_arrangements_estimate_the_exact_p() {
     assert!((all.p - some.p).abs() < 5.0 * error, "{} {}", all.p, some.p);
 }
 
-/// Every arrangement within blocks comes once: a set of all that the odometer shows, against the product of multinomials.
+/// Every arrangement within blocks comes once: a set of all that the odometer shows, against the product of
+/// multinomials.
 #[test]
 fn val_arrangements_are_all_and_once() {
     for (labels, blocks, n) in
@@ -99,10 +100,10 @@ fn terrain_means(terrains: usize, s: &mut Stream) -> Vec<f64> {
     (0..terrains).map(|_| s.normal() + s.normal() / 20f64.sqrt()).collect()
 }
 
-/// Null: both groups have one distribution, so a test at level 0.05 finds a difference in at most 5 % of data sets. 2000 sets of
-/// 10 + 10 terrains (10 pairs), 99 random arrangements. More than 151 of 2000 has a false-alarm probability of 4e-7
-/// (binomial, p = 0.05), fewer than 57 one of 7e-7: a level of 8.5 % or 2.5 % would be noticed. A test that
-/// took the missions as independent finds one in 55 % of the sets.
+/// Null: both groups have one distribution, so a test at level 0.05 finds a difference in at most 5 % of data sets.
+/// 2000 sets of 10 + 10 terrains (10 pairs), 99 random arrangements. More than 151 of 2000 has a false-alarm
+/// probability of 4e-7 (binomial, p = 0.05), fewer than 57 one of 7e-7: a level of 8.5 % or 2.5 % would be noticed. A
+/// test that took the missions as independent finds one in 55 % of the sets.
 #[test]
 fn stat_level_of_the_two_group_tests() {
     let mut s = stream("level");

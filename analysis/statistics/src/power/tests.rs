@@ -5,9 +5,10 @@ fn stream(purpose: &str) -> Stream {
     Streams::for_seed(1, "power-test").stream(purpose)
 }
 
-/// statsmodels 0.15.0 (`tests/statistical/nested_tests.py`): TTestIndPower and TTestPower for the standardised difference of terrain
-/// means. The rank tests are 95.5 % as efficient for normal values (J. Hodges and E. Lehmann, 1956), which costs at most 3 points of
-/// power, and 199 arrangements another; the simulation's 5 standard errors are 8 points (false alarm 6e-7 each).
+/// statsmodels 0.15.0 (`tests/statistical/nested_tests.py`): TTestIndPower and TTestPower for the standardised
+/// difference of terrain means. The rank tests are 95.5 % as efficient for normal values (J. Hodges and E. Lehmann,
+/// 1956), which costs at most 3 points of power, and 199 arrangements another; the simulation's 5 standard errors are 8
+/// points (false alarm 6e-7 each).
 #[test]
 fn stat_power_is_that_of_the_t_test() {
     let mut s = stream("t-test");
@@ -25,8 +26,8 @@ fn stat_power_is_that_of_the_t_test() {
     }
 }
 
-/// Null: no difference, so the power is the level. 4 cells of 1000 simulations: 22 to 89 of 1000 at 0.05, false alarm 2e-6 and
-/// 1e-7 (binomial) each.
+/// Null: no difference, so the power is the level. 4 cells of 1000 simulations: 22 to 89 of 1000 at 0.05, false alarm
+/// 2e-6 and 1e-7 (binomial) each.
 #[test]
 fn stat_power_without_a_difference_is_the_level() {
     let mut s = stream("level");

@@ -29,8 +29,9 @@ fn val_groups_of_scipy() {
     assert!((correlation_of_groups(&groups()) + 0.750_317_945_991_113_3).abs() < 1e-12);
 }
 
-/// scipy.stats.page_trend_test of scipy 1.17.1, method "exact", of the values with their sign turned: L = 67, one-sided p =
-/// 0.018132716049382717. L's expectation is 5 x 3 x 4^2 / 4 = 60; by symmetry the two-sided p is twice the one-sided. Tolerance 1e-12.
+/// scipy.stats.page_trend_test of scipy 1.17.1, method "exact", of the values with their sign turned: L = 67, one-sided
+/// p = 0.018132716049382717. L's expectation is 5 x 3 x 4^2 / 4 = 60; by symmetry the two-sided p is twice the
+/// one-sided. Tolerance 1e-12.
 #[test]
 fn val_blocks_of_scipy() {
     let test = of_blocks(&blocks(), 10_000, &mut stream("blocks")).unwrap();
@@ -59,7 +60,8 @@ fn val_degenerate_samples() {
 }
 
 /// Null: three groups of one distribution, blocks with a common part. Level 0.05: 2000 sets of 6 terrains a group, 99
-/// random arrangements. Bounds as in the tests of two groups: false alarm below 7e-7 on either side (binomial, p = 0.05).
+/// random arrangements. Bounds as in the tests of two groups: false alarm below 7e-7 on either side (binomial, p =
+/// 0.05).
 #[test]
 fn stat_level_of_the_trend_tests() {
     let mut s = stream("level");

@@ -71,11 +71,11 @@ fn introduction(pairing: &Pairing) -> String {
          terrains."
     };
     format!(
-        "Exploratory: no hypothesis was registered before the run. Every terrain counts once, by the mean of its missions (success: \
-         of all; other figures: of the successful ones). {tests} p is the share of up to {} random arrangements, or of all where they \
-         are fewer, that are as extreme. The shift is Hodges and Lehmann's, delta is Cliff's; {} % intervals draw terrains or \
-         blocks anew ({REPLICATES} samples, percentiles). Groups are equivalent, at {} %, within any margin above the one in \
-         the last column (two one-sided t tests of means); a margin is a claim only when it was set before.",
+        "Exploratory: no hypothesis was registered before the run. Every terrain counts once, by the mean of its missions \
+         (success: of all; other figures: of the successful ones). {tests} p is the share of up to {} random arrangements, \
+         or of all where they are fewer, that are as extreme. The shift is Hodges and Lehmann's, delta is Cliff's; \
+         {} % intervals draw terrains or blocks anew ({REPLICATES} samples, percentiles). Groups are equivalent, at {} %, \
+         within any margin above the one in the last column (two one-sided t tests of means); a margin is a claim only when it was set before.",
         set::count(DRAWS + 1),
         set::fixed(100.0 * LEVEL, 0),
         set::fixed(100.0 * ALPHA, 0),
@@ -94,8 +94,9 @@ fn refusal(groups: &[Group<MissionRow>], figures: &[Figure]) -> String {
     let inflation = 1.0 + (per_terrain - 1.0) * share;
     let level = 2.0 * normal::cdf(normal::quantile(0.5 * ALPHA) / inflation.sqrt());
     format!(
-        "{words} Here {} of the variance of success within groups lies between terrains, so that {} missions a terrain tell as much \
-         as {} independent ones, and a test of missions at {} % would find differences that are not there in about {} of cases.",
+        "{words} Here {} of the variance of success within groups lies between terrains, so that {} missions a terrain tell \
+         as much as {} independent ones, and a test of missions at {} % would find differences that are \
+         not there in about {} of cases.",
         set::percent(share, 0),
         set::plain(per_terrain, 3),
         set::plain(per_terrain / inflation, 2),
