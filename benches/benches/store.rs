@@ -4,6 +4,7 @@
 use divan::Bencher;
 use divan::counter::BytesCount;
 use sastrugi_numeric::{Geometry, Grid, Stream, Streams, Surface};
+use sastrugi_schemas::study::McapFlavour;
 use sastrugi_schemas::tables::SampleRow;
 use sastrugi_schemas::topics::{
     CommandSample, ImuSample, Recording, StateSample, VehicleOutline, WheelOutline, WheelSample, WheelState,
@@ -114,6 +115,7 @@ fn with_mission<T>(f: impl FnOnce(&MissionMcap) -> T) -> T {
     let metadata = BTreeMap::new();
     let terrain = TerrainView::new(&dem, Some(&classes)).expect("classes on the same cells");
     f(&MissionMcap {
+        flavour: McapFlavour::Viewer,
         recording: &recording,
         terrain: &terrain,
         start_m: [5.0, 25.0],

@@ -66,6 +66,8 @@ pub enum McapFlavour {
     /// Foxglove protobuf, for viewers.
     #[default]
     Viewer,
+    /// ROS 2: CDR, one bag per mission.
+    Ros2,
 }
 
 /// Whether terrains of different groups share their random draws.

@@ -34,6 +34,18 @@ fn val_readers_agree_with_a_release() {
     }
 }
 
+/// Bags of ROS 2 as rosbags and mcap-ros2-support read them, and `analyze`: the same missions as in the viewer flavour.
+#[test]
+fn val_ros_reads_the_bags() {
+    let Some(python) = python() else { return };
+    let folder = area();
+    write(folder.path(), "study.toml", &small_study().replace("seed = 7\n", "seed = 7\nmcap = \"ros2\"\n"));
+    let call = sastrugi_in(folder.path(), &["run", "study.toml", "-o", "release", "--quiet"]);
+    assert_eq!(call.code, 0, "{}", call.stderr);
+    let call = check(&python, "check_ros2.py", &[&folder.path().join("release")]);
+    assert_eq!(call.code, 0, "{}{}", call.stdout, call.stderr);
+}
+
 /// The small study with all that a release can say of itself: version and DOI, terms of its data, a split.
 fn described_study() -> String {
     let head = "seed = 7\ntitle = \"Small: \\\"rough\\\" & smooth\"\nversion = \"1.0.0\"\ndoi = \"10.5281/zenodo.1234567\"\n\

@@ -1,6 +1,6 @@
 //! MCAP topics of a release and the recording of a mission that fills them.
 //!
-//! Viewer flavour: Foxglove's public protobuf messages where there is one, own protobuf messages (package `sastrugi`)
+//! ROS 2 flavour: see [`ros2`]. Viewer flavour: Foxglove's public protobuf messages where there is one, own protobuf messages (package `sastrugi`)
 //! for the rest. Each own message starts with field 1, `timestamp` (google.protobuf.Timestamp); the listed fields
 //! follow as numbers 2, 3 ... A field is appended, never renumbered, renamed or removed.
 
@@ -8,6 +8,7 @@ pub mod command;
 pub mod events;
 pub mod imu;
 pub mod recording;
+pub mod ros2;
 pub mod state;
 pub mod terrain_grid;
 pub mod terrain_mesh;

@@ -162,6 +162,12 @@ pub enum EventKind {
 }
 
 impl EventKind {
+    /// The ends of missions by name; `None` for other words.
+    pub fn outcome(name: &str) -> Option<Self> {
+        let ends = [Self::Success, Self::Tipped, Self::Stuck, Self::OutOfBounds, Self::Timeout];
+        ends.into_iter().find(|end| end.name() == name)
+    }
+
     /// Name in tables.
     pub fn name(self) -> &'static str {
         match self {

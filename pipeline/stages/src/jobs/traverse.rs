@@ -17,11 +17,11 @@ use sastrugi_mobility::vehicle::{
 };
 use sastrugi_numeric::{Grid, Streams};
 use sastrugi_schemas::kind::{read_parameters, schema_of};
-use sastrugi_schemas::study::{StudyHead, TraverseItem};
+use sastrugi_schemas::study::{McapFlavour, StudyHead, TraverseItem};
 use sastrugi_schemas::tables::{MissionRow, ParameterRow, ReplicateRow, SampleRow};
 use sastrugi_schemas::topics::{EventKind, Recording};
 use sastrugi_schemas::{Kind, ParameterError};
-use sastrugi_store::mcap::{MissionMcap, TerrainView, write_mission};
+use sastrugi_store::mcap::{MissionMcap, TerrainView, bag_metadata, write_mission};
 use sastrugi_store::parquet::{TableMetadata, TableWriter};
 use sastrugi_store::{dem, digest};
 use serde_json::{Map, Value, json};
@@ -186,12 +186,9 @@ fn add_one(
     builder.node(entry, Node { item, parents, inputs: Vec::new(), stream, job: Box::new(job) })
 }
 
-/// One mission driven: its rows and the content hash of its recording, which is on disk.
+/// One mission driven: its rows, and its recording, which is on disk.
 struct Driven {
-    file: String,
-    release_path: String,
-    content: String,
-    messages: u64,
+    products: Vec<Product>,
     row: MissionRow,
     /// One per start, where there are several.
     replicates: Vec<ReplicateRow>,
@@ -251,7 +248,10 @@ impl TraverseJob {
     ) -> Result<Driven, JobError> {
         let id = format!("{}-{:04}", self.drive.id, mission.index + 1);
         let fail = |e: &dyn std::fmt::Display| JobError::new(format!("{id}: {e}"));
-        let release_path = format!("mcap/{}/{id}.mcap", self.terrain);
+        let release_path = match self.drive.head.mcap {
+            McapFlavour::Viewer => format!("mcap/{}/{id}.mcap", self.terrain),
+            McapFlavour::Ros2 => format!("mcap/{}/{id}/{id}.mcap", self.terrain),
+        };
         let labels = MissionLabels {
             terrain_id: self.terrain.clone(),
             group: self.group.clone(),
@@ -274,6 +274,7 @@ impl TraverseJob {
         samples.iter_mut().for_each(|s| s.mission_id.clone_from(&id));
         let metadata = self.metadata(&row, &site.heights_sha256);
         let mcap = MissionMcap {
+            flavour: self.drive.head.mcap,
             recording: &recording,
             terrain: view,
             start_m: mission.start_m,
@@ -283,8 +284,15 @@ impl TraverseJob {
         };
         let file = format!("{id}.mcap");
         let summary = write_mission(&work.output(&file), &mcap).map_err(|e| fail(&e))?;
-        let (content, messages) = (summary.content_sha256, summary.messages);
-        Ok(Driven { file, release_path, content, messages, row, replicates, samples })
+        let mut products = Vec::new();
+        if self.drive.head.mcap == McapFlavour::Ros2 {
+            let (bag, place) = (format!("{id}.metadata.yaml"), format!("mcap/{}/{id}/metadata.yaml", self.terrain));
+            std::fs::write(work.output(&bag), bag_metadata(&file, &summary)).map_err(|e| fail(&e))?;
+            products.push(Product::released(&bag, place, None));
+        }
+        let recorded = Product::released(&file, release_path, Some(summary.content_sha256));
+        products.push(Product { records: Some(summary.messages), ..recorded });
+        Ok(Driven { products, row, replicates, samples })
     }
 
     /// The rows of a mission's starts, where there are several; `first` was recorded from the drawn one.
@@ -400,7 +408,7 @@ impl Job for TraverseJob {
             "group": self.group,
             "variant": self.variant,
             "missions": self.lines.item,
-            "study": { "name": head.name, "seed": head.seed, "license": head.license, "epoch_ns": head.epoch_ns },
+            "study": { "name": head.name, "seed": head.seed, "license": head.license, "epoch_ns": head.epoch_ns, "mcap": head.mcap },
         })
     }
 
@@ -435,8 +443,7 @@ impl Job for TraverseJob {
         let mut products = vec![Product::internal(SAMPLES)];
         let mut rows = Rows { parameters: self.parameters(), ..Rows::default() };
         for d in driven {
-            let product = Product::released(&d.file, d.release_path, Some(d.content));
-            products.push(Product { records: Some(d.messages), ..product });
+            products.extend(d.products);
             rows.missions.push(d.row);
             rows.replicates.extend(d.replicates);
         }

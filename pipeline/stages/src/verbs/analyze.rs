@@ -9,6 +9,7 @@ use sastrugi_roughness::{classify, moore_gradient};
 use sastrugi_schemas::log::Log;
 use sastrugi_schemas::study::RoughnessSection;
 use sastrugi_schemas::tables::LogRow;
+use sastrugi_schemas::topics::EventKind;
 use sastrugi_store::PROGRAM;
 use sastrugi_store::mcap::{McapError, read_log};
 use sastrugi_store::parquet::{TableMetadata, TableWriter};
@@ -104,7 +105,7 @@ impl Request<'_> {
             topic: found.topic.clone(),
             message: found.schema.clone(),
             frame: found.frame.clone(),
-            outcome: log.events.last().map(|(_, name)| name.clone()).filter(|name| !name.is_empty()),
+            outcome: outcome(log),
             time_s: found.duration_s,
             path_length_m: metrics.path_length_m,
             efficiency: metrics.efficiency,
@@ -142,6 +143,12 @@ impl Request<'_> {
             broken: log.broken.clone(),
         }
     }
+}
+
+/// How the mission ended, where the log has an event that says so; loggers of other programs say other things.
+fn outcome(log: &Log) -> Option<String> {
+    let end = log.events.iter().rev().find_map(|(_, name)| EventKind::outcome(name));
+    end.map(|end| end.name().to_owned())
 }
 
 /// Writes the table `logs`, sorted by the names of the logs.

@@ -61,6 +61,25 @@ pub(super) fn terrain(dem: &Grid, classes: Option<&Grid<u8>>, base_m: f64, near:
     tiles.chain(fans).chain(strips).filter(|patch| !patch.triangles.is_empty()).collect()
 }
 
+/// Row and column of every corner of that surface, row by row.
+pub(super) fn nodes(g: &Geometry, near: &[Square]) -> Vec<(usize, usize)> {
+    if g.rows < 2 || g.cols < 2 {
+        return vec![];
+    }
+    let (fine, coarse): (Vec<_>, Vec<_>) =
+        leaves(g, &marked_tiles(g, near), coarse_side(g)).into_iter().partition(|leaf| leaf.fine);
+    let mut taken = vertices(g, &fine, &coarse);
+    for leaf in &fine {
+        for row in leaf.row..=leaf.row_end {
+            taken[row * g.cols + leaf.col..=row * g.cols + leaf.col_end].fill(true);
+        }
+    }
+    for (row, col) in coarse.iter().map(Leaf::centre) {
+        taken[row * g.cols + col] = true;
+    }
+    (0..g.len()).filter(|&at| taken[at]).map(|at| (at / g.cols, at % g.cols)).collect()
+}
+
 /// Where heights count from, for heights from `low_m` to `high_m`: a whole number of metres, so far below that all heights
 /// lie within one power of two. As floating-point numbers they then share their exponent and differ in a byte or two.
 pub(super) fn base(low_m: f64, high_m: f64) -> f64 {

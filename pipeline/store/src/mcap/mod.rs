@@ -1,12 +1,15 @@
-//! MCAP recordings of missions, viewer flavour: the topics of `sastrugi_schemas::topics`.
+//! MCAP recordings of missions in two flavours, which never mix in a file: for viewers (Foxglove's messages and our own, in
+//! protobuf) and for ROS 2 (CDR). The topics are those of `sastrugi_schemas::topics`.
 //!
 //! Messages stand in the order of their time; chunks are compressed with Zstandard on one thread and carry checksums;
 //! bytes follow from the recording alone. The map frame is the terrain's own coordinates.
 
+mod frames;
 mod log;
 mod mesh;
-mod messages;
 mod protobuf;
+mod ros2;
+mod viewer;
 
 #[cfg(test)]
 mod tests;
@@ -16,14 +19,15 @@ pub use log::read_log;
 use crate::digest::ContentHash;
 use crate::{PROGRAM, atomic};
 use foxglove::messages as fox;
-use foxglove::messages::Timestamp;
 use mcap::records::{MessageHeader, Metadata};
 use mcap::{Compression, WriteOptions, Writer};
 use sastrugi_numeric::Grid;
-use sastrugi_schemas::topics::{Recording, Topic, VIEWER};
+use sastrugi_schemas::study::McapFlavour;
+use sastrugi_schemas::topics::{Recording, Topic};
 use std::collections::BTreeMap;
 use std::io::{self, Cursor};
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
 /// Level of Zstandard.
 const ZSTD_LEVEL: u32 = 1;
@@ -71,10 +75,12 @@ impl McapError {
 pub struct TerrainView<'a> {
     dem: &'a Grid,
     classes: Option<&'a Grid<u8>>,
-    /// Where the heights of `/terrain/mesh` count from, m.
-    base_m: f64,
-    /// `/terrain/grid` without its time.
-    grid: fox::Grid,
+    /// Lowest and highest height, m.
+    range_m: (f64, f64),
+    /// `/terrain/grid` of the viewer flavour, without its time.
+    grid: OnceLock<fox::Grid>,
+    /// `/terrain` of the ROS 2 flavour, without its time.
+    grid_map: OnceLock<ros2::GridMap>,
 }
 
 impl<'a> TerrainView<'a> {
@@ -86,15 +92,24 @@ impl<'a> TerrainView<'a> {
         if classes.is_some_and(|c| (c.rows(), c.cols()) != (dem.rows(), dem.cols())) {
             return Err(McapError::unfit("the class map has another shape than the terrain"));
         }
-        let (low_m, high_m) = dem.range().unwrap_or((0.0, 0.0));
-        let (base_m, grid) = (mesh::base(low_m, high_m), messages::terrain_grid(dem, classes, low_m));
-        Ok(Self { dem, classes, base_m, grid })
+        let range_m = dem.range().unwrap_or((0.0, 0.0));
+        Ok(Self { dem, classes, range_m, grid: OnceLock::new(), grid_map: OnceLock::new() })
+    }
+
+    fn grid(&self) -> &fox::Grid {
+        self.grid.get_or_init(|| viewer::terrain_grid(self.dem, self.classes, self.range_m.0))
+    }
+
+    fn grid_map(&self) -> &ros2::GridMap {
+        self.grid_map.get_or_init(|| ros2::grid_map(self.dem, self.classes))
     }
 }
 
 /// A mission to write.
 #[derive(Clone, Copy, Debug)]
 pub struct MissionMcap<'a> {
+    /// Messages and their encoding.
+    pub flavour: McapFlavour,
     /// What happened.
     pub recording: &'a Recording,
     /// Terrain it happened on.
@@ -115,18 +130,69 @@ pub struct MissionMcap<'a> {
 pub struct McapSummary {
     /// Number of messages.
     pub messages: u64,
+    /// Number of messages of each of the flavour's topics.
+    pub counts: Vec<u64>,
+    /// Time of the first message, ns since 1970-01-01 UTC.
+    pub start_ns: u64,
+    /// Time of the last message, ns since 1970-01-01 UTC.
+    pub end_ns: u64,
     /// Bytes of all messages before compression.
     pub data_bytes: u64,
     /// Hash of the decoded stream: topic, time and data of every message in order.
     pub content_sha256: String,
 }
 
+/// What a flavour is made of.
+struct Flavour {
+    profile: &'static str,
+    message_encoding: &'static str,
+    schema_encoding: &'static str,
+    topics: &'static [&'static Topic],
+    /// The definition of a topic's messages.
+    schema: fn(&Topic) -> Result<Vec<u8>, McapError>,
+    channel_metadata: fn(&Topic) -> BTreeMap<String, String>,
+    messages: fn(&MissionMcap, &mut Timeline) -> Result<(), McapError>,
+}
+
+impl Flavour {
+    fn of(flavour: McapFlavour) -> &'static Self {
+        match flavour {
+            McapFlavour::Viewer => &viewer::FLAVOUR,
+            McapFlavour::Ros2 => &ros2::FLAVOUR,
+        }
+    }
+}
+
 /// A message before it gets its place in the file.
 struct Pending {
-    /// Position of its topic in [`VIEWER`].
+    /// Position of its topic in the flavour's list.
     topic: usize,
     log_time: u64,
     data: Vec<u8>,
+}
+
+/// Messages of a mission, in no particular order.
+struct Timeline {
+    topics: &'static [&'static Topic],
+    epoch_ns: u64,
+    pending: Vec<Pending>,
+}
+
+impl Timeline {
+    /// Adds a message at a time since the mission's start, made for its time in ns since 1970-01-01 UTC.
+    fn add(
+        &mut self,
+        topic: &Topic,
+        time_s: f64,
+        data: impl FnOnce(u64) -> Result<Vec<u8>, McapError>,
+    ) -> Result<(), McapError> {
+        // A negative or NaN time becomes the epoch.
+        let log_time = self.epoch_ns.saturating_add((time_s * 1e9).round() as u64);
+        let topic = self.topics.iter().position(|t| t.name == topic.name);
+        let topic = topic.ok_or_else(|| McapError::unfit("a topic is not listed"))?;
+        self.pending.push(Pending { topic, log_time, data: data(log_time)? });
+        Ok(())
+    }
 }
 
 /// Writes a mission to a file.
@@ -162,32 +228,41 @@ pub fn describe_file(path: &Path) -> Result<serde_json::Value, McapError> {
     }))
 }
 
+/// The text of `metadata.yaml`, which makes a bag of the folder that holds a ROS 2 recording.
+pub fn bag_metadata(file: &str, summary: &McapSummary) -> String {
+    ros2::bag_metadata(file, summary)
+}
+
 /// A mission as the bytes of an MCAP file.
 ///
 /// # Errors
 /// As [`write_mission`], without the file system.
 pub fn encode_mission(mission: &MissionMcap) -> Result<(Vec<u8>, McapSummary), McapError> {
     check(mission)?;
-    let mut messages = messages::of_mission(mission)?;
+    let flavour = Flavour::of(mission.flavour);
+    let mut timeline = Timeline { topics: flavour.topics, epoch_ns: mission.epoch_ns, pending: vec![] };
+    (flavour.messages)(mission, &mut timeline)?;
+    let mut messages = timeline.pending;
     messages.sort_by_key(|m| (m.log_time, m.topic));
     let options = WriteOptions::new()
-        .profile("")
+        .profile(flavour.profile)
         .library(PROGRAM)
         .compression(Some(Compression::Zstd))
         .compression_level(ZSTD_LEVEL)
         .compression_threads(0)
         .chunk_size(Some(CHUNK_BYTES));
     let mut writer = options.create(Cursor::new(Vec::new()))?;
-    let channels = VIEWER.iter().map(|topic| add_channel(&mut writer, topic)).collect::<Result<Vec<_>, _>>()?;
+    let channels = flavour.topics.iter().map(|topic| add_channel(&mut writer, flavour, topic));
+    let channels = channels.collect::<Result<Vec<_>, _>>()?;
     let mut content = ContentHash::new("messages");
     // Counted by topic: the messages of one instant then differ in little but their data.
-    let mut sequences = [0; VIEWER.len()];
+    let mut counts = vec![0; flavour.topics.len()];
     for Pending { topic, log_time, data } in &messages {
-        let (channel_id, sequence) = (channels[*topic], sequences[*topic]);
+        let (channel_id, sequence) = (channels[*topic], counts[*topic] as u32);
         let header = MessageHeader { channel_id, sequence, log_time: *log_time, publish_time: *log_time };
-        sequences[*topic] += 1;
+        counts[*topic] += 1;
         writer.write_to_known_channel(&header, data)?;
-        content.text(VIEWER[*topic].name);
+        content.text(flavour.topics[*topic].name);
         content.u64(*log_time);
         content.bytes(data);
     }
@@ -195,8 +270,14 @@ pub fn encode_mission(mission: &MissionMcap) -> Result<(Vec<u8>, McapSummary), M
         writer.write_metadata(&Metadata { name: name.clone(), metadata: metadata.clone() })?;
     }
     writer.finish()?;
-    let data_bytes = messages.iter().map(|m| m.data.len() as u64).sum();
-    let summary = McapSummary { messages: messages.len() as u64, data_bytes, content_sha256: content.finish() };
+    let summary = McapSummary {
+        messages: messages.len() as u64,
+        counts,
+        start_ns: messages.first().map_or(0, |m| m.log_time),
+        end_ns: messages.last().map_or(0, |m| m.log_time),
+        data_bytes: messages.iter().map(|m| m.data.len() as u64).sum(),
+        content_sha256: content.finish(),
+    };
     Ok((writer.into_inner().into_inner(), summary))
 }
 
@@ -212,24 +293,7 @@ fn check(mission: &MissionMcap) -> Result<(), McapError> {
     Ok(())
 }
 
-fn add_channel(writer: &mut Writer<Cursor<Vec<u8>>>, topic: &Topic) -> Result<u16, McapError> {
-    let schema = match messages::public_schema(topic) {
-        Some(data) => data,
-        None => protobuf::descriptor_set(topic)?,
-    };
-    let schema = writer.add_schema(topic.schema, "protobuf", &schema)?;
-    let description = BTreeMap::from([("description".to_owned(), topic.description.to_owned())]);
-    Ok(writer.add_channel(schema, topic.name, "protobuf", &description)?)
-}
-
-/// Time of a sample, ns since 1970-01-01 UTC.
-fn log_time(epoch_ns: u64, time_s: f64) -> u64 {
-    // A negative or NaN time becomes the epoch.
-    epoch_ns.saturating_add((time_s * 1e9).round() as u64)
-}
-
-fn timestamp(log_time: u64) -> Result<Timestamp, McapError> {
-    let seconds = u32::try_from(log_time / 1_000_000_000);
-    let seconds = seconds.map_err(|_| McapError::unfit(format!("{log_time} ns is beyond the year 2106")))?;
-    Ok(Timestamp::new(seconds, (log_time % 1_000_000_000) as u32))
+fn add_channel(writer: &mut Writer<Cursor<Vec<u8>>>, flavour: &Flavour, topic: &Topic) -> Result<u16, McapError> {
+    let schema = writer.add_schema(topic.schema, flavour.schema_encoding, &(flavour.schema)(topic)?)?;
+    Ok(writer.add_channel(schema, topic.name, flavour.message_encoding, &(flavour.channel_metadata)(topic))?)
 }

@@ -3,7 +3,7 @@ use super::*;
 use ::mcap::MessageStream;
 use sastrugi_numeric::{Geometry, Streams, Surface};
 use sastrugi_schemas::topics::{
-    self, CommandSample, Event, EventKind, ImuSample, StateSample, VehicleOutline, WheelOutline, WheelSample,
+    self, CommandSample, Event, EventKind, ImuSample, StateSample, VIEWER, VehicleOutline, WheelOutline, WheelSample,
     WheelState,
 };
 use std::collections::BTreeMap as Map;
@@ -159,8 +159,13 @@ impl Scene {
         TerrainView::new(&self.dem, Some(&self.classes)).unwrap()
     }
 
+    fn ros2<'a>(&'a self, terrain: &'a TerrainView<'a>) -> MissionMcap<'a> {
+        MissionMcap { flavour: McapFlavour::Ros2, ..self.mission(terrain) }
+    }
+
     fn mission<'a>(&'a self, terrain: &'a TerrainView<'a>) -> MissionMcap<'a> {
         MissionMcap {
+            flavour: McapFlavour::Viewer,
             recording: &self.recording,
             terrain,
             start_m: [500_002.0, 4_000_000.0 + 2.0],
@@ -193,16 +198,16 @@ fn val_own_messages_are_as_described() {
     let r = &scene.recording;
     let names = vec![String::new(); 4];
     for (topic, values) in [
-        (&topics::state::TOPIC, messages::state_values(&r.states[0])),
-        (&topics::imu::TOPIC, messages::imu_values(&r.imu[0])),
-        (&topics::wheels::TOPIC, messages::wheel_values(&names, &r.wheels[0])),
-        (&topics::command::TOPIC, messages::command_values(&r.commands[0])),
+        (&topics::state::TOPIC, viewer::state_values(&r.states[0])),
+        (&topics::imu::TOPIC, viewer::imu_values(&r.imu[0])),
+        (&topics::wheels::TOPIC, viewer::wheel_values(&names, &r.wheels[0])),
+        (&topics::command::TOPIC, viewer::command_values(&r.commands[0])),
     ] {
         let described: Vec<_> = topic.fields.iter().map(|f| f.kind).collect();
         assert_eq!(values.iter().map(protobuf::Value::kind).collect::<Vec<_>>(), described, "{}", topic.name);
     }
     for topic in VIEWER {
-        assert_ne!(topic.fields.is_empty(), messages::public_schema(topic).is_none(), "{}", topic.name);
+        assert_ne!(topic.fields.is_empty(), viewer::public_schema(topic).is_none(), "{}", topic.name);
     }
 }
 
@@ -262,7 +267,7 @@ fn val_wheels_stand_on_the_mesh() {
     let scene = Scene::new(400, 12);
     let view = scene.terrain();
     let mission = scene.mission(&view);
-    let triangles = triangles(&terrain(&scene.dem, None, 0.0, &messages::corridor(&mission)));
+    let triangles = triangles(&terrain(&scene.dem, None, 0.0, &frames::corridor(&mission)));
     let contacts = scene.recording.wheels.iter().flat_map(|s| &s.wheels).map(|w| w.contact_m);
     let worst = contacts.step_by(7).map(|p| off_mesh(&triangles, p)).fold(0.0, f64::max);
     eprintln!("largest distance of a contact from the mesh: {:.2} mm", 1e3 * worst);
@@ -290,10 +295,10 @@ fn off_mesh(triangles: &[[[f64; 3]; 3]], p: [f64; 3]) -> f64 {
 fn val_wheels_are_steered_and_turned() {
     let near = |a: [f64; 3], b: [f64; 3]| (0..3).all(|i| (a[i] - b[i]).abs() < 1e-12);
     let quarter = std::f64::consts::FRAC_PI_2;
-    assert!(near(messages::rotated(messages::wheel_rotation(0.0, quarter), [0.0, 0.0, 1.0]), [1.0, 0.0, 0.0]));
+    assert!(near(frames::rotated(frames::wheel_rotation(0.0, quarter), [0.0, 0.0, 1.0]), [1.0, 0.0, 0.0]));
     let (sin, cos) = libm::sincos(0.3);
     for angle in [0.0, 1.0, 100.0] {
-        assert!(near(messages::rotated(messages::wheel_rotation(0.3, angle), [0.0, 1.0, 0.0]), [-sin, cos, 0.0]));
+        assert!(near(frames::rotated(frames::wheel_rotation(0.3, angle), [0.0, 1.0, 0.0]), [-sin, cos, 0.0]));
     }
 }
 
@@ -314,7 +319,7 @@ fn val_holes_are_not_drawn() {
     let mut scene = Scene::new(160, 3);
     scene.dem.values[80 * 160 + 70] = f64::NAN;
     scene.dem.values[3] = f64::NAN;
-    let patches = terrain(&scene.dem, None, 0.0, &messages::corridor(&scene.mission(&scene.terrain())));
+    let patches = terrain(&scene.dem, None, 0.0, &frames::corridor(&scene.mission(&scene.terrain())));
     assert!(patches.iter().flat_map(|p| &p.points).flatten().all(|v| v.is_finite()));
     encode_mission(&scene.mission(&scene.terrain())).unwrap();
 }
@@ -365,4 +370,76 @@ fn prop_logs_come_back() {
         std::fs::write(&path, &flipped).unwrap();
         let _ = read_log(&path);
     }
+}
+
+/// A ROS 2 recording holds the numbers of the recording themselves, and its file nothing of the other flavour.
+#[test]
+fn prop_ros2_recordings_come_back() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("bag.mcap");
+    let scene = Scene::new(160, 3);
+    let (bytes, summary) = encode_mission(&scene.ros2(&scene.terrain())).unwrap();
+    assert_eq!(summary.counts, [1, 1, 1, 61, 61, 301, 61, 61, 2]);
+    assert_eq!(summary.end_ns - summary.start_ns, 3_000_000_000);
+    let found = ::mcap::Summary::read(&bytes).unwrap().unwrap();
+    assert!(found.channels.values().all(|c| c.message_encoding == "cdr"));
+    assert!(found.schemas.values().all(|s| s.encoding == "ros2msg"));
+    std::fs::write(&path, &bytes).unwrap();
+    let (log, recording) = (read_log(&path).unwrap(), &scene.recording);
+    assert_eq!(log.poses[0].poses.len(), recording.states.len());
+    for (read, wrote) in log.poses[0].poses.iter().zip(&recording.states) {
+        assert_eq!((read.position_m, read.orientation), (wrote.position_m, wrote.orientation));
+        assert_eq!(read.angular_velocity_rad_s, Some(wrote.angular_velocity_rad_s));
+    }
+    for (read, wrote) in log.imus[0].samples.iter().zip(&recording.imu) {
+        assert_eq!(read.specific_force_m_s2, wrote.specific_force_m_s2);
+    }
+    assert!(log.transforms.iter().any(|t| (t.parent.as_str(), t.child.as_str()) == ("base_link", "rear_right_wheel")));
+    assert_eq!(log.events.last().map(|(_, name)| name.as_str()), Some("success"));
+    assert_eq!(encode_mission(&scene.ros2(&scene.terrain())).unwrap().0, bytes);
+}
+
+/// The grid map has the terrain's own heights where its cells are the terrain's, from the north-east corner westward, and
+/// heights between them where they are not; cells without data are NaN.
+#[test]
+fn val_a_grid_map_has_the_heights() {
+    let mut dem = rough(90, 70, 0.5, [500_000.3, 4_000_000.7], 6);
+    dem.values[5] = f64::NAN;
+    let classes = classes(&dem);
+    let map = ros2::grid_map(&dem, Some(&classes));
+    assert_eq!((map.resolution, map.length_x, map.length_y), (0.5, 35.0, 45.0));
+    assert_eq!(map.layers, ["elevation", "class"]);
+    for (j, i) in (0..90).flat_map(|j| (0..70).map(move |i| (j, i))) {
+        let z = dem.at(j, 69 - i) as f32;
+        let found = map.data[0].data[j * 70 + i];
+        assert!(found == z || found.is_nan() && (!z.is_finite() || near_hole(j, 69 - i)), "{j} {i}: {found} of {z}");
+    }
+    let large = rough(400, 401, 0.05, [0.0; 2], 6);
+    let map = ros2::grid_map(&large, None);
+    assert!(map.resolution > 0.15 && map.data[0].data.len() <= 128 * 128);
+    let [nx, ny] = [map.length_x, map.length_y].map(|length| (length / map.resolution).round() as usize);
+    for (j, i) in [(0, 0), (3, 7), (ny - 1, nx - 1)] {
+        let x = map.position[0] + 0.5 * map.length_x - (i as f64 + 0.5) * map.resolution;
+        let y = map.position[1] + 0.5 * map.length_y - (j as f64 + 0.5) * map.resolution;
+        assert!((f64::from(map.data[0].data[j * nx + i]) - large.height(x, y).unwrap()).abs() < 1e-6, "{j} {i}");
+    }
+}
+
+/// A cell beside the hole of [`val_a_grid_map_has_the_heights`].
+fn near_hole(row: usize, col: usize) -> bool {
+    row <= 1 && col.abs_diff(5) <= 1
+}
+
+/// The points of the cloud are the corners of the mesh.
+#[test]
+fn prop_points_are_the_corners_of_the_mesh() {
+    let scene = Scene::new(160, 3);
+    let near = frames::corridor(&scene.mission(&scene.terrain()));
+    let key = |x: f64, y: f64| ((x * 1000.0).round() as i64, (y * 1000.0).round() as i64);
+    let g = &scene.dem.geometry;
+    let nodes: std::collections::BTreeSet<_> =
+        super::mesh::nodes(g, &near).into_iter().map(|(row, col)| key(g.x(col), g.y(row))).collect();
+    let corners = triangles(&terrain(&scene.dem, None, 0.0, &near)).into_iter().flatten();
+    let corners: std::collections::BTreeSet<_> = corners.map(|[x, y, _]| key(x, y)).collect();
+    assert_eq!(nodes, corners);
 }

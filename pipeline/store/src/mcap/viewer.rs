@@ -1,8 +1,9 @@
-//! The messages of a mission, topic by topic.
+//! Viewer flavour: the topics of `sastrugi_schemas::topics::VIEWER` in protobuf.
 
-use super::mesh::{self, Patch, Square};
+use super::frames::{BASE, IDENTITY, MAP, class_rgb, corridor, wheel_rotation};
+use super::mesh::{self, Patch};
 use super::protobuf::{self, Value};
-use super::{McapError, MissionMcap, Pending, TerrainView, log_time, timestamp};
+use super::{Flavour, McapError, MissionMcap, TerrainView, Timeline};
 use foxglove::Encode;
 use foxglove::messages as fox;
 use foxglove::messages::{Color, Point3, Pose, Quaternion, Timestamp, Vector2, Vector3};
@@ -12,9 +13,8 @@ use sastrugi_schemas::RoughnessClass;
 use sastrugi_schemas::topics::{
     self, CommandSample, Event, EventKind, ImuSample, Recording, StateSample, Topic, VIEWER, WheelSample, WheelState,
 };
+use std::collections::BTreeMap;
 
-const MAP: &str = "map";
-const BASE: &str = "base_link";
 /// Most cells along a side of `/terrain/grid`.
 const GRID_CELLS: usize = 64;
 /// Poses per second of `/vehicle/path`.
@@ -34,8 +34,21 @@ const COARSE: f64 = 4.0;
 const DRAWN: f64 = 16384.0;
 /// Elevation of `/terrain/grid`.
 const ELEVATION: f64 = 256.0;
-const GREY: [u8; 3] = [0x9a, 0x9a, 0x94];
-const IDENTITY: [f64; 4] = [0.0, 0.0, 0.0, 1.0];
+
+/// The flavour.
+pub(super) const FLAVOUR: Flavour = Flavour {
+    profile: "",
+    message_encoding: "protobuf",
+    schema_encoding: "protobuf",
+    topics: &VIEWER,
+    schema,
+    channel_metadata: |topic| BTreeMap::from([("description".to_owned(), topic.description.to_owned())]),
+    messages,
+};
+
+fn schema(topic: &Topic) -> Result<Vec<u8>, McapError> {
+    public_schema(topic).map_or_else(|| protobuf::descriptor_set(topic), Ok)
+}
 
 /// The schema of a topic that carries one of Foxglove's messages.
 pub(super) fn public_schema(topic: &Topic) -> Option<Vec<u8>> {
@@ -51,51 +64,51 @@ pub(super) fn public_schema(topic: &Topic) -> Option<Vec<u8>> {
     schema.map(|s| s.data.into_owned())
 }
 
-/// All messages of a mission, in no particular order.
-pub(super) fn of_mission(mission: &MissionMcap) -> Result<Vec<Pending>, McapError> {
-    let mut out = Messages { epoch_ns: mission.epoch_ns, pending: vec![] };
+/// Puts all messages of a mission on the timeline.
+fn messages(mission: &MissionMcap, out: &mut Timeline) -> Result<(), McapError> {
     let recording = mission.recording;
-    out.add(&topics::terrain_mesh::TOPIC, 0.0, |t| terrain_mesh(mission, t).encode_to_vec())?;
+    out.add(&topics::terrain_mesh::TOPIC, 0.0, |t| Ok(terrain_mesh(mission, timestamp(t)?).encode_to_vec()))?;
     out.add(&topics::terrain_grid::TOPIC, 0.0, |t| {
-        fox::Grid { timestamp: Some(t), ..mission.terrain.grid.clone() }.encode_to_vec()
+        Ok(fox::Grid { timestamp: Some(timestamp(t)?), ..mission.terrain.grid().clone() }.encode_to_vec())
     })?;
-    out.add(&topics::vehicle_shape::TOPIC, 0.0, |t| vehicle_shape(mission, t).encode_to_vec())?;
-    out.add(&topics::vehicle_path::TOPIC, 0.0, |t| vehicle_path(recording, t).encode_to_vec())?;
+    out.add(&topics::vehicle_shape::TOPIC, 0.0, |t| Ok(vehicle_shape(mission, timestamp(t)?).encode_to_vec()))?;
+    out.add(&topics::vehicle_path::TOPIC, 0.0, |t| Ok(vehicle_path(recording, timestamp(t)?).encode_to_vec()))?;
     let wheels = recording.wheels.iter().map(Some).chain(std::iter::repeat(None));
     for (state, wheels) in recording.states.iter().zip(wheels) {
-        out.add(&topics::tf::TOPIC, state.time_s, |t| transforms(recording, state, wheels, t).encode_to_vec())?;
-        out.add(&topics::vehicle_pose::TOPIC, state.time_s, |t| vehicle_pose(state, t).encode_to_vec())?;
-        out.add(&topics::state::TOPIC, state.time_s, |t| protobuf::encode(&t, &state_values(state)))?;
+        out.add(&topics::tf::TOPIC, state.time_s, |t| {
+            Ok(transforms(recording, state, wheels, timestamp(t)?).encode_to_vec())
+        })?;
+        out.add(
+            &topics::vehicle_pose::TOPIC,
+            state.time_s,
+            |t| Ok(vehicle_pose(state, timestamp(t)?).encode_to_vec()),
+        )?;
+        out.add(&topics::state::TOPIC, state.time_s, |t| Ok(protobuf::encode(&timestamp(t)?, &state_values(state))))?;
     }
     for sample in &recording.imu {
-        out.add(&topics::imu::TOPIC, sample.time_s, |t| protobuf::encode(&t, &imu_values(sample)))?;
+        out.add(&topics::imu::TOPIC, sample.time_s, |t| Ok(protobuf::encode(&timestamp(t)?, &imu_values(sample))))?;
     }
     let names: Vec<String> = recording.vehicle.wheels.iter().map(|w| w.name.clone()).collect();
     for sample in &recording.wheels {
-        out.add(&topics::wheels::TOPIC, sample.time_s, |t| protobuf::encode(&t, &wheel_values(&names, sample)))?;
+        out.add(&topics::wheels::TOPIC, sample.time_s, |t| {
+            Ok(protobuf::encode(&timestamp(t)?, &wheel_values(&names, sample)))
+        })?;
     }
     for sample in &recording.commands {
-        out.add(&topics::command::TOPIC, sample.time_s, |t| protobuf::encode(&t, &command_values(sample)))?;
+        out.add(&topics::command::TOPIC, sample.time_s, |t| {
+            Ok(protobuf::encode(&timestamp(t)?, &command_values(sample)))
+        })?;
     }
     for event in &recording.events {
-        out.add(&topics::events::TOPIC, event.time_s, |t| log(event, t).encode_to_vec())?;
+        out.add(&topics::events::TOPIC, event.time_s, |t| Ok(log(event, timestamp(t)?).encode_to_vec()))?;
     }
-    Ok(out.pending)
+    Ok(())
 }
 
-struct Messages {
-    epoch_ns: u64,
-    pending: Vec<Pending>,
-}
-
-impl Messages {
-    fn add(&mut self, topic: &Topic, time_s: f64, data: impl FnOnce(Timestamp) -> Vec<u8>) -> Result<(), McapError> {
-        let log_time = log_time(self.epoch_ns, time_s);
-        let topic = VIEWER.iter().position(|t| t.name == topic.name);
-        let topic = topic.ok_or_else(|| McapError::unfit("a topic is not listed"))?;
-        self.pending.push(Pending { topic, log_time, data: data(timestamp(log_time)?) });
-        Ok(())
-    }
+fn timestamp(log_time: u64) -> Result<Timestamp, McapError> {
+    let seconds = u32::try_from(log_time / 1_000_000_000);
+    let seconds = seconds.map_err(|_| McapError::unfit(format!("{log_time} ns is beyond the year 2106")))?;
+    Ok(Timestamp::new(seconds, (log_time % 1_000_000_000) as u32))
 }
 
 pub(super) fn state_values(s: &StateSample) -> Vec<Value> {
@@ -167,12 +180,6 @@ fn transforms(
     fox::FrameTransforms { transforms: all }
 }
 
-/// Quaternion of a wheel in base_link: steering turns its axle about z, forward rolling turns z towards x about the axle.
-pub(super) fn wheel_rotation(steering_rad: f64, angle_rad: f64) -> [f64; 4] {
-    let ((sin, cos), (steer_sin, steer_cos)) = (libm::sincos(0.5 * angle_rad), libm::sincos(0.5 * steering_rad));
-    [-steer_sin * sin, steer_cos * sin, steer_sin * cos, steer_cos * cos]
-}
-
 fn vehicle_pose(state: &StateSample, time: Timestamp) -> fox::PoseInFrame {
     fox::PoseInFrame { timestamp: Some(time), frame_id: MAP.to_owned(), pose: Some(pose_of(state)) }
 }
@@ -235,43 +242,11 @@ fn vehicle_shape(mission: &MissionMcap, time: Timestamp) -> fox::SceneUpdate {
 }
 
 fn terrain_mesh(mission: &MissionMcap, time: Timestamp) -> fox::SceneUpdate {
-    let &TerrainView { dem, classes, base_m, .. } = mission.terrain;
-    let patches = mesh::terrain(dem, classes, base_m, &corridor(mission));
+    let &TerrainView { dem, classes, range_m: (low_m, high_m), .. } = mission.terrain;
+    let patches = mesh::terrain(dem, classes, mesh::base(low_m, high_m), &corridor(mission));
     let triangles = patches.into_iter().map(triangle_list).collect();
     let entity = fox::SceneEntity { triangles, ..entity(time, MAP, "terrain", false) };
     fox::SceneUpdate { deletions: vec![], entities: vec![entity] }
-}
-
-/// Where the terrain is drawn in full: under the wheels at every sample, and a cell around.
-pub(super) fn corridor(mission: &MissionMcap) -> Vec<Square> {
-    let Recording { vehicle, states, wheels, .. } = mission.recording;
-    let [dx, dy] = mission.terrain.dem.geometry.cell;
-    let cell = dx.max(dy);
-    let mut near = vec![];
-    for state in states {
-        let [x, y, _] = state.position_m;
-        for wheel in &vehicle.wheels {
-            let half_side = (0.5 * wheel.radius_m).max(0.5 * wheel.width_m) + cell;
-            for ahead in [-wheel.radius_m, 0.0, wheel.radius_m] {
-                let [hub_x, hub_y, hub_z] = wheel.hub_m;
-                let [dx, dy, _] = rotated(state.orientation, [hub_x + ahead, hub_y, hub_z]);
-                near.push(Square { centre: [x + dx, y + dy], half_side });
-            }
-        }
-    }
-    let touching = wheels.iter().flat_map(|sample| &sample.wheels).filter(|wheel| wheel.normal_force_n != 0.0);
-    near.extend(touching.map(|w| Square { centre: [w.contact_m[0], w.contact_m[1]], half_side: cell }));
-    near
-}
-
-/// `v` turned by a unit quaternion `[x, y, z, w]`: v + 2 w (q x v) + 2 q x (q x v).
-pub(super) fn rotated([qx, qy, qz, qw]: [f64; 4], v: [f64; 3]) -> [f64; 3] {
-    let cross =
-        |a: [f64; 3], b: [f64; 3]| [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-    let q = [qx, qy, qz];
-    let t = cross(q, v).map(|c| 2.0 * c);
-    let u = cross(q, t);
-    [v[0] + qw * t[0] + u[0], v[1] + qw * t[1] + u[1], v[2] + qw * t[2] + u[2]]
 }
 
 fn triangle_list(patch: Patch) -> fox::TriangleListPrimitive {
@@ -297,7 +272,7 @@ pub(super) fn terrain_grid(dem: &Grid, classes: Option<&Grid<u8>>, low_m: f64) -
     for (row, col) in (0..rows).rev().flat_map(|r| (0..cols).map(move |c| (r, c))) {
         let (row, col) = ((row * step + step / 2).min(g.rows - 1), (col * step + step / 2).min(g.cols - 1));
         let z = in_steps(dem.at(row, col), ELEVATION);
-        let rgb = classes.map_or(GREY, |classes| class_rgb(classes.at(row, col)));
+        let rgb = class_rgb(classes.map_or(RoughnessClass::NO_DATA, |classes| classes.at(row, col)));
         data.extend(rgb);
         data.push(if z.is_finite() { 255 } else { 0 });
         data.extend((if z.is_finite() { z as f32 } else { 0.0 }).to_le_bytes());
@@ -335,10 +310,6 @@ fn entity(time: Timestamp, frame: &str, id: &str, frame_locked: bool) -> fox::Sc
         frame_locked,
         ..fox::SceneEntity::default()
     }
-}
-
-fn class_rgb(code: u8) -> [u8; 3] {
-    RoughnessClass::from_code(code).map_or(GREY, RoughnessClass::colour)
 }
 
 fn class_colour(code: u8) -> Color {

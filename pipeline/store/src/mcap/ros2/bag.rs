@@ -1,0 +1,41 @@
+//! `metadata.yaml` of a bag, in the format of version 5 ("Humble"), which later distributions read too.
+
+use super::super::McapSummary;
+use sastrugi_schemas::topics::Topic;
+use sastrugi_schemas::topics::ros2::{ROS2, TERRAIN, TERRAIN_POINTS, TF_STATIC};
+
+/// What a bag's player offers for a topic. What is said once at the start stays for those who come late.
+pub(super) fn quality_of_service(topic: &Topic) -> String {
+    let lasting = [TF_STATIC, TERRAIN, TERRAIN_POINTS].iter().any(|t| t.name == topic.name);
+    // history 1: keep last; reliability 1: reliable; durability 1: transient local, 2: volatile; the rest is without limit.
+    let durability = if lasting { 1 } else { 2 };
+    let depth = if lasting { 1 } else { 10 };
+    let forever = "\n    sec: 9223372036\n    nsec: 854775807";
+    format!(
+        "- history: 1\n  depth: {depth}\n  reliability: 1\n  durability: {durability}\n  deadline:{forever}\n  lifespan:{forever}\n  \
+         liveliness: 1\n  liveliness_lease_duration:{forever}\n  avoid_ros_namespace_conventions: false"
+    )
+}
+
+/// The text of `metadata.yaml` beside one file of messages.
+pub(in super::super) fn metadata(file: &str, summary: &McapSummary) -> String {
+    let duration_ns = summary.end_ns.saturating_sub(summary.start_ns);
+    let (start_ns, messages) = (summary.start_ns, summary.messages);
+    let topics: String = ROS2.iter().zip(&summary.counts).map(|(topic, count)| topic_entry(topic, *count)).collect();
+    format!(
+        "rosbag2_bagfile_information:\n  version: 5\n  storage_identifier: mcap\n  duration:\n    nanoseconds: {duration_ns}\n  \
+         starting_time:\n    nanoseconds_since_epoch: {start_ns}\n  message_count: {messages}\n  \
+         topics_with_message_count:\n{topics}  compression_format: \"\"\n  compression_mode: \"\"\n  relative_file_paths:\n    \
+         - {file}\n  files:\n    - path: {file}\n      starting_time:\n        nanoseconds_since_epoch: {start_ns}\n      \
+         duration:\n        nanoseconds: {duration_ns}\n      message_count: {messages}\n"
+    )
+}
+
+fn topic_entry(topic: &Topic, count: u64) -> String {
+    let quality = quality_of_service(topic).replace('\n', "\\n");
+    format!(
+        "    - topic_metadata:\n        name: {}\n        type: {}\n        serialization_format: cdr\n        \
+         offered_qos_profiles: \"{quality}\"\n      message_count: {count}\n",
+        topic.name, topic.schema
+    )
+}

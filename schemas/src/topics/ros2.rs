@@ -1,0 +1,65 @@
+//! Topics of the ROS 2 flavour: public messages in CDR, with their definitions in the file.
+
+use super::Topic;
+
+const fn topic(name: &'static str, schema: &'static str, description: &'static str) -> Topic {
+    Topic { name, schema, description, fields: &[] }
+}
+
+/// Topic `/tf_static`.
+pub const TF_STATIC: Topic = topic(
+    "/tf_static",
+    "tf2_msgs/msg/TFMessage",
+    "map -> terrain, the point that /terrain/points counts from; one message at the mission's start",
+);
+/// Topic `/terrain`.
+pub const TERRAIN: Topic = topic(
+    "/terrain",
+    "grid_map_msgs/msg/GridMap",
+    "the terrain in at most 128 square cells a side: layers elevation (m) and class; one message at the mission's start",
+);
+/// Topic `/terrain/points`.
+pub const TERRAIN_POINTS: Topic = topic(
+    "/terrain/points",
+    "sensor_msgs/msg/PointCloud2",
+    "cell centres of the terrain, coloured by roughness class: every one along the path, fewer elsewhere; one message at the \
+     mission's start",
+);
+/// Topic `/tf`.
+pub const TF: Topic =
+    topic("/tf", "tf2_msgs/msg/TFMessage", "map -> base_link and base_link -> each wheel, at the sampling rate");
+/// Topic `/odom`.
+pub const ODOM: Topic = topic(
+    "/odom",
+    "nav_msgs/msg/Odometry",
+    "true pose of base_link in map and its motion in base_link, at the sampling rate; covariances are 0",
+);
+/// Topic `/imu`.
+pub const IMU: Topic = topic(
+    "/imu",
+    "sensor_msgs/msg/Imu",
+    "an ideal inertial measurement unit at base_link, at its own rate: orientation, angular velocity, mean specific force since \
+     the sample before",
+);
+/// Topic `/joint_states`.
+pub const JOINT_STATES: Topic = topic(
+    "/joint_states",
+    "sensor_msgs/msg/JointState",
+    "wheels: angle turned (rad), spin (rad/s) and drive torque (N m), at the sampling rate",
+);
+/// Topic `/cmd_vel`.
+pub const CMD_VEL: Topic = topic(
+    "/cmd_vel",
+    "geometry_msgs/msg/TwistStamped",
+    "commanded forward speed and yaw rate in base_link, at the sampling rate",
+);
+/// Topic `/events`.
+pub const EVENTS: Topic = topic(
+    "/events",
+    "rcl_interfaces/msg/Log",
+    "start of the mission and its outcome, the name of the event as the logger's",
+);
+
+/// All topics of the ROS 2 flavour, in the order of their channels.
+pub const ROS2: [&Topic; 9] =
+    [&TF_STATIC, &TERRAIN, &TERRAIN_POINTS, &TF, &ODOM, &IMU, &JOINT_STATES, &CMD_VEL, &EVENTS];

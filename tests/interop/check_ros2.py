@@ -1,0 +1,256 @@
+"""ROS 2 bags of a release as rosbags and mcap-ros2-support read them: check_ros2.py RELEASE.
+
+Every bag opens as a folder, its definitions are the official ones, and its values are those of the tables and the terrain.
+"""
+
+import functools
+import math
+
+import numpy as np
+import pyarrow.parquet as pq
+import rasterio
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
+from rosbags.interfaces import Nodetype
+from rosbags.rosbag2 import Reader
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+from common import ContentHash, expect, manifest, run
+
+TOPICS = {
+    "/tf_static": "tf2_msgs/msg/TFMessage",
+    "/terrain": "grid_map_msgs/msg/GridMap",
+    "/terrain/points": "sensor_msgs/msg/PointCloud2",
+    "/tf": "tf2_msgs/msg/TFMessage",
+    "/odom": "nav_msgs/msg/Odometry",
+    "/imu": "sensor_msgs/msg/Imu",
+    "/joint_states": "sensor_msgs/msg/JointState",
+    "/cmd_vel": "geometry_msgs/msg/TwistStamped",
+    "/events": "rcl_interfaces/msg/Log",
+}
+# Messages said once at the start, kept for late listeners.
+LASTING = {"/tf_static", "/terrain", "/terrain/points"}
+# grid_map_msgs is no part of ROS 2's own distribution; these are its fields in the branch "humble".
+GRID_MAP = {
+    "grid_map_msgs/msg/GridMapInfo": [
+        ("resolution", "float64"), ("length_x", "float64"), ("length_y", "float64"), ("pose", "geometry_msgs/msg/Pose"),
+    ],
+    "grid_map_msgs/msg/GridMap": [
+        ("header", "std_msgs/msg/Header"), ("info", "grid_map_msgs/msg/GridMapInfo"), ("layers", "string[]"),
+        ("basic_layers", "string[]"), ("data", "std_msgs/msg/Float32MultiArray[]"), ("outer_start_index", "uint16"),
+        ("inner_start_index", "uint16"),
+    ],
+}
+CELL_HEIGHT_TOLERANCE_M = 1e-3
+
+
+@functools.cache
+def official():
+    """Definitions of ROS 2 Humble, and those of grid_map_msgs."""
+    return get_typestore(Stores.ROS2_HUMBLE)
+
+
+def type_text(field):
+    """A field's type as a .msg file spells it."""
+    kind, detail = field
+    if kind == Nodetype.NAME:
+        return detail
+    if kind == Nodetype.BASE:
+        return detail[0]
+    inner = type_text(detail[0])
+    return f"{inner}[{detail[1] or ''}]"
+
+
+def embedded_types(reader):
+    """The definitions that an MCAP file carries, by name of the schema."""
+    return {schema.name: schema.data.decode() for schema in reader.get_summary().schemas.values()}
+
+
+def check_definitions(path, definitions):
+    """Every definition has the hash (RIHS01, over names and types of all fields) of the official one."""
+    for name, text in definitions.items():
+        types = get_types_from_msg(text, name)
+        store = get_typestore(Stores.EMPTY)
+        store.register(types)
+        for part in types:
+            if part in GRID_MAP:
+                fields = [(field, type_text(kind)) for field, kind in types[part][1]]
+                expect(fields == GRID_MAP[part], f"{path}: {part} is {fields}")
+                continue
+            expect(types[part] == official().fielddefs[part], f"{path}: {part} differs from the official definition")
+            if "grid_map" not in name:
+                expect(store.hash_rihs01(part) == official().hash_rihs01(part), f"{path}: the hash of {part} differs")
+
+
+def typestore(definitions):
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    store.register({k: v for k, v in get_types_from_msg(definitions["grid_map_msgs/msg/GridMap"],
+                                                       "grid_map_msgs/msg/GridMap").items() if k.startswith("grid_map")})
+    return store
+
+
+def read_bag(folder, definitions):
+    """Messages by topic as rosbags reads them, each with its time."""
+    messages = {}
+    store = typestore(definitions)
+    with Reader(folder) as bag:
+        total = bag.message_count
+        expect({c.topic: c.msgtype for c in bag.connections} == TOPICS, f"{folder}: other topics than stated")
+        for connection in bag.connections:
+            durability = connection.ext.offered_qos_profiles[0].durability.name
+            expected = "TRANSIENT_LOCAL" if connection.topic in LASTING else "VOLATILE"
+            expect(durability == expected, f"{folder}: {connection.topic} is offered as {durability}")
+        for connection, time, data in bag.messages():
+            message = store.deserialize_cdr(data, connection.msgtype)
+            messages.setdefault(connection.topic, []).append((time, message))
+        counts = {c.topic: c.msgcount for c in bag.connections}
+        start, end = bag.start_time, bag.end_time
+    read = sum(map(len, messages.values()))
+    expect(read == total, f"{folder}: {read} messages, metadata.yaml says {total}")
+    for topic, count in counts.items():
+        expect(len(messages.get(topic, [])) == count, f"{folder}: metadata.yaml miscounts {topic}")
+    times = sorted(time for topic in messages.values() for time, _ in topic)
+    # The end of a bag is one past its last message.
+    expect((times[0], times[-1] + 1) == (start, end), f"{folder}: metadata.yaml states other times")
+    return messages
+
+
+def values(part):
+    """A vector or quaternion as numbers."""
+    return [getattr(part, axis) for axis in ("x", "y", "z", "w") if hasattr(part, axis)]
+
+
+def pose_values(pose):
+    return values(pose.position) + values(pose.orientation)
+
+
+def read_mcap(path):
+    """The same messages as mcap-ros2-support reads them, and the content hash."""
+    content, messages = ContentHash("messages"), {}
+    with open(path, "rb") as file:
+        reader = make_reader(file, validate_crcs=True, decoder_factories=[DecoderFactory()])
+        header = reader.get_header()
+        expect(header.profile == "ros2", f"{path} has the profile {header.profile}")
+        for schema, channel, message, decoded in reader.iter_decoded_messages(log_time_order=False):
+            expect(schema.encoding == "ros2msg", f"{path}: {channel.topic} has the schema encoding {schema.encoding}")
+            expect(channel.message_encoding == "cdr", f"{path}: {channel.topic} is {channel.message_encoding}")
+            content.text(channel.topic)
+            content.u64(message.log_time)
+            content.bytes(message.data)
+            messages.setdefault(channel.topic, []).append((message.log_time, decoded))
+        return messages, content.hex(), embedded_types(reader)
+
+
+def stamp_ns(stamp):
+    return stamp.sec * 10**9 + stamp.nanosec if hasattr(stamp, "nanosec") else stamp
+
+
+def check_same(path, ours, theirs):
+    """Both readers see the same values."""
+    for topic in ("/odom", "/imu", "/tf", "/cmd_vel", "/joint_states"):
+        for (t, a), (u, b) in zip(ours[topic], theirs[topic], strict=True):
+            expect(t == u and flat(a) == flat(b), f"{path}: the readers differ on {topic} at {t}")
+
+
+def flat(message):
+    """Every number and text of a message, in order."""
+    if isinstance(message, (int, float, str, bool)):
+        return [message]
+    if isinstance(message, (list, tuple, np.ndarray)):
+        return [x for part in message for x in flat(part.item() if isinstance(part, np.generic) else part)]
+    names = [n for n in getattr(message, "__slots__", None) or vars(message) if not n.startswith("__")]
+    return [x for name in names for x in flat(getattr(message, name))]
+
+
+def check_motion(path, messages, samples, mission):
+    odometry = messages["/odom"]
+    expect(len(odometry) == len(samples), f"{path}: {len(odometry)} odometries, table samples has {len(samples)}")
+    start = odometry[0][0]
+    for (time, message), row in zip(odometry, samples):
+        header, pose = message.header, pose_values(message.pose.pose)
+        expect(abs((time - start) * 1e-9 - row["time_s"]) <= 1e-9, f"{path}: an odometry at {time}")
+        expect(stamp_ns(header.stamp) == time, f"{path}: a stamp differs from the time of its message")
+        expect((header.frame_id, message.child_frame_id) == ("map", "base_link"), f"{path}: other frames")
+        expect(pose == [row[k] for k in ("x_m", "y_m", "z_m", "qx", "qy", "qz", "qw")], f"{path}: a pose at {time}")
+        speed = math.dist(values(message.twist.twist.linear), [0, 0, 0])
+        expected = math.dist([row[k] for k in ("vx_m_s", "vy_m_s", "vz_m_s")], [0, 0, 0])
+        expect(abs(speed - expected) <= 1e-9 * (1 + expected), f"{path}: {speed} m/s, table samples says {expected}")
+    # Forward in the body's own frame: the twist is no motion in the map.
+    forward = np.mean([message.twist.twist.linear.x for _, message in odometry])
+    expect(forward > 0 or mission["time_s"] < 2, f"{path}: on the mean it drives backwards ({forward} m/s)")
+    for (_, message), (_, tf) in zip(odometry, messages["/tf"], strict=True):
+        first = tf.transforms[0]
+        found = values(first.transform.translation) + values(first.transform.rotation)
+        expect(found == pose_values(message.pose.pose), f"{path}: /tf differs from /odom")
+    expect(messages["/events"][-1][1].name == mission["outcome"], f"{path}: another outcome than in table missions")
+
+
+def check_terrain(path, messages, raster):
+    """The grid map and the cloud have the heights of the terrain, at their places."""
+    heights, to_map = raster
+    rows, cols = heights.shape
+    info, layers = messages["/terrain"][0][1].info, messages["/terrain"][0][1]
+    expect(layers.layers == ["elevation", "class"], f"{path}: layers {layers.layers}")
+    dim = [(d.label, d.size, d.stride) for d in layers.data[0].layout.dim]
+    ny, nx = dim[0][1], dim[1][1]
+    expect(dim == [("column_index", ny, nx * ny), ("row_index", nx, nx)], f"{path}: layout {dim}")
+    # Rows of a grid map run from the largest x, columns from the largest y.
+    elevation = np.asarray(layers.data[0].data).reshape(ny, nx)[:, ::-1]
+    if abs(info.resolution - to_map.a) < 1e-9:
+        expect(elevation.shape == heights.shape, f"{path}: the grid map has {elevation.shape} cells of {heights.shape}")
+        off = np.nanmax(np.abs(elevation - heights))
+        expect(off <= CELL_HEIGHT_TOLERANCE_M, f"{path}: the grid map is {off} m off")
+        corner = (info.pose.position.x - info.length_x / 2, info.pose.position.y + info.length_y / 2)
+        expect(np.allclose(corner, (to_map.c, to_map.f), rtol=0, atol=1e-6), f"{path}: the grid map begins at {corner}")
+    origin = values(messages["/tf_static"][0][1].transforms[0].transform.translation)
+    cloud = messages["/terrain/points"][0][1]
+    expect(cloud.header.frame_id == messages["/tf_static"][0][1].transforms[0].child_frame_id, f"{path}: cloud's frame")
+    kind = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("rgb", "<u4")])
+    expect([(f.name, f.offset, f.datatype) for f in cloud.fields] == [(n, 4 * k, 7) for k, n in enumerate(kind.names)],
+           f"{path}: fields of the cloud")
+    points = np.frombuffer(bytes(cloud.data), kind)
+    expect(len(points) == cloud.width and cloud.height == 1, f"{path}: {len(points)} points, {cloud.width} stated")
+    x, y = (points[axis].astype(float) + origin[k] for k, axis in enumerate("xy"))
+    col, row = (x - to_map.c) / to_map.a - 0.5, (y - to_map.f) / to_map.e - 0.5
+    expect(max(np.abs(col - np.rint(col)).max(), np.abs(row - np.rint(row)).max()) < 1e-3, f"{path}: points off the cells")
+    off = np.abs(points["z"] + origin[2] - heights[np.rint(row).astype(int), np.rint(col).astype(int)]).max()
+    expect(off <= CELL_HEIGHT_TOLERANCE_M, f"{path}: a point of the cloud is {off} m off the terrain")
+    return len(points)
+
+
+def read_raster(path):
+    with rasterio.open(path) as raster:
+        return raster.read(1).astype(float), raster.transform
+
+
+def table(release, name):
+    files = sorted((release / "tables" / name).glob("*.parquet"))
+    return [row for file in files for row in pq.read_table(file).to_pylist()]
+
+
+def check_release(release):
+    terrains = {row["terrain_id"]: release / row["path"] for row in table(release, "terrains")}
+    raster = functools.lru_cache(maxsize=4)(read_raster)
+    samples = {}
+    for row in table(release, "samples"):
+        samples.setdefault((row["terrain_id"], row["mission_id"]), []).append(row)
+    artifacts = {artifact["path"]: artifact for artifact in manifest(release)["artifacts"]}
+    report = {}
+    for mission in table(release, "missions"):
+        path = release / mission["path"]
+        expect((path.parent / "metadata.yaml").exists(), f"{path.parent} is no bag")
+        theirs, content, definitions = read_mcap(path)
+        expect(artifacts[mission["path"]]["content_sha256"] == content, f"{path}: not the manifest's content hash")
+        check_definitions(path, definitions)
+        messages = read_bag(path.parent, definitions)
+        check_same(path, messages, theirs)
+        check_motion(path, messages, samples[mission["terrain_id"], mission["mission_id"]], mission)
+        points = check_terrain(path, messages, raster(terrains[mission["terrain_id"]]))
+        report[mission["path"]] = {"messages": sum(map(len, messages.values())), "points": points,
+                                   "bytes": path.stat().st_size}
+    expect(report, f"{release} holds no mission")
+    return report
+
+
+if __name__ == "__main__":
+    run(check_release, lambda paths: {})
