@@ -327,13 +327,24 @@ fn val_merge_refuses_what_does_not_fit() {
 /// `analyze` says of a recording what the release's table says of the mission, bit for bit.
 #[test]
 fn val_a_recording_is_judged_as_its_mission() {
-    let folder = area();
-    release_in(folder.path());
-    let missions = rows(&folder.path().join("release"), "missions");
+    for flavour in ["viewer", "ros2"] {
+        let folder = area();
+        let study = small_study().replace("seed = 7\n", &format!("seed = 7\nmcap = \"{flavour}\"\n"));
+        write(folder.path(), "study.toml", &study);
+        let call = sastrugi_in(folder.path(), &["run", "study.toml", "-o", "release", "--quiet"]);
+        assert_eq!(call.code, 0, "{}", call.stderr);
+        recordings_are_judged_as_missions(folder.path());
+        let call = sastrugi_in(folder.path(), &["verify", "release", "--recompute", "all", "--quiet"]);
+        assert_eq!(call.code, 0, "{}", call.stderr);
+    }
+}
+
+fn recordings_are_judged_as_missions(folder: &Path) {
+    let missions = rows(&folder.join("release"), "missions");
     assert!(!missions.is_empty());
     for mission in &missions {
         let text = |column: &str| mission[column].as_str().unwrap().to_owned();
-        let call = sastrugi_in(folder.path(), &["analyze", &format!("release/{}", text("path")), "--json"]);
+        let call = sastrugi_in(folder, &["analyze", &format!("release/{}", text("path")), "--json"]);
         assert_eq!(call.code, 0, "{}", call.stderr);
         let found: Value = serde_json::from_str(&call.stdout).unwrap();
         let log = &found[0]["log"];

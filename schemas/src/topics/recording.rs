@@ -51,14 +51,14 @@ pub struct WheelOutline {
     pub width_m: f64,
 }
 
-/// Pose and motion of base_link.
+/// Pose and motion of base_link, as simulated in steps of 2^-20 m (and of a quaternion's unit) and 2^-16 m/s or rad/s.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StateSample {
     /// Time, s.
     pub time_s: f64,
     /// Position in the map frame, m.
     pub position_m: [f64; 3],
-    /// Orientation quaternion (map from base_link) `[x, y, z, w]`, unit length.
+    /// Orientation quaternion (map from base_link) `[x, y, z, w]`, of unit length to those steps.
     pub orientation: [f64; 4],
     /// Velocity in the map frame, m/s.
     pub velocity_m_s: [f64; 3],

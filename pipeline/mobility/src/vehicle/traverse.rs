@@ -157,6 +157,16 @@ fn empty(vehicle: &Vehicle, parameters: &TraverseParameters) -> Recording {
     }
 }
 
+/// Steps per metre, and per unit of a quaternion, of recorded poses: 1 micrometre. The digits below tell nothing and do not
+/// compress: they were a tenth of every recording. Differentiated twice at 20 Hz they amount to 0.3 mm/s2.
+const POSE_STEPS: f64 = 1_048_576.0;
+/// Steps per m/s and rad/s of recorded motions.
+const MOTION_STEPS: f64 = 65_536.0;
+
+fn in_steps(value: f64, steps: f64) -> f64 {
+    (value * steps).round() / steps
+}
+
 /// A mission under way.
 struct Run<'a> {
     simulation: Simulation<'a>,
@@ -276,10 +286,10 @@ impl<'a> Run<'a> {
         let (position_m, velocity_m_s) = body.base(self.vehicle);
         self.recording.states.push(StateSample {
             time_s,
-            position_m,
-            orientation: body.orientation,
-            velocity_m_s,
-            angular_velocity_rad_s: body.rate,
+            position_m: position_m.map(|v| in_steps(v, POSE_STEPS)),
+            orientation: body.orientation.map(|v| in_steps(v, POSE_STEPS)),
+            velocity_m_s: velocity_m_s.map(|v| in_steps(v, MOTION_STEPS)),
+            angular_velocity_rad_s: body.rate.map(|v| in_steps(v, MOTION_STEPS)),
         });
         self.recording.wheels.push(WheelSample {
             time_s,

@@ -11,8 +11,9 @@ const GAP_INTERVALS: f64 = 5.0;
 const GAP_MIN_S: f64 = 0.25;
 /// Largest deviation of a quaternion's length from 1.
 const LENGTH_TOLERANCE: f64 = 1e-2;
-/// Deviation that is but rounding.
-const ROUNDING: f64 = 1e-12;
+/// Quaternions whose length is off by less are taken as they are, so that a recording in steps of 2^-20 is judged by its own
+/// bits.
+const ROUNDING: f64 = 4e-6;
 /// Intervals count as even when each is within this share of the usual one.
 const EVEN: f64 = 1e-3;
 
@@ -81,7 +82,6 @@ pub(super) fn cleaned(stream: &PoseStream) -> Result<(Vec<TimedPose>, Vec<String
                 let back_s = -step as f64 * 1e-9;
                 return Err(LogError::Backwards { topic: stream.topic.clone(), message: index + 1, back_s });
             }
-            // A unit quaternion keeps its bits.
             _ if (length - 1.0).abs() < ROUNDING => poses.push(*pose),
             _ => poses.push(TimedPose { orientation: pose.orientation.map(|c| c / length), ..*pose }),
         }

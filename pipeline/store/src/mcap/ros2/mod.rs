@@ -130,7 +130,9 @@ fn transforms(
 }
 
 fn odometry(state: &StateSample, log_time: u64) -> Result<Odometry, McapError> {
-    let [x, y, z, w] = state.orientation;
+    // Of unit length to the recording's steps only.
+    let length = state.orientation.iter().map(|c| c * c).sum::<f64>().sqrt();
+    let [x, y, z, w] = state.orientation.map(|c| c / length);
     Ok(Odometry {
         header: header(MAP, log_time)?,
         child_frame_id: BASE.to_owned(),
