@@ -28,7 +28,7 @@ fn val_readers_agree_with_a_release() {
     let call = sastrugi_in(folder.path(), &["run", "study.toml", "-o", "release", "--quiet"]);
     assert_eq!(call.code, 0, "{}", call.stderr);
     let release = folder.path().join("release");
-    for script in ["check_dems.py", "check_tables.py", "check_mcap.py", "check_metadata.py"] {
+    for script in ["check_dems.py", "check_tables.py", "check_mcap.py", "check_metadata.py", "check_rerun.py"] {
         let call = check(&python, script, &[&release]);
         assert_eq!(call.code, 0, "{script}: {}{}", call.stdout, call.stderr);
     }
@@ -42,8 +42,10 @@ fn val_ros_reads_the_bags() {
     write(folder.path(), "study.toml", &small_study().replace("seed = 7\n", "seed = 7\nmcap = \"ros2\"\n"));
     let call = sastrugi_in(folder.path(), &["run", "study.toml", "-o", "release", "--quiet"]);
     assert_eq!(call.code, 0, "{}", call.stderr);
-    let call = check(&python, "check_ros2.py", &[&folder.path().join("release")]);
-    assert_eq!(call.code, 0, "{}{}", call.stdout, call.stderr);
+    for script in ["check_ros2.py", "check_rerun.py"] {
+        let call = check(&python, script, &[&folder.path().join("release")]);
+        assert_eq!(call.code, 0, "{script}: {}{}", call.stdout, call.stderr);
+    }
 }
 
 /// The small study with all that a release can say of itself: version and DOI, terms of its data, a split.

@@ -1,6 +1,6 @@
 //! Topic `/vehicle/state`.
 
-use super::FieldKind::Double;
+use super::FieldKind::{Double, Float};
 use super::{Topic, field};
 
 /// The topic.
@@ -22,5 +22,7 @@ pub const TOPIC: Topic = Topic {
         field("roll_rate_rad_s", Double, "rad/s", "angular velocity about the body's x axis"),
         field("pitch_rate_rad_s", Double, "rad/s", "angular velocity about the body's y axis"),
         field("yaw_rate_rad_s", Double, "rad/s", "angular velocity about the body's z axis"),
+        field("roll_deg", Float, "deg", "roll for plots, in steps of 1/64 degree"),
+        field("pitch_deg", Float, "deg", "pitch for plots (nose down positive), in steps of 1/64 degree"),
     ],
 };

@@ -7,6 +7,6 @@ pub const TOPIC: Topic = Topic {
     name: "/tf",
     schema: "foxglove.FrameTransforms",
     description: "map -> base_link and base_link -> each wheel (where the suspension has it, steered and turned by its angle, in \
-                  steps of 1/16384), at the sampling rate",
+                  steps of 1/4096), at the sampling rate",
     fields: &[],
 };

@@ -13,7 +13,9 @@ use crate::splits::{self, Splits};
 use crate::study::Study;
 use sastrugi_schemas::Record as Row;
 use sastrugi_schemas::manifest::{FailedItem, ItemNote, Origin};
+use sastrugi_schemas::study::McapFlavour;
 use sastrugi_schemas::tables::{ParameterRow, SampleRow};
+use sastrugi_store::mcap::VIEWER_LAYOUT;
 use sastrugi_store::release::{self, Head, Incoming, Release, ReleaseBuilder, ReleaseError};
 use serde_json::Value;
 use std::cmp::Ordering;
@@ -337,7 +339,9 @@ fn add_documents(builder: &mut ReleaseBuilder, contents: &Contents<'_>, sources:
         ("croissant.json", json_text(&documents::croissant(&described))?),
         ("ro-crate-metadata.json", json_text(&documents::ro_crate(&described))?),
     ];
-    for (path, text) in documents {
+    let viewer = head.mcap == McapFlavour::Viewer && artifacts.iter().any(|a| a.path.ends_with(".mcap"));
+    let layout = viewer.then(|| ("mcap/foxglove-layout.json", VIEWER_LAYOUT.to_owned()));
+    for (path, text) in documents.into_iter().chain(layout) {
         builder.write_text(path, &text, Origin::default()).map_err(release_error)?;
     }
     Ok(())

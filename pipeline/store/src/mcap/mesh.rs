@@ -15,8 +15,8 @@ use std::collections::BTreeMap;
 const TILE: usize = 8;
 /// Most leaves along a side before any is split.
 const COARSE_LEAVES: usize = 32;
-/// Heights are stored in steps of 2^-8 m: 2 mm off at most.
-const HEIGHT_STEPS_PER_M: f64 = 256.0;
+/// Heights are stored in steps of 2^-7 m: 4 mm off at most.
+const HEIGHT_STEPS_PER_M: f64 = 128.0;
 /// Least depth of the point that heights count from: a whole byte of a double then holds their place within a metre.
 const DEPTH_M: f64 = 16.0;
 

@@ -29,6 +29,9 @@ use std::io::{self, Cursor};
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
+/// Panels of Foxglove and Lichtblick for recordings of the viewer flavour: a layout file to import.
+pub const VIEWER_LAYOUT: &str = include_str!("viewer-layout.json");
+
 /// Level of Zstandard.
 const ZSTD_LEVEL: u32 = 1;
 /// Uncompressed size of a chunk, bytes.

@@ -211,6 +211,42 @@ fn val_own_messages_are_as_described() {
     }
 }
 
+/// Every topic and field that the layout names is there, and every panel it arranges is described.
+#[test]
+fn val_the_layout_names_what_is_recorded() {
+    let layout: serde_json::Value = serde_json::from_str(VIEWER_LAYOUT).unwrap();
+    let topic = |name: &str| VIEWER.into_iter().find(|t| t.name == name).unwrap_or_else(|| panic!("{name}"));
+    let panels = layout["configById"].as_object().unwrap();
+    for name in panels["3D!terrain"]["topics"].as_object().unwrap().keys() {
+        topic(name);
+    }
+    topic(panels["RosOut!events"]["topicToRender"].as_str().unwrap());
+    for path in panels.values().filter_map(|p| p["paths"].as_array()).flatten() {
+        let (name, field) = path["value"].as_str().unwrap().split_once('.').unwrap();
+        assert!(topic(name).fields.iter().any(|f| f.name == field), "{name} has no {field}");
+    }
+    let arranged = layout["layout"].to_string();
+    assert!(panels.keys().all(|panel| arranged.contains(panel.as_str())), "{arranged}");
+}
+
+/// The angles of a state turn as the tables' do: nose down is a positive pitch, left side up a positive roll.
+#[test]
+fn val_states_tell_roll_and_pitch() {
+    let scene = Scene::new(120, 1);
+    let half = |degrees: f64| libm::sincos(0.5 * degrees.to_radians());
+    for (orientation, roll_deg, pitch_deg) in [
+        ([half(12.0).0, 0.0, 0.0, half(12.0).1], 12.0, 0.0),
+        ([0.0, half(20.0).0, 0.0, half(20.0).1], 0.0, 20.0),
+        ([0.0, half(-30.0).0, 0.0, half(-30.0).1], 0.0, -30.0),
+        ([0.0, 0.0, half(70.0).0, half(70.0).1], 0.0, 0.0),
+    ] {
+        let values = viewer::state_values(&StateSample { orientation, ..scene.recording.states[0] });
+        let angles: Vec<f64> =
+            values[13..].iter().map(|v| if let protobuf::Value::Float(v) = v { *v } else { 99.0 }).collect();
+        assert_eq!(angles, [roll_deg, pitch_deg], "{orientation:?}");
+    }
+}
+
 /// Triangles of all patches by their corners in the map frame.
 fn triangles(patches: &[Patch]) -> Vec<[[f64; 3]; 3]> {
     let corner = |p: &Patch, i: u32| [0, 1, 2].map(|axis| p.origin[axis] + p.points[i as usize][axis]);

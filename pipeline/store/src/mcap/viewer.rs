@@ -1,6 +1,6 @@
 //! Viewer flavour: the topics of `sastrugi_schemas::topics::VIEWER` in protobuf.
 
-use super::frames::{BASE, IDENTITY, MAP, class_rgb, corridor, wheel_rotation};
+use super::frames::{BASE, IDENTITY, MAP, class_rgb, corridor, rotated, wheel_rotation};
 use super::mesh::{self, Patch};
 use super::protobuf::{self, Value};
 use super::{Flavour, McapError, MissionMcap, TerrainView, Timeline};
@@ -31,7 +31,9 @@ const TORQUE: f64 = 64.0;
 /// Forces.
 const COARSE: f64 = 4.0;
 /// Where wheels are drawn: quaternions and hubs in base_link.
-const DRAWN: f64 = 16384.0;
+const DRAWN: f64 = 4096.0;
+/// Angles for plots, in degrees.
+const DEGREES: f64 = 64.0;
 /// Elevation of `/terrain/grid`.
 const ELEVATION: f64 = 256.0;
 
@@ -113,7 +115,15 @@ fn timestamp(log_time: u64) -> Result<Timestamp, McapError> {
 
 pub(super) fn state_values(s: &StateSample) -> Vec<Value> {
     let parts = [&s.position_m[..], &s.orientation, &s.velocity_m_s, &s.angular_velocity_rad_s];
-    parts.concat().into_iter().map(Value::Double).collect()
+    let angles = roll_and_pitch(s.orientation).map(|angle| Value::Float(in_steps(angle.to_degrees(), DEGREES)));
+    parts.concat().into_iter().map(Value::Double).chain(angles).collect()
+}
+
+/// Roll and pitch (nose down positive) in rad, of the order yaw, pitch, roll: viewers do not work them out.
+fn roll_and_pitch(orientation: [f64; 4]) -> [f64; 2] {
+    let up = |axis| rotated(orientation, axis)[2];
+    let roll = libm::atan2(up([0.0, 1.0, 0.0]), up([0.0, 0.0, 1.0]));
+    [roll, libm::asin((-up([1.0, 0.0, 0.0])).clamp(-1.0, 1.0))]
 }
 
 pub(super) fn imu_values(s: &ImuSample) -> Vec<Value> {
