@@ -20,6 +20,8 @@ from ruamel.yaml import YAML
 from common import expect, manifest, run
 
 PARTS = ["train", "validation", "test"]
+# Tables of more files are a set of files only; their hashes are in the manifest.
+DESCRIBED_FILES = 64
 
 
 def plain(value):
@@ -75,10 +77,14 @@ def check_croissant(release):
         parts = [record["splits/name"] for record in dataset.records("splits")]
         expect(sorted(map(plain, parts)) == sorted(PARTS), f"croissant.json: splits {parts}")
     files = {file.content_url: file.sha256 for file in dataset.metadata.file_objects}
-    for part in sorted((release / "tables").glob("*/*.parquet")):
-        path = str(part.relative_to(release))
-        sha256 = hashlib.sha256(part.read_bytes()).hexdigest()
-        expect(files.pop(path, None) == sha256, f"croissant.json: the hash of {path} is wrong or missing")
+    for folder in sorted((release / "tables").iterdir()):
+        parts = sorted(folder.glob("*.parquet"))
+        if len(parts) > DESCRIBED_FILES:
+            continue
+        for part in parts:
+            path = str(part.relative_to(release))
+            sha256 = hashlib.sha256(part.read_bytes()).hexdigest()
+            expect(files.pop(path, None) == sha256, f"croissant.json: the hash of {path} is wrong or missing")
     expect(not files, f"croissant.json names {sorted(files)}")
     return {"records": counts, "warnings": sorted(issues.warnings)}
 

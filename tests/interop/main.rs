@@ -48,6 +48,29 @@ fn val_ros_reads_the_bags() {
     }
 }
 
+/// More terrains than Croissant describes files of one table: `samples` is a set of files, and every record is still found.
+#[test]
+fn val_a_table_of_many_files_is_one_set() {
+    let Some(python) = python() else { return };
+    let folder = area();
+    write(folder.path(), "study.toml", MANY_TERRAINS);
+    let call = sastrugi_in(folder.path(), &["run", "study.toml", "-o", "release", "--quiet"]);
+    assert_eq!(call.code, 0, "{}", call.stderr);
+    let release = folder.path().join("release");
+    assert_eq!(std::fs::read_dir(release.join("tables/samples")).unwrap().count(), 66);
+    let croissant = std::fs::read_to_string(release.join("croissant.json")).unwrap();
+    assert!(!croissant.contains("samples/part-") && croissant.contains("tables/samples/*.parquet"));
+    let call = check(&python, "check_metadata.py", &[&release]);
+    assert_eq!(call.code, 0, "{}{}", call.stdout, call.stderr);
+}
+
+/// Smooth terrains of 13 m, driven for half a second each.
+const MANY_TERRAINS: &str = "[study]\nname = \"many\"\nseed = 7\ndate = \"2026-11-22\"\nlicense = \"CC-BY-4.0\"\n\n\
+    [[terrain]]\nid = \"t\"\nkind = \"weierstrass_mandelbrot\"\ncount = 66\nsize_px = [64, 64]\ncell_m = 0.2\n\
+    fractal_dimension = 2.1\nsampling_length_m = 12.8\nelevation_scale_m = 1e-18\nfrequencies = 64\n\n\
+    [[missions]]\nid = \"m\"\nterrains = [\"t\"]\ncount = 1\nlength_m = 4.0\nborder_m = 1.5\n\n\
+    [[traverse]]\nid = \"h\"\nmissions = \"m\"\ntimeout_s = 0.5\n";
+
 /// The small study with all that a release can say of itself: version and DOI, terms of its data, a split.
 fn described_study() -> String {
     let head = "seed = 7\ntitle = \"Small: \\\"rough\\\" & smooth\"\nversion = \"1.0.0\"\ndoi = \"10.5281/zenodo.1234567\"\n\

@@ -284,6 +284,17 @@ mod tests {
     }
 
     #[test]
+    fn val_a_hundred_thousand_missions_are_planned() {
+        let text = STUDY.replace("count = 2\n", "count = 2500\n").replace("id = \"m\"\n", "id = \"m\"\ncount = 20\n");
+        let loaded = load_text(&text, "study", Path::new("")).unwrap();
+        let nowhere = tempfile::tempdir().unwrap();
+        let summary = plan_of(&loaded, &nowhere.path().join("release"), None).unwrap();
+        // 2500 terrains of each of two cell sizes, in four stages; 20 missions on each.
+        assert_eq!((summary.items, summary.ready, summary.stale.len()), (20_000, 0, 20_000));
+        assert!(summary.stale.iter().all(|item| item.reason == "new"));
+    }
+
+    #[test]
     fn val_the_released_study_points_into_the_release() {
         let folder = tempfile::tempdir().unwrap();
         fs::write(folder.path().join("my dem.TIF"), b"x").unwrap();

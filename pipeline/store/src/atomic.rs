@@ -9,6 +9,10 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// Start of the name of every file under construction; no artifact's name starts with a dot.
 const TEMPORARY_PREFIX: &str = ".sastrugi-partial-";
 
+/// Start of the name of a folder under construction. Who makes it brings its entries to disk, once, before it gets its
+/// name; so its files are not brought there name by name.
+pub const UNFINISHED: &str = "unfinished-";
+
 /// A file under construction. Dropped without [`AtomicFile::commit`], it leaves nothing behind.
 #[derive(Debug)]
 pub struct AtomicFile {
@@ -39,7 +43,8 @@ impl AtomicFile {
         file.sync_all()?;
         drop(file);
         fs::rename(&self.temporary, &self.path)?;
-        sync_folder(folder_of(&self.path))
+        let folder = folder_of(&self.path);
+        if is_unfinished(folder) { Ok(()) } else { sync_folder(folder) }
     }
 
     fn writer(&mut self) -> io::Result<&mut BufWriter<File>> {
@@ -85,6 +90,10 @@ pub fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
 /// The file system refused.
 pub fn sync_folder(folder: &Path) -> io::Result<()> {
     File::open(folder)?.sync_all()
+}
+
+fn is_unfinished(folder: &Path) -> bool {
+    folder.file_name().is_some_and(|name| name.to_string_lossy().starts_with(UNFINISHED))
 }
 
 fn folder_of(path: &Path) -> &Path {

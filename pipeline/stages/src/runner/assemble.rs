@@ -1,6 +1,7 @@
 //! From results to a sealed release: artifacts, tables, documents, report, checksums, one rename.
 //!
-//! Records are read one at a time, in order of their ids, so that memory does not grow with the number of items.
+//! Records are read one at a time, in order of their ids, and tables are written in row groups: of what an item made, only
+//! the manifest's lines on its files stay in memory.
 
 use super::cache::{Record, StoredFile, load_record};
 use super::documents::{self, Described};
@@ -14,11 +15,13 @@ use crate::study::Study;
 use sastrugi_schemas::Record as Row;
 use sastrugi_schemas::manifest::{FailedItem, ItemNote, Origin};
 use sastrugi_schemas::study::McapFlavour;
-use sastrugi_schemas::tables::{ParameterRow, SampleRow};
+use sastrugi_schemas::tables::{
+    HeightDistributionRow, MissionRow, ParameterRow, ProfilePsdRow, PsdRow, ReplicateRow, SampleRow, StructureRow,
+    SurfaceRow,
+};
 use sastrugi_store::mcap::VIEWER_LAYOUT;
 use sastrugi_store::release::{self, Head, Incoming, Release, ReleaseBuilder, ReleaseError};
 use serde_json::Value;
-use std::cmp::Ordering;
 use std::collections::BTreeMap;
 use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
@@ -224,31 +227,36 @@ fn write_parts<R: Row>(
     }
 }
 
-/// The tables that describe surfaces. An item may describe surfaces under ids of their own (`<texture>.residual`), so that
-/// rows are sorted here.
+/// The tables that describe surfaces, all at once, surface by surface. An item may describe surfaces under ids of their own
+/// (`<texture>.residual`), which are looked up first.
 fn add_described(builder: &mut ReleaseBuilder, contents: &Contents<'_>) -> Result<(), Error> {
     let stages = [roughness::STAGE, fit::STAGE, texture::STAGE];
-    let mut all = Rows::default();
+    let mut described: BTreeMap<String, Vec<&PathBuf>> = BTreeMap::new();
     for (_, folder) in contents.results(&stages) {
-        let rows = record(folder)?.rows;
-        all.psd.extend(rows.psd);
-        all.height_distribution.extend(rows.height_distribution);
-        all.surfaces.extend(rows.surfaces);
-        all.structure.extend(rows.structure);
-        all.profile_psd.extend(rows.profile_psd);
+        for surface in record(folder)?.rows.surfaces {
+            described.entry(surface.surface_id).or_default().push(folder);
+        }
     }
-    // Stable: within a surface rows are in order.
-    all.psd.sort_by(|a, b| a.terrain_id.cmp(&b.terrain_id));
-    all.height_distribution.sort_by(|a, b| a.terrain_id.cmp(&b.terrain_id));
-    all.surfaces.sort_by(|a, b| a.surface_id.cmp(&b.surface_id));
-    all.structure.sort_by(|a, b| a.surface_id.cmp(&b.surface_id));
-    all.profile_psd.sort_by(|a, b| a.surface_id.cmp(&b.surface_id));
+    let (mut psd, mut heights) = (builder.table::<PsdRow>("0000"), builder.table::<HeightDistributionRow>("0000"));
+    let (mut surfaces, mut structure) = (builder.table::<SurfaceRow>("0000"), builder.table::<StructureRow>("0000"));
+    let mut profiles = builder.table::<ProfilePsdRow>("0000");
+    for (id, folders) in &described {
+        for folder in folders {
+            let rows = record(folder)?.rows;
+            psd.extend(rows.psd.into_iter().filter(|row| row.terrain_id == *id)).map_err(release_error)?;
+            let of_surface = rows.height_distribution.into_iter().filter(|row| row.terrain_id == *id);
+            heights.extend(of_surface).map_err(release_error)?;
+            surfaces.extend(rows.surfaces.into_iter().filter(|r| r.surface_id == *id)).map_err(release_error)?;
+            structure.extend(rows.structure.into_iter().filter(|r| r.surface_id == *id)).map_err(release_error)?;
+            profiles.extend(rows.profile_psd.into_iter().filter(|r| r.surface_id == *id)).map_err(release_error)?;
+        }
+    }
     let made_by = || made_by(&stages.join("+"));
-    builder.write_table("0000", all.psd, made_by()).map_err(release_error)?;
-    builder.write_table("0000", all.height_distribution, made_by()).map_err(release_error)?;
-    builder.write_table("0000", all.surfaces, made_by()).map_err(release_error)?;
-    builder.write_table("0000", all.structure, made_by()).map_err(release_error)?;
-    builder.write_table("0000", all.profile_psd, made_by()).map_err(release_error)
+    builder.close(psd, made_by()).map_err(release_error)?;
+    builder.close(heights, made_by()).map_err(release_error)?;
+    builder.close(surfaces, made_by()).map_err(release_error)?;
+    builder.close(structure, made_by()).map_err(release_error)?;
+    builder.close(profiles, made_by()).map_err(release_error)
 }
 
 fn made_by(stage: &str) -> Origin {
@@ -274,14 +282,21 @@ fn add_missions(builder: &mut ReleaseBuilder, contents: &Contents<'_>) -> Result
     };
     let parts: Vec<&str> = terrains.keys().copied().collect();
     builder.write_parts(&parts, samples, &made_by(traverse::STAGE)).map_err(|Failed(error)| error)?;
-    add_by_terrain(builder, contents, &terrains, |rows| rows.missions, |a, b| a.mission_id.cmp(&b.mission_id))?;
-    add_by_terrain(
-        builder,
-        contents,
-        &terrains,
-        |rows| rows.replicates,
-        |a, b| (&a.mission_id, a.replicate).cmp(&(&b.mission_id, b.replicate)),
-    )
+    let (mut missions, mut replicates) = (builder.table::<MissionRow>("0000"), builder.table::<ReplicateRow>("0000"));
+    for folders in terrains.values() {
+        let mut rows = Rows::default();
+        for folder in folders {
+            let of_run = rows_of(contents, folder)?;
+            rows.missions.extend(of_run.missions);
+            rows.replicates.extend(of_run.replicates);
+        }
+        rows.missions.sort_by(|a, b| a.mission_id.cmp(&b.mission_id));
+        rows.replicates.sort_by(|a, b| (&a.mission_id, a.replicate).cmp(&(&b.mission_id, b.replicate)));
+        missions.extend(rows.missions).map_err(release_error)?;
+        replicates.extend(rows.replicates).map_err(release_error)?;
+    }
+    builder.close(missions, made_by(traverse::STAGE)).map_err(release_error)?;
+    builder.close(replicates, made_by(traverse::STAGE)).map_err(release_error)
 }
 
 /// `parameters`: every run once, whatever the number of its terrains.
@@ -307,30 +322,9 @@ impl From<ReleaseError> for Failed {
     }
 }
 
-/// One table whose first key is the terrain, its rows taken terrain by terrain and sorted there by the other keys.
-fn add_by_terrain<R: Row>(
-    builder: &mut ReleaseBuilder,
-    contents: &Contents<'_>,
-    terrains: &BTreeMap<&str, Vec<&PathBuf>>,
-    take: impl Fn(Rows) -> Vec<R>,
-    order: impl Fn(&R, &R) -> Ordering,
-) -> Result<(), Error> {
-    let sorted = |folders: &Vec<&PathBuf>| -> Result<Vec<R>, Error> {
-        let mut rows = Vec::new();
-        for folder in folders {
-            rows.extend(take(rows_of(contents, folder)?));
-        }
-        rows.sort_by(&order);
-        Ok(rows)
-    };
-    write_parts(builder, terrains.values().map(sorted), traverse::STAGE)
-}
-
 fn add_documents(builder: &mut ReleaseBuilder, contents: &Contents<'_>, sources: &Sources) -> Result<(), Error> {
-    let mut artifacts = builder.artifacts().to_vec();
-    artifacts.sort_by(|a, b| a.path.cmp(&b.path));
     let (head, failures) = (&contents.study.head, contents.failures);
-    let described = Described { head, sources: &sources.list, artifacts: &artifacts, failures };
+    let described = Described { head, sources: &sources.list, artifacts: builder.artifacts(), failures };
     let documents = [
         ("study.toml", contents.text.to_owned()),
         ("README.md", documents::readme(&described)),
@@ -339,7 +333,7 @@ fn add_documents(builder: &mut ReleaseBuilder, contents: &Contents<'_>, sources:
         ("croissant.json", json_text(&documents::croissant(&described))?),
         ("ro-crate-metadata.json", json_text(&documents::ro_crate(&described))?),
     ];
-    let viewer = head.mcap == McapFlavour::Viewer && artifacts.iter().any(|a| a.path.ends_with(".mcap"));
+    let viewer = head.mcap == McapFlavour::Viewer && described.artifacts.iter().any(|a| a.path.ends_with(".mcap"));
     let layout = viewer.then(|| ("mcap/foxglove-layout.json", VIEWER_LAYOUT.to_owned()));
     for (path, text) in documents.into_iter().chain(layout) {
         builder.write_text(path, &text, Origin::default()).map_err(release_error)?;

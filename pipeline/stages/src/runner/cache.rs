@@ -1,12 +1,14 @@
 //! The work area: finished items by key, each in a folder that appears whole or not at all.
 //!
 //! `items/<stage>/<id>/<key>/` holds an item's files and `record.json`. A job writes into a folder with a name that no
-//! reader takes for a result; every file is flushed as it is written, the record comes last, then one rename makes it a
-//! result.
+//! reader takes for a result; every file is flushed as it is written, the record comes last, then the folder, and one
+//! rename makes it a result.
 
 use super::graph::{Graph, Ingredients};
 use crate::jobs::{ItemRef, Outcome, Product, Rows};
-use sastrugi_store::{atomic, digest};
+use sastrugi_store::atomic::{self, UNFINISHED};
+use sastrugi_store::digest;
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::fs::{self, File, TryLockError};
 use std::io;
@@ -14,7 +16,6 @@ use std::path::{Path, PathBuf};
 
 const RECORD: &str = "record.json";
 const FAILURE: &str = "failure.json";
-const UNFINISHED: &str = "unfinished-";
 
 /// A finished item.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -126,6 +127,17 @@ impl Cache {
         load_record(&self.result_folder(item, key))
     }
 
+    /// True when [`Self::load`] would find a result; its rows are not read.
+    pub fn holds(&self, item: &ItemRef, key: &str) -> bool {
+        let folder = self.result_folder(item, key);
+        read_json(&folder.join(RECORD)).is_some_and(|Files { files }| are_whole(&folder, &files))
+    }
+
+    /// True when the item was tried before, with whatever key.
+    pub fn knows(&self, item: &ItemRef) -> bool {
+        self.item_folder(item).exists()
+    }
+
     /// The ingredients of any earlier result of this item.
     pub fn earlier(&self, item: &ItemRef) -> Option<Ingredients> {
         let mut folders: Vec<PathBuf> =
@@ -136,8 +148,7 @@ impl Cache {
 
     /// Why an item failed when it was last tried with this key.
     pub fn failure(&self, item: &ItemRef, key: &str) -> Option<String> {
-        let text = fs::read(self.item_folder(item).join(FAILURE)).ok()?;
-        let failed: Failed = serde_json::from_slice(&text).ok()?;
+        let failed: Failed = read_json(&self.item_folder(item).join(FAILURE))?;
         (failed.key == key).then_some(failed.message)
     }
 
@@ -179,7 +190,7 @@ impl Cache {
         let item = graph.node(position).item.clone();
         let key = graph.key(position).to_owned();
         let files = outcome.products.into_iter().map(|p| stored(folder, p)).collect::<Result<Vec<_>, _>>()?;
-        let ingredients = graph.ingredients(position).clone();
+        let ingredients = graph.ingredients(position);
         let record = Record { item, key, ingredients, files, rows: outcome.rows, notes: outcome.notes };
         let path = folder.join(RECORD);
         let text = serde_json::to_vec(&record).map_err(|e| io_error("cannot encode", &path)(e.into()))?;
@@ -189,6 +200,7 @@ impl Cache {
             fs::remove_dir_all(&target).map_err(io_error("cannot clear", &target))?;
         }
         let parent = self.item_folder(&record.item);
+        atomic::sync_folder(folder).map_err(io_error("cannot flush", folder))?;
         fs::rename(folder, &target).map_err(io_error("cannot rename to", &target))?;
         atomic::sync_folder(&parent).map_err(io_error("cannot flush", &parent))?;
         Ok(record)
@@ -239,9 +251,24 @@ fn children(folder: &Path) -> Result<Vec<PathBuf>, CacheError> {
 
 /// The record in a result's folder, if it is whole and the files have their lengths.
 pub fn load_record(folder: &Path) -> Option<Record> {
-    let record: Record = serde_json::from_slice(&fs::read(folder.join(RECORD)).ok()?).ok()?;
+    let record: Record = read_json(&folder.join(RECORD))?;
+    are_whole(folder, &record.files).then_some(record)
+}
+
+/// The part of a record that says whether its result is there.
+#[derive(Deserialize)]
+struct Files {
+    files: Vec<StoredFile>,
+}
+
+fn read_json<T: DeserializeOwned>(path: &Path) -> Option<T> {
+    serde_json::from_slice(&fs::read(path).ok()?).ok()
+}
+
+/// True when all files are there with their lengths.
+fn are_whole(folder: &Path, files: &[StoredFile]) -> bool {
     let whole = |f: &StoredFile| fs::metadata(folder.join(&f.product.file)).is_ok_and(|m| m.len() == f.bytes);
-    record.files.iter().all(whole).then_some(record)
+    files.iter().all(whole)
 }
 
 fn stored(folder: &Path, product: Product) -> Result<StoredFile, CacheError> {

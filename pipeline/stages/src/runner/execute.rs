@@ -70,7 +70,7 @@ struct Run<'a> {
 /// A process may be ended at any moment: an item that has not finished leaves no result.
 pub fn execute(graph: &Graph, cache: &Cache, needed: &[usize], limits: Limits, progress: &dyn Progress) -> Execution {
     let (ready, missing): (Vec<usize>, Vec<usize>) =
-        needed.iter().partition(|&&p| cache.load(&graph.node(p).item, graph.key(p)).is_some());
+        needed.iter().partition(|&&p| cache.holds(&graph.node(p).item, graph.key(p)));
     let seconds = missing.iter().map(|&p| graph.node(p).job.estimate().seconds).sum();
     progress.begin(needed.len(), ready.len(), seconds);
     let run = Run {

@@ -45,12 +45,12 @@ pub struct Ingredients {
     pub revision: String,
 }
 
-/// All items of a study, parents before children.
+/// All items of a study, parents before children. Ingredients are made anew when they are asked for: those of many items
+/// would need far more memory than all else that is known of them.
 #[derive(Default)]
 pub struct Graph {
     nodes: Vec<Node>,
     keys: Vec<String>,
-    ingredients: Vec<Ingredients>,
     index: BTreeMap<ItemRef, usize>,
 }
 
@@ -61,18 +61,10 @@ impl Graph {
         if self.index.contains_key(&node.item) {
             return false;
         }
-        let Some(parents) = node.parents.iter().map(|p| self.find(p)).collect::<Option<Vec<usize>>>() else {
+        if !node.parents.iter().all(|parent| self.index.contains_key(parent)) {
             return false;
-        };
-        let ingredients = Ingredients {
-            recipe: node.job.recipe(),
-            stream: node.stream.clone(),
-            inputs: node.inputs.iter().map(|i| i.sha256.clone()).collect(),
-            parents: parents.iter().map(|&p| (self.nodes[p].item.to_string(), self.keys[p].clone())).collect(),
-            revision: revision(node.job.rooms()),
-        };
-        self.keys.push(key(&node.item, &ingredients));
-        self.ingredients.push(ingredients);
+        }
+        self.keys.push(key(&node.item, &self.ingredients_of(&node)));
         self.index.insert(node.item.clone(), self.nodes.len());
         self.nodes.push(node);
         true
@@ -109,8 +101,19 @@ impl Graph {
     }
 
     /// What the key at a position is made of.
-    pub fn ingredients(&self, position: usize) -> &Ingredients {
-        &self.ingredients[position]
+    pub fn ingredients(&self, position: usize) -> Ingredients {
+        self.ingredients_of(&self.nodes[position])
+    }
+
+    fn ingredients_of(&self, node: &Node) -> Ingredients {
+        let parents = node.parents.iter().filter_map(|p| Some((p.to_string(), self.keys[self.find(p)?].clone())));
+        Ingredients {
+            recipe: node.job.recipe(),
+            stream: node.stream.clone(),
+            inputs: node.inputs.iter().map(|i| i.sha256.clone()).collect(),
+            parents: parents.collect(),
+            revision: revision(node.job.rooms()),
+        }
     }
 
     /// Positions of the parents of the item at a position.
@@ -138,9 +141,10 @@ impl Graph {
 }
 
 fn key(item: &ItemRef, ingredients: &Ingredients) -> String {
-    let mut hasher = blake3::Hasher::new_derive_key("sastrugi 2026-11 item keys v1");
+    let mut hasher = blake3::Hasher::new_derive_key("sastrugi 2026-11 item keys v2");
+    let Ingredients { recipe, stream, inputs, parents, revision } = ingredients;
     // Maps keep a fixed order (struct fields, BTreeMap, parameters as the kernels print them), so the text is canonical.
-    let text = serde_json::json!([item, ingredients]).to_string();
-    hasher.update(text.as_bytes());
+    hasher.update(recipe.to_string().as_bytes());
+    hasher.update(serde_json::json!([item, stream, inputs, parents, revision]).to_string().as_bytes());
     hasher.finalize().to_hex()[..32].to_owned()
 }

@@ -34,24 +34,25 @@ pub fn plan(graph: &Graph, cache: &Cache) -> PlanSummary {
     let mut stale = Vec::new();
     for position in 0..graph.len() {
         let node = graph.node(position);
-        if cache.load(&node.item, graph.key(position)).is_some() {
-            continue;
-        }
-        let reason = reason(graph, cache, position);
+        let reason = match cache.knows(&node.item) {
+            true if cache.holds(&node.item, graph.key(position)) => continue,
+            true => reason(graph, cache, position),
+            false => "new".to_owned(),
+        };
         let estimate = node.job.estimate();
         stale.push(Stale { item: node.item.to_string(), reason, seconds: estimate.seconds, bytes: estimate.bytes });
     }
     PlanSummary { items: graph.len(), ready: graph.len() - stale.len(), stale }
 }
 
-/// Why an item has no result.
+/// Why an item that was tried before has no result.
 fn reason(graph: &Graph, cache: &Cache, position: usize) -> String {
     let item = &graph.node(position).item;
     if let Some(message) = cache.failure(item, graph.key(position)) {
         return format!("failed before: {message}");
     }
     match cache.earlier(item) {
-        Some(earlier) => difference(&earlier, graph.ingredients(position)),
+        Some(earlier) => difference(&earlier, &graph.ingredients(position)),
         None => "new".to_owned(),
     }
 }

@@ -202,7 +202,13 @@ fn val_many_rows_stream_through() {
     let mut writer = TableWriter::create(&path, &metadata()).unwrap();
     let count = 2 * ROW_GROUP_ROWS as i64 + 17;
     (0..count).for_each(|bin| writer.push(&psd(bin)).unwrap());
+    // What is not yet in the file is less than a row group, so that memory does not grow with the number of rows.
+    assert!(writer.writer.in_progress_rows() < ROW_GROUP_ROWS);
+    assert_eq!(writer.writer.flushed_row_groups().len(), 2);
     writer.finish().unwrap();
+    let groups = open(&path, &PsdRow::TABLE).unwrap().metadata().row_groups().to_vec();
+    let rows: Vec<i64> = groups.iter().map(|group| group.num_rows()).collect();
+    assert_eq!(rows, [ROW_GROUP_ROWS as i64, ROW_GROUP_ROWS as i64, 17]);
     let mut expected = 0;
     for_each_row(&path, |row: PsdRow| {
         assert_eq!(row, psd(expected));

@@ -2,7 +2,7 @@
 
 use super::{MANIFEST, Release, ReleaseError, SUMS, TABLES, check_path};
 use crate::atomic::sync_folder;
-use crate::digest;
+use crate::digest::{self, Hashed};
 use crate::parquet::{TableMetadata, TableWriter};
 use rayon::prelude::*;
 use sastrugi_schemas::Record;
@@ -11,6 +11,7 @@ use std::collections::BTreeSet;
 use std::ffi::OsString;
 use std::fmt::Write as _;
 use std::fs::{self, File};
+use std::io::{BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 
 /// What a release says of itself.
@@ -40,16 +41,37 @@ impl Head {
     }
 }
 
-/// A release under construction.
+/// A release under construction. What grows with it in memory is the manifest, whose list of files has one line for each.
 #[derive(Debug)]
 pub struct ReleaseBuilder {
     staging: PathBuf,
-    head: Head,
-    artifacts: Vec<Artifact>,
+    metadata: TableMetadata,
+    manifest: Manifest,
     paths: BTreeSet<String>,
-    sources: Vec<Source>,
-    failed: Vec<FailedItem>,
-    notes: Vec<ItemNote>,
+}
+
+/// A file of a table under construction, to be written row by row beside others. It appears with its first row.
+pub struct GrowingTable<R: Record> {
+    path: String,
+    target: PathBuf,
+    metadata: TableMetadata,
+    writer: Option<TableWriter<R>>,
+}
+
+impl<R: Record> GrowingTable<R> {
+    /// Appends rows, each after the one before it in the order of the keys.
+    ///
+    /// # Errors
+    /// The rows are not sorted, or the file cannot be written.
+    pub fn extend(&mut self, rows: impl IntoIterator<Item = R>) -> Result<(), ReleaseError> {
+        for row in rows {
+            if self.writer.is_none() {
+                self.writer = Some(TableWriter::create(&self.target, &self.metadata)?);
+            }
+            self.writer.as_mut().map_or(Ok(()), |writer| writer.push(&row))?;
+        }
+        Ok(())
+    }
 }
 
 /// A file to be copied into a release.
@@ -83,15 +105,22 @@ impl ReleaseBuilder {
     pub(super) fn create(staging: &Path, head: Head) -> Result<Self, ReleaseError> {
         remove_folder(staging)?;
         fs::create_dir_all(staging).map_err(ReleaseError::io(staging))?;
-        Ok(Self {
-            staging: staging.to_owned(),
-            head,
+        let metadata = head.table_metadata();
+        let Head { name, study_sha256, seed, version, license } = head;
+        let manifest = Manifest {
+            program: PROGRAM.to_owned(),
+            version,
+            format: FORMAT,
+            name,
+            study_sha256,
+            seed,
+            license,
             artifacts: vec![],
-            paths: BTreeSet::new(),
             sources: vec![],
             failed: vec![],
             notes: vec![],
-        })
+        };
+        Ok(Self { staging: staging.to_owned(), metadata, manifest, paths: BTreeSet::new() })
     }
 
     /// The folder under construction.
@@ -99,9 +128,10 @@ impl ReleaseBuilder {
         &self.staging
     }
 
-    /// The files listed so far, in no order.
-    pub fn artifacts(&self) -> &[Artifact] {
-        &self.artifacts
+    /// The files listed so far, by path.
+    pub fn artifacts(&mut self) -> &[Artifact] {
+        self.manifest.artifacts.sort_by(|a, b| a.path.cmp(&b.path));
+        &self.manifest.artifacts
     }
 
     /// Copies files into the release, several at a time; returns their SHA-256 in the same order.
@@ -113,7 +143,12 @@ impl ReleaseBuilder {
         let copied: Result<Vec<(u64, String)>, ReleaseError> =
             files.par_iter().zip(&targets).map(|(file, target)| copy(&file.source, target)).collect();
         let list = |(file, (bytes, sha256)): (Incoming, (u64, String))| {
-            self.artifacts.push(Artifact { path: file.path, bytes, sha256: sha256.clone(), origin: file.origin });
+            self.manifest.artifacts.push(Artifact {
+                path: file.path,
+                bytes,
+                sha256: sha256.clone(),
+                origin: file.origin,
+            });
             sha256
         };
         Ok(files.into_iter().zip(copied?).map(list).collect())
@@ -152,19 +187,26 @@ impl ReleaseBuilder {
         rows: impl IntoIterator<Item = R>,
         origin: Origin,
     ) -> Result<(), ReleaseError> {
-        let mut rows = rows.into_iter().peekable();
-        if rows.peek().is_none() {
-            return Ok(());
-        }
-        let path = format!("{TABLES}/{}/part-{part}.parquet", R::TABLE.name);
-        let target = self.target(&path)?;
-        let mut writer = TableWriter::<R>::create(&target, &self.head.table_metadata())?;
-        for row in rows {
-            writer.push(&row)?;
-        }
+        let mut table = self.table(part);
+        table.extend(rows)?;
+        self.close(table, origin)
+    }
+
+    /// A file `part-<part>.parquet` of a table, to be written bit by bit; [`Self::close`] lists it.
+    pub fn table<R: Record>(&self, part: &str) -> GrowingTable<R> {
+        let path = part_path::<R>(part);
+        GrowingTable { target: self.staging.join(&path), path, metadata: self.metadata.clone(), writer: None }
+    }
+
+    /// Completes and lists a table's file, if it has a row.
+    ///
+    /// # Errors
+    /// The file cannot be written, or its path is taken.
+    pub fn close<R: Record>(&mut self, table: GrowingTable<R>, origin: Origin) -> Result<(), ReleaseError> {
+        let Some(writer) = table.writer else { return Ok(()) };
         let summary = writer.finish()?;
         let content_sha256 = Some(summary.content_sha256);
-        self.adopt(&path, Origin { content_sha256, records: Some(summary.rows), ..origin })
+        self.adopt(&table.path, Origin { content_sha256, records: Some(summary.rows), ..origin })
     }
 
     /// Writes one file `part-<part>.parquet` of a table for each part, several at a time; `rows` makes the rows of a part,
@@ -178,45 +220,45 @@ impl ReleaseBuilder {
         rows: impl Fn(&str) -> Result<Vec<R>, E> + Sync,
         origin: &Origin,
     ) -> Result<(), E> {
-        let path = |part: &str| format!("{TABLES}/{}/part-{part}.parquet", R::TABLE.name);
-        let targets = parts.iter().map(|part| self.claim(&path(part))).collect::<Result<Vec<PathBuf>, _>>()?;
-        let metadata = self.head.table_metadata();
+        let targets =
+            parts.iter().map(|part| self.claim(&part_path::<R>(part))).collect::<Result<Vec<PathBuf>, _>>()?;
+        let metadata = &self.metadata;
         let write = |(part, target): (&&str, &PathBuf)| {
             let rows = rows(part)?;
             if rows.is_empty() {
                 return Ok(None);
             }
-            let mut writer = TableWriter::<R>::create(target, &metadata).map_err(ReleaseError::from)?;
+            let mut writer = TableWriter::<R>::create(target, metadata).map_err(ReleaseError::from)?;
             rows.iter().try_for_each(|row| writer.push(row)).map_err(ReleaseError::from)?;
             let summary = writer.finish().map_err(ReleaseError::from)?;
             let (bytes, sha256) = digest::of_file(target).map_err(ReleaseError::io(target))?;
             let content_sha256 = Some(summary.content_sha256);
             let origin = Origin { content_sha256, records: Some(summary.rows), ..origin.clone() };
-            Ok(Some(Artifact { path: path(part), bytes, sha256, origin }))
+            Ok(Some(Artifact { path: part_path::<R>(part), bytes, sha256, origin }))
         };
         let written: Result<Vec<Option<Artifact>>, E> = parts.par_iter().zip(&targets).map(write).collect();
-        self.artifacts.extend(written?.into_iter().flatten());
+        self.manifest.artifacts.extend(written?.into_iter().flatten());
         Ok(())
     }
 
     /// Lists an item that failed.
     pub fn failed(&mut self, item: FailedItem) {
-        self.failed.push(item);
+        self.manifest.failed.push(item);
     }
 
     /// Names the measured data that files come from.
     pub fn name_sources(&mut self, sources: Vec<Source>) {
-        self.sources = sources;
+        self.manifest.sources = sources;
     }
 
     /// Lists a sentence that readers of an item's files must know.
     pub fn note(&mut self, note: ItemNote) {
-        self.notes.push(note);
+        self.manifest.notes.push(note);
     }
 
     fn list(&mut self, artifact: Artifact) {
         self.paths.insert(artifact.path.clone());
-        self.artifacts.push(artifact);
+        self.manifest.artifacts.push(artifact);
     }
 
     /// Where a file goes that is listed later.
@@ -232,32 +274,20 @@ impl ReleaseBuilder {
     /// # Errors
     /// The file system failed.
     pub fn write_draft(&mut self) -> Result<(), ReleaseError> {
-        let json = json_text(&self.manifest())?;
-        let path = self.staging.join(MANIFEST);
-        fs::write(&path, json).map_err(ReleaseError::io(&path))
+        self.write_manifest().map(drop)
     }
 
-    /// The manifest of what is listed, in order.
-    fn manifest(&mut self) -> Manifest {
-        self.artifacts.sort_by(|a, b| a.path.cmp(&b.path));
-        self.failed.sort_by(|a, b| (&a.stage, &a.item).cmp(&(&b.stage, &b.item)));
-        let Head { name, study_sha256, seed, version, license } = self.head.clone();
-        let (artifacts, failed, notes) = (self.artifacts.clone(), self.failed.clone(), self.notes.clone());
-        let sources = self.sources.clone();
-        let program = PROGRAM.to_owned();
-        Manifest {
-            program,
-            version,
-            format: FORMAT,
-            name,
-            study_sha256,
-            seed,
-            license,
-            artifacts,
-            sources,
-            failed,
-            notes,
-        }
+    /// Writes the manifest in order, and gives its SHA-256.
+    fn write_manifest(&mut self) -> Result<String, ReleaseError> {
+        self.manifest.artifacts.sort_by(|a, b| a.path.cmp(&b.path));
+        self.manifest.failed.sort_by(|a, b| (&a.stage, &a.item).cmp(&(&b.stage, &b.item)));
+        let path = self.staging.join(MANIFEST);
+        let file = File::create(&path).map_err(ReleaseError::io(&path))?;
+        let mut writer = BufWriter::new(Hashed::new(file));
+        serde_json::to_writer_pretty(&mut writer, &self.manifest)?;
+        writeln!(writer).map_err(ReleaseError::io(&path))?;
+        let written = writer.into_inner().map_err(|e| ReleaseError::io(&path)(e.into_error()))?;
+        Ok(written.finish().2)
     }
 
     /// Where a file of the release goes; its folder is made.
@@ -280,22 +310,18 @@ impl ReleaseBuilder {
     /// [`ReleaseError::Occupied`] when `dest` holds something that is no release; the file system failed.
     pub fn seal(mut self, dest: &Path) -> Result<Release, ReleaseError> {
         check_dest(dest)?;
-        let manifest = self.manifest();
-        let json = json_text(&manifest)?;
-        let in_staging = |name: &str, text: &str| {
-            let path = self.staging.join(name);
-            fs::write(&path, text).map_err(ReleaseError::io(&path))
-        };
-        in_staging(MANIFEST, &json)?;
-        in_staging(SUMS, &sums(&manifest, &digest::of_text(&json)))?;
+        let sha256 = self.write_manifest()?;
+        let path = self.staging.join(SUMS);
+        fs::write(&path, sums(&self.manifest, &sha256)).map_err(ReleaseError::io(&path))?;
         sync_tree(&self.staging)?;
         put_in_place(&self.staging, dest)?;
-        Ok(Release { folder: dest.to_owned(), manifest })
+        Ok(Release { folder: dest.to_owned(), manifest: self.manifest })
     }
 }
 
-fn json_text(manifest: &Manifest) -> Result<String, ReleaseError> {
-    Ok(serde_json::to_string_pretty(manifest)? + "\n")
+/// Path of a part of a table in a release.
+fn part_path<R: Record>(part: &str) -> String {
+    format!("{TABLES}/{}/part-{part}.parquet", R::TABLE.name)
 }
 
 /// The text of `SHA256SUMS`: every file of the manifest and the manifest itself, by path.

@@ -11,6 +11,9 @@ use serde_json::{Value, json};
 const SPLITS: &str = "splits";
 const SPLIT_COLUMN: &str = "split";
 const PARQUET: &str = "application/x-parquet";
+/// Most files of a table that are described one by one; more are one set, and their hashes are in the manifest alone, so
+/// that this file, which loaders read whole, stays small.
+const DESCRIBED_FILES: usize = 64;
 /// Files beside the tables: name, pattern of their paths, media type, what they are.
 const RASTERS: [(&str, &str, &str, &str); 4] = [
     ("terrain", "terrain/*.tif", "image/tiff", "Generated heightfields, GeoTIFF, float32 metres"),
@@ -56,10 +59,11 @@ fn work(source: &Source) -> Value {
     work
 }
 
-/// Every file of a table with its hash; tables of several files, and rasters, as sets besides.
+/// Every file of a table with its hash, up to [`DESCRIBED_FILES`]; tables of several files, and rasters, as sets besides.
 fn distribution(described: &Described<'_>) -> Vec<Value> {
+    let few = |table: &&&'static Table| described.parts(table.name).count() <= DESCRIBED_FILES;
     let parts = |table: &&'static Table| described.parts(table.name);
-    let mut files: Vec<Value> = tables::ALL.iter().flat_map(parts).map(file_object).collect();
+    let mut files: Vec<Value> = tables::ALL.iter().filter(few).flat_map(parts).map(file_object).collect();
     let several = tables::ALL.iter().filter(|table| described.parts(table.name).count() > 1);
     files.extend(several.map(|table| {
         let includes = format!("tables/{}/*.parquet", table.name);
