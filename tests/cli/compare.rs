@@ -1,8 +1,9 @@
 //! `compare`: answers, exit codes, refusals.
 
-use sastrugi_tests::{area, sastrugi_in, write};
+use sastrugi_tests::{area, called, sastrugi_in, write};
 use serde_json::Value;
 use std::path::Path;
+use std::process::Command;
 
 fn fit_file(folder: &Path, name: &str, sigma_m: f64) {
     let [low, high] = [0.98 * sigma_m, 1.02 * sigma_m];
@@ -85,10 +86,15 @@ fn val_what_cannot_be_compared_is_refused() {
     let path = folder.path();
     fit_file(path, "a.json", 0.1);
     std::fs::create_dir(path.join("release")).unwrap();
-    let cases: [(&[&str], i32, &str); 7] = [
+    let cases: [(&[&str], i32, &str); 12] = [
         (&["compare", "a.json"], 2, "<B>"),
         (&["compare", "a.json", "--split-half"], 2, "takes a DEM"),
-        (&["compare", "release", "a.json"], 2, "not releases"),
+        (&["compare", "release", "a.json"], 2, "with another release"),
+        (&["compare", "release", "release"], 65, "no release"),
+        (&["compare", "release", "missing"], 65, "no release"),
+        (&["compare", "release", "release", "--outer-scale", "2"], 2, "outer_scale_m"),
+        (&["compare", "release", "release", "--margin", "-1"], 2, "margin"),
+        (&["compare", "release", "release", "--window-a", "0,0,1,1"], 2, "as a whole"),
         (&["compare", "a.json", "missing.tif"], 65, "missing.tif"),
         (&["compare", "a.json", "a.json", "--window-a", "0,0,1,1"], 2, "no window"),
         (&["compare", "a.json", "a.json", "--model", "auto"], 2, "one model"),
@@ -99,4 +105,114 @@ fn val_what_cannot_be_compared_is_refused() {
         assert_eq!(call.code, code, "{arguments:?}: {}{}", call.stdout, call.stderr);
         assert!(call.stderr.contains(word), "{arguments:?}: {}", call.stderr);
     }
+}
+
+/// Twelve smooth terrains of 13 m, driven for up to 8 s.
+fn study(seed: u32, elevation_scale_m: &str) -> String {
+    format!(
+        "[study]\nname = \"smooth\"\nseed = {seed}\ndate = \"2026-11-22\"\nlicense = \"CC-BY-4.0\"\n\n[[terrain]]\nid = \"t\"\n\
+         kind = \"weierstrass_mandelbrot\"\ngroup = \"smooth\"\ncount = 12\nsize_px = [64, 64]\ncell_m = 0.2\n\
+         fractal_dimension = 2.1\nsampling_length_m = 12.8\nelevation_scale_m = {elevation_scale_m}\nfrequencies = 64\n\n\
+         [[missions]]\nid = \"m\"\nterrains = [\"t\"]\ncount = 3\nlength_m = 4.0\nborder_m = 1.5\n\n\
+         [[traverse]]\nid = \"h\"\nmissions = \"m\"\ntimeout_s = 8.0\n"
+    )
+}
+
+/// A release of that study.
+fn release(folder: &Path, name: &str, seed: u32, elevation_scale_m: &str) {
+    let file = format!("{name}.toml");
+    write(folder, &file, &study(seed, elevation_scale_m));
+    let call = sastrugi_in(folder, &["run", &file, "-o", name, "--quiet"]);
+    assert_eq!(call.code, 0, "{}", call.stderr);
+}
+
+fn answers(record: &Value) -> Vec<&str> {
+    record["quantities"].as_array().unwrap().iter().map(|q| q["answer"].as_str().unwrap()).collect()
+}
+
+/// A release against itself, against the study with another seed, and against the study on rougher ground.
+///
+/// Null of the second comparison: labels of releases mean nothing, as terrains of both are drawn alike. The permutation tests
+/// are exact and adjusted by Holm over all figures, so that "different" comes up with probability 0.05 at most, once for the
+/// seeds written here. Rougher ground: rms heights in the ratio of 3, which 12 terrains against 12 show for certain.
+#[test]
+fn stat_releases_are_compared_by_terrain() {
+    let folder = area();
+    let path = folder.path();
+    release(path, "one", 1, "1e-18");
+    release(path, "two", 2, "1e-18");
+    release(path, "rough", 1, "1e-17");
+
+    let own = json(path, &["compare", "one", "one", "--fail-on-difference"], 0);
+    assert!(answers(&own).iter().all(|answer| *answer == "same"), "{own}");
+    assert_eq!((&own["what"], &own["same_study_and_version"]), (&"releases".into(), &true.into()));
+    assert_eq!(own["files"]["different"], serde_json::json!([]));
+
+    let seeds = json(path, &["compare", "one", "two", "--fail-on-difference"], 0);
+    assert!(answers(&seeds).iter().all(|answer| *answer != "different"), "{seeds}");
+    assert_eq!(seeds["quantities"][0]["terrains"], serde_json::json!([12, 12]));
+    assert_eq!((&seeds["quantities"][0]["paired"], &seeds["same_study_and_version"]), (&false.into(), &false.into()));
+    // A margin of three standard deviations is met by what is drawn alike.
+    let wide = json(path, &["compare", "one", "two", "--margin", "3", "--fail-on-difference"], 0);
+    assert!(answers(&wide).iter().all(|answer| *answer == "same"), "{wide}");
+
+    let rough = json(path, &["compare", "one", "rough", "--fail-on-difference"], 4);
+    let height = &rough["quantities"].as_array().unwrap().iter().find(|q| q["figure"] == "rms_height_m").unwrap();
+    // Same random draws, so that terrains are pairs.
+    assert_eq!((&height["answer"], &height["paired"]), (&"different".into(), &true.into()));
+    assert!(height["difference"].as_f64().unwrap() > 0.0 && height["p_adjusted"].as_f64().unwrap() <= 0.05);
+    json(path, &["compare", "one", "rough"], 0);
+    let threads = json(path, &["compare", "one", "rough", "--threads", "1"], 0);
+    assert_eq!(threads["quantities"], rough["quantities"]);
+
+    let text = sastrugi_in(path, &["compare", "one", "rough"]).stdout;
+    for word in ["12 pairs", "rms_height_m", "that differ", "different studies", "different:"] {
+        assert!(text.contains(word), "{word} is not in {text}");
+    }
+}
+
+/// Other bytes with the same heights are packaging; releases of other versions are compared by their figures only.
+#[test]
+fn val_packaging_and_versions_of_releases() {
+    let folder = area();
+    let path = folder.path();
+    release(path, "one", 1, "1e-18");
+    release(path, "again", 1, "1e-18");
+    json(path, &["compare", "one", "again", "--fail-on-difference"], 0);
+
+    let file = "again/terrain/t-0001.tif";
+    let call = sastrugi_in(path, &["convert", file, "plain.tif", "--compress", "none", "--quiet"]);
+    assert_eq!(call.code, 0, "{}", call.stderr);
+    std::fs::rename(path.join("plain.tif"), path.join(file)).unwrap();
+    let sum = called(Command::new("sha256sum").arg(path.join(file))).stdout;
+    let sha256 = sum.split(' ').next().unwrap();
+    edit_manifest(&path.join("again"), |manifest| {
+        let artifacts = manifest["artifacts"].as_array_mut().unwrap();
+        let terrain = artifacts.iter_mut().find(|a| a["path"] == "terrain/t-0001.tif").unwrap();
+        terrain["sha256"] = sha256.into();
+    });
+    let packed = json(path, &["compare", "one", "again", "--fail-on-difference"], 4);
+    assert_eq!(packed["files"]["packaging"], serde_json::json!(["terrain/t-0001.tif"]));
+    assert_eq!((&packed["files"]["different"], &packed["answer"]), (&serde_json::json!([]), &"same".into()));
+
+    edit_manifest(&path.join("again"), |manifest| manifest["version"] = "0.0.9".into());
+    let versions = json(path, &["compare", "one", "again", "--fail-on-difference"], 0);
+    assert!(
+        versions["files"].is_null() && versions["notes"][0].as_str().unwrap().contains("not comparable byte by byte")
+    );
+
+    edit_manifest(&path.join("again"), |manifest| {
+        manifest["version"] = packed["releases"][0]["version"].clone();
+        let artifacts = manifest["artifacts"].as_array_mut().unwrap();
+        artifacts.retain(|a| a["path"] != "LICENSE" && a["path"] != "terrain/t-0001.tif");
+    });
+    let missing = json(path, &["compare", "one", "again", "--fail-on-difference"], 4);
+    assert_eq!(missing["files"]["only_a"], serde_json::json!(["LICENSE", "terrain/t-0001.tif"]));
+}
+
+fn edit_manifest(release: &Path, edit: impl FnOnce(&mut Value)) {
+    let path = release.join("manifest.json");
+    let mut manifest: Value = serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
+    edit(&mut manifest);
+    std::fs::write(&path, manifest.to_string()).unwrap();
 }

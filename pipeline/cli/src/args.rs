@@ -94,8 +94,12 @@ pub enum Verb {
         after_help = "A damaged release is not packed: exit code 4.\n\nExample:\n  sastrugi pack release -o release.tar"
     )]
     Pack(Pack),
-    /// Say whether two DEMs or two fits are statistically the same, or a texture like its site.
-    #[command(after_help = "Answers per quantity: same (within the bounds), different, cannot tell.\n\nExamples:\n  \
+    /// Say whether two releases, two DEMs or two fits are statistically the same, or a texture like its site.
+    #[command(after_help = "Answers per quantity: same (within the bounds), different, cannot tell.\n\n\
+        Two releases: files by their hashes, then the figures of the tables missions and terrains, group by group, with\n\
+        terrains as the units. `--fail-on-difference` ends with exit code 4 when a figure is different, or, for releases of\n\
+        the same study by the same version, when a file is missing or any byte differs.\n\nExamples:\n  \
+        sastrugi compare release other-release --margin 0.25\n  \
         sastrugi compare site.tif synthetic.tif --outer-scale 2\n  \
         sastrugi compare site.json synthetic.json --equivalence-sigma 0.05 --fail-on-difference")]
     Compare(Compare),
@@ -474,17 +478,20 @@ pub struct Pack {
 /// `compare`.
 #[derive(Debug, Args)]
 pub struct Compare {
-    /// DEM or fit file.
+    /// Release, DEM or fit file.
     pub a: PathBuf,
-    /// DEM or fit file.
+    /// Release, DEM or fit file.
     #[arg(required_unless_present = "split_half")]
     pub b: Option<PathBuf>,
     /// Fit one half of A, and compare textures of that fit with the other half, on what was not fitted.
     #[arg(long, conflicts_with_all = ["b", "window_b"])]
     pub split_half: bool,
-    /// End with exit code 4 when any quantity is different.
+    /// End with exit code 4 when any quantity is different (releases of one study and version: any byte).
     #[arg(long)]
     pub fail_on_difference: bool,
+    /// Releases: difference of means that counts as the same, in standard deviations between terrains (0.5).
+    #[arg(long, value_name = "SHARE", allow_negative_numbers = true)]
+    pub margin: Option<f64>,
     /// Window of the moving average that separates background from texture, m.
     #[arg(long, value_name = "M", allow_negative_numbers = true)]
     pub outer_scale: Option<f64>,
@@ -506,7 +513,7 @@ pub struct Compare {
     /// Simulated surfaces of each DEM (199).
     #[arg(long, value_name = "N")]
     pub simulations: Option<u32>,
-    /// Seed of the simulations' random streams.
+    /// Seed of the random streams of simulations and permutations.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
     /// Part of A, x0,y0,x1,y1 in its own coordinates.

@@ -112,10 +112,8 @@ fn not_circular(side: &Side<'_>, fit: &FitFile) -> Result<(), Error> {
 fn read(side: &Side<'_>, request: &Request<'_>) -> Result<Read, Error> {
     let name = side.path.display();
     if side.path.is_dir() {
-        let message = format!(
-            "{name} is a folder: two DEMs, two fit files, or one of each can be compared, not releases; compare the DEMs \
-             and fits inside of them"
-        );
+        let message =
+            format!("{name} is a folder: a release is compared with another release, not with a DEM or a fit");
         return Err(Error::Usage(message));
     }
     let is_fit = side.path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));

@@ -1,10 +1,11 @@
-//! Verbs that work on single files: the same kernels as in a study, without a study.
+//! Verbs that work on single files: the same kernels as in a study, without a study; and on two releases side by side.
 
 pub mod analyze;
 pub mod compare;
 pub mod fit;
 pub mod parameters;
 mod reading;
+pub mod releases;
 pub mod roughness;
 pub mod terrain;
 pub mod texture;
