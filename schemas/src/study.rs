@@ -36,12 +36,18 @@ pub struct StudyHead {
     /// People or groups that made the study.
     #[serde(default)]
     pub creators: Vec<String>,
+    /// Those of the creators that are no people.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub organizations: Vec<String>,
     /// Start of every mission's clock in MCAP files, ns since 1970-01-01 UTC.
     #[serde(default = "default_epoch_ns")]
     pub epoch_ns: u64,
     /// Flavour of the MCAP files.
     #[serde(default)]
     pub mcap: McapFlavour,
+    /// Layout of the GeoTIFFs in `terrain/`, `texture/` and `dem/`.
+    #[serde(default)]
+    pub geotiff: GeoTiff,
     /// Whether groups share their random draws.
     #[serde(default)]
     pub pairing: Pairing,
@@ -68,6 +74,17 @@ pub enum McapFlavour {
     Viewer,
     /// ROS 2: CDR, one bag per mission.
     Ros2,
+}
+
+/// Layout of a GeoTIFF. The heights are the same.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum GeoTiff {
+    /// Tiles, without overviews.
+    #[default]
+    Plain,
+    /// With overviews, laid out so that a part can be read over a network (cloud-optimised GeoTIFF).
+    Cog,
 }
 
 /// Whether terrains of different groups share their random draws.

@@ -36,7 +36,8 @@ fn val_a_licence_that_the_data_does_not_permit_is_refused() {
 #[test]
 fn val_what_the_data_asks_for_goes_with_everything_made_from_it() {
     let folder = area();
-    let head = "version = \"2.1\"\ndoi = \"10.5281/zenodo.1234567\"\nurl = \"https://example.org/rough\"\ncreators = [\"A. Person\"]\n";
+    let head = "version = \"2.1\"\ndoi = \"10.5281/zenodo.1234567\"\nurl = \"https://example.org/rough\"\ncreators = [\"A. Person\", \"A group\"]\n\
+        organizations = [\"A group\"]\n";
     let dem =
         "license = \"Terms of the agency\"\nattribution = \"The agency\"\ncitation = \"Agency (2000), Heights\"\n";
     write(folder.path(), "study.toml", &study(head, dem));
@@ -50,6 +51,14 @@ fn val_what_the_data_asks_for_goes_with_everything_made_from_it() {
             assert!(text.contains(words), "{name} does not name {words}:\n{text}");
         }
     }
+    let json = |name: &str| -> Value { serde_json::from_str(&read(&release, name)).unwrap() };
+    let croissant = json("croissant.json");
+    let kinds: Vec<&str> =
+        croissant["creator"].as_array().unwrap().iter().filter_map(|c| c["@type"].as_str()).collect();
+    assert_eq!(kinds, ["sc:Person", "sc:Organization"]);
+    let crate_graph = json("ro-crate-metadata.json")["@graph"].clone();
+    let group = crate_graph.as_array().unwrap().iter().find(|entity| entity["name"] == "A group").unwrap();
+    assert_eq!(group["@type"], "Organization");
     let citation = read(&release, "CITATION.cff");
     for line in ["version: \"2.1\"", "doi: \"10.5281/zenodo.1234567\"", "url: \"https://example.org/rough\""] {
         assert!(citation.contains(line), "{citation}");

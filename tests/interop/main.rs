@@ -48,6 +48,38 @@ fn val_ros_reads_the_bags() {
     }
 }
 
+/// `--cog` and `geotiff = "cog"`: valid for rio-cogeo, and the heights of the plain file.
+#[test]
+fn val_cloud_optimised_files_are_valid() {
+    let Some(python) = python() else { return };
+    let folder = area();
+    let path = folder.path();
+    let fixture = sastrugi_fixtures::workspace_root().join("fixtures/dem/jacksboro.tif");
+    let fixture = fixture.to_str().unwrap();
+    for (name, more) in [("plain.tif", None), ("cog.tif", Some("--cog")), ("again.tif", Some("--cog"))] {
+        let arguments = ["convert", fixture, name, "--quiet"].into_iter().chain(more).collect::<Vec<_>>();
+        let call = sastrugi_in(path, &arguments);
+        assert_eq!(call.code, 0, "{}", call.stderr);
+    }
+    assert_eq!(std::fs::read(path.join("cog.tif")).unwrap(), std::fs::read(path.join("again.tif")).unwrap());
+    for (name, how) in [("plain", "plain"), ("cog", "cog")] {
+        let study = LARGE_TERRAIN.replace("HOW", how);
+        write(path, "study.toml", &study);
+        let call = sastrugi_in(path, &["run", "study.toml", "-o", name, "--quiet"]);
+        assert_eq!(call.code, 0, "{}", call.stderr);
+    }
+    let files = ["cog.tif", "plain.tif", "cog/terrain/t.tif", "plain/terrain/t.tif"].map(|name| path.join(name));
+    let call = check(&python, "check_cog.py", &files.each_ref().map(PathBuf::as_path));
+    assert_eq!(call.code, 0, "{}{}", call.stdout, call.stderr);
+    let call = sastrugi_in(path, &["compare", "plain", "cog", "--json", "--quiet"]);
+    let compared: Value = serde_json::from_str(&call.stdout).unwrap();
+    assert_eq!((&compared["answer"], &compared["files"]["packaging"][0]), (&"same".into(), &"terrain/t.tif".into()));
+}
+
+/// A terrain of more than two tiles a side.
+const LARGE_TERRAIN: &str = "[study]\nname = \"large\"\nseed = 7\ndate = \"2026-11-22\"\ngeotiff = \"HOW\"\n\n\
+    [[terrain]]\nid = \"t\"\nkind = \"weierstrass_mandelbrot\"\nsize_px = [600, 531]\ncell_m = 0.2\nfrequencies = 64\n";
+
 /// More terrains than Croissant describes files of one table: `samples` is a set of files, and every record is still found.
 #[test]
 fn val_a_table_of_many_files_is_one_set() {
@@ -74,7 +106,7 @@ const MANY_TERRAINS: &str = "[study]\nname = \"many\"\nseed = 7\ndate = \"2026-1
 /// The small study with all that a release can say of itself: version and DOI, terms of its data, a split.
 fn described_study() -> String {
     let head = "seed = 7\ntitle = \"Small: \\\"rough\\\" & smooth\"\nversion = \"1.0.0\"\ndoi = \"10.5281/zenodo.1234567\"\n\
-        creators = [\"A. Person\", \"A group\"]\nsplit = [0.4, 0.3, 0.3]\n";
+        creators = [\"A. Person\", \"A group\"]\norganizations = [\"A group\"]\nsplit = [0.4, 0.3, 0.3]\n";
     let dem =
         "id = \"site\"\nlicense = \"public domain\"\nattribution = \"NASA and USGS\"\ncitation = \"SRTM (2000)\"\n";
     let study = small_study().replace("seed = 7\n", head).replace("id = \"site\"\n", dem);

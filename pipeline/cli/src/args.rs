@@ -225,9 +225,9 @@ pub struct Terrain {
     /// DEM to write; the ending gives the format.
     #[arg(short, long, value_name = "DEM")]
     pub output: PathBuf,
-    /// Compression of a GeoTIFF.
-    #[arg(long, value_enum, default_value_t)]
-    pub compress: Compress,
+    /// How the DEM is written.
+    #[command(flatten)]
+    pub writing: Writing,
 }
 
 /// How a DEM is read.
@@ -362,9 +362,9 @@ pub struct Texture {
     /// DEM to write.
     #[arg(short, long, value_name = "DEM")]
     pub output: PathBuf,
-    /// Compression of a GeoTIFF.
-    #[arg(long, value_enum, default_value_t)]
-    pub compress: Compress,
+    /// How the DEM is written.
+    #[command(flatten)]
+    pub writing: Writing,
 }
 
 /// `roughness`.
@@ -530,6 +530,17 @@ pub struct Compare {
     pub set: Vec<String>,
 }
 
+/// How a DEM is written.
+#[derive(Debug, Args)]
+pub struct Writing {
+    /// Compression of a GeoTIFF.
+    #[arg(long, value_enum, default_value_t)]
+    pub compress: Compress,
+    /// A cloud-optimised GeoTIFF: with overviews, laid out so that a part can be read over a network.
+    #[arg(long)]
+    pub cog: bool,
+}
+
 /// `convert`.
 #[derive(Debug, Args)]
 pub struct Convert {
@@ -546,9 +557,9 @@ pub struct Convert {
     /// How the DEM is read.
     #[command(flatten)]
     pub reading: Reading,
-    /// Compression of a GeoTIFF.
-    #[arg(long, value_enum, default_value_t)]
-    pub compress: Compress,
+    /// How the DEM is written.
+    #[command(flatten)]
+    pub writing: Writing,
 }
 
 /// `info`.

@@ -27,10 +27,11 @@ pub fn convert(args: &Convert, common: &Common) -> Verdict {
         let message = format!("{path}: the ending names no DEM format; .tif, .asc, .hgt, .png, .npy and .obj do");
         return Err(Failure::usage(message));
     }
+    let options = options(&args.writing, &args.output)?;
     let window = args.window.as_deref().map(|w| numbers::<4>("--window", w)).transpose()?;
     let reading = Reading { window, masks: args.masks.all(), ..reading(&args.reading)? };
     let Read { dem: Dem { grid, info }, notes, .. } = read_as_it_is(&args.input, &reading)?;
-    let lost = dem::write(&args.output, &grid, &info.crs, &options(args.compress)).map_err(failure)?;
+    let lost = dem::write(&args.output, &grid, &info.crs, &options).map_err(failure)?;
     let notes: Vec<&String> = notes.iter().chain(&lost).collect();
     let mut text = format!("{}: {} x {} cells", args.output.display(), grid.rows(), grid.cols());
     notes.iter().for_each(|note| text.push_str(&format!("\n  note: {note}")));

@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 
 /// `terrain`.
 pub fn terrain(args: &Terrain, common: &Common) -> Verdict {
-    let options = options(args.compress);
+    let options = options(&args.writing, &args.output)?;
     let request =
         verbs::terrain::Request { spec: &args.spec, set: &args.set, seed: args.seed, output: &args.output, options };
     made(common, &verbs::terrain::terrain(&request)?)
@@ -42,7 +42,7 @@ pub fn texture(args: &Texture, common: &Common) -> Verdict {
         amplitude: args.amplitude.as_deref(),
         fill: args.fill.as_deref(),
         output: &args.output,
-        options: options(args.compress),
+        options: options(&args.writing, &args.output)?,
     };
     made(common, &verbs::texture::texture(&request)?)
 }

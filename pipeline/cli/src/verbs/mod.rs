@@ -8,12 +8,13 @@ mod lists;
 mod study;
 
 use crate::Verdict;
-use crate::args::{self, Arguments, Compress, Verb};
+use crate::args::{self, Arguments, Compress, Verb, Writing};
 use crate::failure::Failure;
 use sastrugi_stages::verbs::{Reading, numbers};
 use sastrugi_store::atomic;
-use sastrugi_store::dem::{Compression, WriteOptions};
+use sastrugi_store::dem::{Compression, Format, WriteOptions};
 use sastrugi_store::points::GridSettings;
+use std::path::Path;
 
 /// Does what was asked.
 pub fn dispatch(arguments: &Arguments) -> Verdict {
@@ -47,14 +48,17 @@ pub fn start_threads(threads: Option<u16>) -> Result<(), Failure> {
     rayon::ThreadPoolBuilder::new().num_threads(threads).build_global().map_err(Failure::failed)
 }
 
-/// How DEMs are written.
-fn options(compress: Compress) -> WriteOptions {
-    let compression = match compress {
+/// How a DEM is written to `output`.
+fn options(writing: &Writing, output: &Path) -> Result<WriteOptions, Failure> {
+    if writing.cog && Format::of_name(output) != Some(Format::GeoTiff) {
+        return Err(Failure::usage(format!("{}: --cog takes a GeoTIFF (.tif)", output.display())));
+    }
+    let compression = match writing.compress {
         Compress::None => Compression::None,
         Compress::Deflate => Compression::Deflate,
         Compress::Zstd => Compression::Zstd,
     };
-    WriteOptions { compression }
+    Ok(WriteOptions { compression, cloud_optimised: writing.cog })
 }
 
 /// How a DEM is read.

@@ -1,13 +1,13 @@
 //! Stage `dem`: a measured DEM into metres, window applied.
 
 use super::original::{self, Original};
-use super::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work};
+use super::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work, raster_options};
 use crate::registry::{BuildError, Builder, Heightfield, InputPlace};
 use crate::revision::Room;
 use crate::runner::graph::Node;
 use crate::study::terms::{self, Objection};
 use sastrugi_numeric::{Geometry, Grid, resample};
-use sastrugi_schemas::study::DemItem;
+use sastrugi_schemas::study::{DemItem, GeoTiff};
 use sastrugi_store::dem::{self, Claimed, Crs, Dem, ReadOptions};
 use sastrugi_store::points::GridSettings;
 use sastrugi_store::{atomic, digest};
@@ -87,6 +87,7 @@ struct DemJob {
     release_path: String,
     bytes: u64,
     claimed: Claimed,
+    geotiff: GeoTiff,
 }
 
 /// Adds the items of `[[dem]]`.
@@ -124,7 +125,8 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
         };
         let (bytes, release_path, inputs) = (original.bytes(), original.release_path().to_owned(), original.inputs());
         let original = original.node(original::STAGE, &id);
-        let job = DemJob { item, original: original.item.clone(), release_path, bytes, claimed };
+        let geotiff = builder.study.head.geotiff;
+        let job = DemJob { item, original: original.item.clone(), release_path, bytes, claimed, geotiff };
         let parents = vec![original.item.clone()];
         let node = Node { item: field.item.clone(), parents, inputs, stream: None, job: Box::new(job) };
         builder.node(&entry, original)?;
@@ -176,7 +178,9 @@ fn recipe(item: &DemItem) -> Value {
 
 impl Job for DemJob {
     fn recipe(&self) -> Value {
-        recipe(&self.item)
+        let mut recipe = recipe(&self.item);
+        recipe["geotiff"] = json!(self.geotiff);
+        recipe
     }
 
     fn rooms(&self) -> &'static [Room] {
@@ -200,7 +204,7 @@ impl Job for DemJob {
         let name_it =
             |e: JobError| JobError { message: e.message.replace(&copy.display().to_string(), &self.release_path), ..e };
         let Imported { metric, place, notes } = import(&copy, &self.item).map_err(name_it)?;
-        dem::write(&work.output(HEIGHTS), &metric.grid, &metric.info.crs, &Default::default())
+        dem::write(&work.output(HEIGHTS), &metric.grid, &metric.info.crs, &raster_options(self.geotiff))
             .map_err(JobError::new)?;
         let content = digest::heights(&metric.grid);
         let path = format!("dem/{}.metric.tif", self.item.id);

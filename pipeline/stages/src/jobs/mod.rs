@@ -13,11 +13,13 @@ pub mod texture;
 pub mod traverse;
 
 use crate::revision::Room;
+use sastrugi_schemas::study::GeoTiff;
 use sastrugi_schemas::tables::{
     CandidateCurveRow, CandidateRow, CovarianceRow, FitRow, HeightDistributionRow, LikelihoodProfileRow, MissionRow,
     ParameterRow, ProfilePsdRow, PsdRow, ReplicateRow, ScoreCovarianceRow, ScoreRow, StructureRow, SurfaceRow,
     TerrainRow,
 };
+use sastrugi_store::dem::WriteOptions;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -61,6 +63,11 @@ pub trait Job: Send + Sync {
     /// # Errors
     /// Why this item has no result; the other items go on.
     fn run(&self, work: &Work<'_>) -> Result<Outcome, JobError>;
+}
+
+/// How the heights of a release are written.
+fn raster_options(geotiff: GeoTiff) -> WriteOptions {
+    WriteOptions { cloud_optimised: geotiff == GeoTiff::Cog, ..WriteOptions::default() }
 }
 
 /// Rough cost of an item on one core.

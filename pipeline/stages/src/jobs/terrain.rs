@@ -1,14 +1,14 @@
 //! Stage `terrain`: one generated heightfield.
 
 use super::dem::HEIGHTS;
-use super::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work};
+use super::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work, raster_options};
 use crate::registry::{BuildError, Builder, Heightfield};
 use crate::revision::Room;
 use crate::runner::graph::Node;
 use crate::study::Entry;
 use crate::study::entry::Expanded;
 use sastrugi_numeric::{Grid, Streams};
-use sastrugi_schemas::study::TerrainItem;
+use sastrugi_schemas::study::{GeoTiff, TerrainItem};
 use sastrugi_store::dem::{self, Crs};
 use sastrugi_store::digest;
 use sastrugi_terrain::Generator;
@@ -23,6 +23,7 @@ struct TerrainJob {
     generator: Box<dyn Generator>,
     streams: Streams,
     png16: bool,
+    geotiff: GeoTiff,
 }
 
 /// Adds the items of `[[terrain]]`.
@@ -56,7 +57,8 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
                 cell_m: Some(generator.geometry().cell.into_iter().fold(f64::INFINITY, f64::min)),
                 geometry: Some(generator.geometry()),
             };
-            let job = TerrainJob { id: one.id.clone(), generator, streams, png16: item.png16 };
+            let geotiff = builder.study.head.geotiff;
+            let job = TerrainJob { id: one.id.clone(), generator, streams, png16: item.png16, geotiff };
             let node = Node {
                 item: field.item.clone(),
                 parents: Vec::new(),
@@ -94,7 +96,7 @@ fn name_families(
 
 impl Job for TerrainJob {
     fn recipe(&self) -> Value {
-        json!({ "kind": self.generator.kind(), "params": self.generator.parameters(), "png16": self.png16 })
+        json!({ "kind": self.generator.kind(), "params": self.generator.parameters(), "png16": self.png16, "geotiff": self.geotiff })
     }
 
     fn rooms(&self) -> &'static [Room] {
@@ -112,7 +114,8 @@ impl Job for TerrainJob {
 
     fn run(&self, work: &Work<'_>) -> Result<Outcome, JobError> {
         let heights = generate(self.generator.as_ref(), &self.streams)?;
-        dem::write(&work.output(HEIGHTS), &heights, &Crs::default(), &Default::default()).map_err(JobError::new)?;
+        dem::write(&work.output(HEIGHTS), &heights, &Crs::default(), &raster_options(self.geotiff))
+            .map_err(JobError::new)?;
         let id = &self.id;
         let content = digest::heights(&heights);
         let mut products = vec![Product::released(HEIGHTS, format!("terrain/{id}.tif"), Some(content))];

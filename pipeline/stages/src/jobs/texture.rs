@@ -3,7 +3,7 @@
 use super::dem::{HEIGHTS, input_error};
 use super::scoreboard::{self, Entrant, ScoreboardJob};
 use super::surface::{Surface, describe_residual};
-use super::{Estimate, ItemRef, Job, JobError, Outcome, Product, Rows, Work, fit};
+use super::{Estimate, ItemRef, Job, JobError, Outcome, Product, Rows, Work, fit, raster_options};
 use crate::registry::{BuildError, Builder, Heightfield, unknown_id};
 use crate::revision::Room;
 use crate::runner::graph::Node;
@@ -11,7 +11,7 @@ use crate::study::{Entry, StudyError};
 use sastrugi_numeric::{Grid, Streams};
 use sastrugi_schemas::Kind;
 use sastrugi_schemas::fit::FitFile;
-use sastrugi_schemas::study::{FitReference, Methods, Modulate, TextureItem};
+use sastrugi_schemas::study::{FitReference, GeoTiff, Methods, Modulate, TextureItem};
 use sastrugi_store::dem::{self, Crs};
 use sastrugi_store::digest;
 use sastrugi_texture::covariance::Covariance;
@@ -104,6 +104,7 @@ struct TextureJob {
     /// Cells of the heightfield that is written.
     cells: u64,
     streams: Streams,
+    geotiff: GeoTiff,
 }
 
 /// Adds the items of `[[texture]]`.
@@ -178,6 +179,7 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
                     one_of_many,
                     cells,
                     streams,
+                    geotiff: builder.study.head.geotiff,
                 };
                 let stream = field.stream.clone();
                 let node = Node { item: field.item.clone(), parents, inputs: Vec::new(), stream, job: Box::new(job) };
@@ -342,6 +344,7 @@ impl Job for TextureJob {
             "params": self.draft.parameters(),
             "fit": self.matched.describe(),
             "onto": base,
+            "geotiff": self.geotiff,
         });
         match &self.modulation {
             None => {}
@@ -441,7 +444,7 @@ impl TextureJob {
         rows: Rows,
         notes: Vec<String>,
     ) -> Result<Outcome, JobError> {
-        dem::write(&work.output(HEIGHTS), heights, crs, &Default::default()).map_err(JobError::new)?;
+        dem::write(&work.output(HEIGHTS), heights, crs, &raster_options(self.geotiff)).map_err(JobError::new)?;
         let content = digest::heights(heights);
         let products = vec![Product::released(HEIGHTS, format!("texture/{}.tif", self.id), Some(content))];
         Ok(Outcome { products, rows, notes })

@@ -89,6 +89,7 @@ fn read_head(root: &Map<String, Value>, text: &StudyText) -> Result<StudyHead, S
         check_url(head.url.as_deref()),
         check_doi(head.doi.as_deref()),
         check_split(head.split.as_ref()),
+        check_organizations(&head),
     ];
     checks.into_iter().collect::<Result<Vec<()>, _>>().map_err(|e| section_error(text, "study", e))?;
     Ok(head)
@@ -221,6 +222,15 @@ fn check_url(url: Option<&str>) -> Result<(), ParameterError> {
 }
 
 /// DOIs are `10.`, four to nine digits, `/`, and a suffix (the pattern of the Citation File Format).
+fn check_organizations(head: &StudyHead) -> Result<(), ParameterError> {
+    match head.organizations.iter().find(|name| !head.creators.contains(name)) {
+        Some(name) => {
+            Err(ParameterError::new("organizations", format!("names \"{name}\", which is not in `creators`")))
+        }
+        None => Ok(()),
+    }
+}
+
 fn check_doi(doi: Option<&str>) -> Result<(), ParameterError> {
     let right = |doi: &str| {
         let (registrant, suffix) = doi.strip_prefix("10.")?.split_once('/')?;
@@ -283,6 +293,7 @@ mod tests {
         for doi in ["https://doi.org/10.5281/zenodo.1", "10.5281", "10.52/a", "10.5281/a b", "10.5281/"] {
             at(&format!("{HEAD}doi = \"{doi}\"\n"), "plain DOI", &format!("\"{doi}\""));
         }
+        at(&format!("{HEAD}creators = [\"a\"]\norganizations = [\"b\"]\n"), "not in `creators`", "[\"b\"]");
         at(&format!("{HEAD}[roughness]\nlow_max = 2.0\n"), "above low_max", "[roughness]");
         at(&format!("{HEAD}[[terain]]\nid = \"a\"\n"), "unknown section `terain`", "terain");
         at(&format!("{HEAD}[extra]\n"), "unknown section", "extra");

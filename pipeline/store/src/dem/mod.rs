@@ -364,6 +364,8 @@ pub enum Compression {
 pub struct WriteOptions {
     /// Compression of a GeoTIFF; other formats have one way.
     pub compression: Compression,
+    /// A GeoTIFF with overviews, laid out so that a part can be read over a network (COG).
+    pub cloud_optimised: bool,
 }
 
 /// Writes heights in the format of the name's ending: `.tif` (float32, tiles of 256, no data -9999, PixelIsArea),
@@ -375,7 +377,7 @@ pub struct WriteOptions {
 pub fn write(path: &Path, grid: &Grid, crs: &Crs, options: &WriteOptions) -> Result<Vec<String>, DemError> {
     let unfit = |reason: Refusal| DemError::Unfit { path: path.to_owned(), reason: reason.0 };
     let (bytes, notes) = match Format::of_name(path) {
-        Some(Format::GeoTiff) => (tiff_writer::heights(grid, crs, options.compression).map_err(unfit)?, vec![]),
+        Some(Format::GeoTiff) => (tiff_writer::heights(grid, crs, options).map_err(unfit)?, vec![]),
         Some(Format::EsriAscii) => (ascii::render(grid).map_err(unfit)?, lost_crs(crs)),
         Some(Format::Hgt) => hgt::render(path, grid, crs).map_err(unfit)?,
         Some(Format::Npy) => (npy::render(grid), vec!["a .npy file keeps no cell size, place or CRS".to_owned()]),

@@ -86,7 +86,7 @@ fn prop_every_format_returns_what_it_was_given() {
     let grid = hilly(300, 270);
     for (name, options) in [
         ("a.tif", WriteOptions::default()),
-        ("b.tif", WriteOptions { compression: Compression::None }),
+        ("b.tif", WriteOptions { compression: Compression::None, ..WriteOptions::default() }),
         ("c.asc", WriteOptions::default()),
         ("d.npy", WriteOptions::default()),
     ] {
@@ -99,6 +99,34 @@ fn prop_every_format_returns_what_it_was_given() {
         }
         assert!(same(&back, &grid), "{name}: {:?} {:?}", back.geometry, grid.geometry);
         assert_eq!(crate::digest::heights(&back), crate::digest::heights(&grid));
+    }
+}
+
+/// The heights of a cloud-optimised file are those of a plain one; overviews follow, each the mean of the finite cells.
+#[test]
+fn val_overviews_are_means_of_finite_cells() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.tif");
+    let grid = hilly(600, 530);
+    let options = WriteOptions { cloud_optimised: true, ..WriteOptions::default() };
+    write(&path, &grid, &Crs::wgs84(), &options).unwrap();
+    assert!(same(&read(&path).unwrap().grid, &grid));
+    let file = geotiff_reader::GeoTiffFile::open(&path).unwrap();
+    assert_eq!(file.overview_count(), 2);
+    let mut level = grid.as_stored();
+    for number in 0..2 {
+        let overview: Vec<f32> = file.read_overview(number).unwrap().iter().copied().collect();
+        let (rows, cols) = (level.rows().div_ceil(2), level.cols().div_ceil(2));
+        let mean = |at: usize| {
+            let (row, col) = (2 * (at / cols), 2 * (at % cols));
+            let cells = [(row, col), (row, col + 1), (row + 1, col), (row + 1, col + 1)];
+            let inside = cells.into_iter().filter(|(r, c)| *r < level.rows() && *c < level.cols());
+            let finite: Vec<f64> = inside.map(|(r, c)| level.at(r, c)).filter(|v| v.is_finite()).collect();
+            (finite.iter().sum::<f64>() / finite.len() as f64) as f32
+        };
+        let expected: Vec<f32> = (0..rows * cols).map(mean).collect();
+        assert_eq!(overview, expected);
+        level = Grid::new(Geometry::square(rows, cols, 1.0), expected.into_iter().map(f64::from).collect());
     }
 }
 
@@ -115,7 +143,7 @@ fn samples() -> Vec<(&'static str, Vec<u8>)> {
         ("e.png", Compression::None),
     ] {
         let path = folder.path().join(name);
-        write(&path, &grid, &Crs::wgs84(), &WriteOptions { compression }).unwrap();
+        write(&path, &grid, &Crs::wgs84(), &WriteOptions { compression, ..WriteOptions::default() }).unwrap();
         samples.push((name, std::fs::read(path).unwrap()));
     }
     samples
@@ -224,7 +252,7 @@ fn val_what_a_format_cannot_hold_is_not_written() {
 /// Bytes of a deflated GeoTIFF: a change of backend (by another crate's features, say) must not pass unnoticed.
 #[test]
 fn gold_bytes_of_a_geotiff() {
-    let bytes = tiff_writer::heights(&hilly(300, 270), &Crs::wgs84(), Compression::Deflate).unwrap();
+    let bytes = tiff_writer::heights(&hilly(300, 270), &Crs::wgs84(), &WriteOptions::default()).unwrap();
     assert_eq!(crate::digest::of_bytes(&bytes), GOLD_GEOTIFF);
 }
 const GOLD_GEOTIFF: &str = "d7d725120c8b5f26bf817ad08e6cd612d8b2e5da3c6189f6540f42e6500ac24c";
@@ -307,7 +335,7 @@ fn val_rows_of_written_rasters() {
     let grid = hilly(600, 270);
     for compression in [Compression::None, Compression::Deflate, Compression::Zstd] {
         let path = folder.path().join("a.tif");
-        write(&path, &grid, &Crs::wgs84(), &WriteOptions { compression }).unwrap();
+        write(&path, &grid, &Crs::wgs84(), &WriteOptions { compression, ..WriteOptions::default() }).unwrap();
         blocks_agree(&path);
         assert_eq!(open(&path, &ReadOptions::default()).unwrap().block_rows(), 256);
     }

@@ -1,12 +1,15 @@
 //! GeoTIFF as releases hold it: one band, little-endian, tiles of 256 x 256, directory first, PixelIsArea.
 //!
+//! A cloud-optimised one holds overviews as well, each cell the mean of up to 2 x 2 finite ones of the level before, down to
+//! one tile: directories first, from the largest level to the smallest, then tiles, those of the smallest level first.
+//!
 //! A writer of our own, because what is needed is small and its bytes must follow from the grid alone: no clock, no
 //! host, no CPU. Deflate runs in `flate2`; whichever pure-Rust backend it is built with chooses its output without
 //! regard to the CPU (vector code there compares and sums, with the same result), and a golden hash in the tests holds
 //! the bytes. Predictor 3 is that of Adobe Photoshop TIFF Technical Note 3 (2005).
 
 use super::crs::{Crs, GeoKey, RASTER_TYPE};
-use super::{Compression, NO_DATA, Refusal, free_of_no_data_value};
+use super::{Compression, NO_DATA, Refusal, WriteOptions, free_of_no_data_value};
 use flate2::write::ZlibEncoder;
 use rayon::prelude::*;
 use sastrugi_numeric::{Geometry, Grid};
@@ -14,6 +17,12 @@ use sastrugi_schemas::RoughnessClass;
 use std::io::Write;
 
 const TILE: usize = 256;
+/// Bytes before the first directory.
+const HEADER: usize = 8;
+/// What an image of the file is: the raster itself, or one of its overviews.
+const SUBFILE: u16 = 254;
+const WHOLE: u32 = 0;
+const REDUCED: u32 = 1;
 /// Level of deflate: the usual compromise.
 const LEVEL: u32 = 6;
 const COMPRESSION_NONE: u16 = 1;
@@ -32,14 +41,13 @@ const UNIT_METRE: &str =
     "<GDALMetadata>\n  <Item name=\"UNITTYPE\" sample=\"0\" role=\"unittype\">m</Item>\n</GDALMetadata>\n";
 
 /// Heights as float32.
-pub(super) fn heights(grid: &Grid, crs: &Crs, compression: Compression) -> Result<Vec<u8>, Refusal> {
+pub(super) fn heights(grid: &Grid, crs: &Crs, options: &WriteOptions) -> Result<Vec<u8>, Refusal> {
+    let compression = options.compression;
     let rounded = grid.as_stored();
     free_of_no_data_value(&rounded)?;
-    let stored: Vec<f32> = rounded.values.iter().map(|&v| if v.is_nan() { NO_DATA } else { v } as f32).collect();
-    if let Some(at) = stored.iter().position(|v| v.is_infinite()) {
+    if let Some(at) = rounded.values.iter().position(|v| v.is_infinite()) {
         return Err(Refusal::new(format!("the height {} m does not fit in single precision", grid.values[at])));
     }
-    let stored = Grid::new(grid.geometry, stored);
     let encode = |tile: Vec<f32>| match compression {
         Compression::None => Ok(tile.iter().flat_map(|v| v.to_le_bytes()).collect()),
         Compression::Deflate => deflated(&float_predicted(&tile)),
@@ -50,15 +58,48 @@ pub(super) fn heights(grid: &Grid, crs: &Crs, compression: Compression) -> Resul
         Compression::Deflate => (COMPRESSION_DEFLATE, PREDICTOR_FLOAT),
         Compression::Zstd => (COMPRESSION_ZSTD, PREDICTOR_FLOAT),
     };
-    let mut tags = sample_tags(code, predictor, 32, SAMPLE_FLOAT);
-    tags.push(Tag::ascii(42112, UNIT_METRE));
-    file(tags, &stored, crs, NO_DATA as f32, encode)
+    let tags =
+        |subfile| [sample_tags(code, predictor, 32, SAMPLE_FLOAT), vec![Tag::long(SUBFILE, &[subfile])]].concat();
+    let image = |subfile, level: &Grid| image(tags(subfile), &single_precision(level), NO_DATA as f32, encode);
+    let mut whole = image(WHOLE, &rounded)?;
+    whole.tags.push(Tag::ascii(42112, UNIT_METRE));
+    whole.tags.extend(georeference(&grid.geometry, crs)?);
+    let levels = if options.cloud_optimised { overviews(&rounded) } else { vec![] };
+    let reduced = levels.iter().map(|level| image(REDUCED, level));
+    assemble(std::iter::once(Ok(whole)).chain(reduced).collect::<Result<_, _>>()?)
+}
+
+fn single_precision(grid: &Grid) -> Grid<f32> {
+    let stored = |v: &f64| if v.is_nan() { NO_DATA } else { *v } as f32;
+    Grid::new(grid.geometry, grid.values.iter().map(stored).collect())
+}
+
+/// Levels after the whole one, down to one tile.
+fn overviews(grid: &Grid) -> Vec<Grid> {
+    let half = |level: &Grid| (level.rows().max(level.cols()) > TILE).then(|| halved(level).as_stored());
+    std::iter::successors(half(grid), half).collect()
+}
+
+/// The level after: half as many cells, each the mean of the finite ones among 2 x 2.
+fn halved(grid: &Grid) -> Grid {
+    let g = grid.geometry;
+    let geometry = Geometry { rows: g.rows.div_ceil(2), cols: g.cols.div_ceil(2), cell: g.cell.map(|c| 2.0 * c), ..g };
+    let mean = |at: usize| {
+        let (row, col) = (2 * (at / geometry.cols), 2 * (at % geometry.cols));
+        let beside = (row..(row + 2).min(g.rows)).flat_map(|r| (col..(col + 2).min(g.cols)).map(move |c| (r, c)));
+        let finite: Vec<f64> = beside.map(|(r, c)| grid.values[r * g.cols + c]).filter(|v| v.is_finite()).collect();
+        finite.iter().sum::<f64>() / finite.len() as f64
+    };
+    Grid::new(geometry, (0..geometry.rows * geometry.cols).map(mean).collect())
 }
 
 /// Classes as 8-bit codes.
 pub(super) fn classes(grid: &Grid<u8>, crs: &Crs) -> Result<Vec<u8>, Refusal> {
-    let tags = sample_tags(COMPRESSION_DEFLATE, PREDICTOR_NONE, 8, SAMPLE_UNSIGNED);
-    file(tags, grid, crs, RoughnessClass::NO_DATA, |tile| deflated(&tile))
+    let mut tags = sample_tags(COMPRESSION_DEFLATE, PREDICTOR_NONE, 8, SAMPLE_UNSIGNED);
+    tags.push(Tag::long(SUBFILE, &[WHOLE]));
+    let mut whole = image(tags, grid, RoughnessClass::NO_DATA, |tile| deflated(&tile))?;
+    whole.tags.extend(georeference(&grid.geometry, crs)?);
+    assemble(vec![whole])
 }
 
 fn sample_tags(compression: u16, predictor: u16, bits: u16, format: u16) -> Vec<Tag> {
@@ -70,20 +111,24 @@ fn sample_tags(compression: u16, predictor: u16, bits: u16, format: u16) -> Vec<
     ]
 }
 
-/// A file from the tags that describe samples, and the samples.
-fn file<T: Copy + Send + Sync + std::fmt::Display>(
+/// One level of a file: its directory and its tiles.
+struct Image {
+    tags: Vec<Tag>,
+    tiles: Vec<Vec<u8>>,
+}
+
+/// A level from the tags that describe samples, and the samples.
+fn image<T: Copy + Send + Sync + std::fmt::Display>(
     mut tags: Vec<Tag>,
     grid: &Grid<T>,
-    crs: &Crs,
     no_data: T,
     encode: impl Fn(Vec<T>) -> Result<Vec<u8>, Refusal> + Sync,
-) -> Result<Vec<u8>, Refusal> {
+) -> Result<Image, Refusal> {
     let g = &grid.geometry;
     let (down, across) = (g.rows.div_ceil(TILE), g.cols.div_ceil(TILE));
     let tile = |n: usize| encode(cut(grid, n / across, n % across, no_data));
     let tiles = (0..down * across).into_par_iter().map(tile).collect::<Result<Vec<_>, _>>()?;
     tags.extend([
-        Tag::long(254, &[0]),
         Tag::long(256, &[to_u32(g.cols)?]),
         Tag::long(257, &[to_u32(g.rows)?]),
         Tag::short(262, &[1]),
@@ -93,9 +138,7 @@ fn file<T: Copy + Send + Sync + std::fmt::Display>(
         Tag::short(323, &[TILE as u16]),
         Tag::ascii(42113, &no_data.to_string()),
     ]);
-    tags.extend(place_tags(g));
-    tags.extend(key_tags(crs)?);
-    assemble(tags, &tiles)
+    Ok(Image { tags, tiles })
 }
 
 fn to_u32(n: usize) -> Result<u32, Refusal> {
@@ -137,6 +180,11 @@ fn deflated(bytes: &[u8]) -> Result<Vec<u8>, Refusal> {
 /// One frame, one thread: the same bytes everywhere.
 fn zstandard(bytes: &[u8]) -> Result<Vec<u8>, Refusal> {
     zstd::bulk::compress(bytes, ZSTD_LEVEL).map_err(|e| Refusal::new(format!("zstd failed: {e}")))
+}
+
+/// Place and coordinates of the whole level.
+fn georeference(g: &Geometry, crs: &Crs) -> Result<Vec<Tag>, Refusal> {
+    Ok(place_tags(g).into_iter().chain(key_tags(crs)?).collect())
 }
 
 fn place_tags(g: &Geometry) -> [Tag; 2] {
@@ -183,6 +231,7 @@ fn key_tags(crs: &Crs) -> Result<Vec<Tag>, Refusal> {
 }
 
 /// One entry of the directory.
+#[derive(Clone)]
 struct Tag {
     id: u16,
     kind: u16,
@@ -211,47 +260,75 @@ impl Tag {
     }
 }
 
-/// Header, directory, values of the directory, tiles.
-fn assemble(mut tags: Vec<Tag>, tiles: &[Vec<u8>]) -> Result<Vec<u8>, Refusal> {
+/// Header; directory and its values, image by image; tiles, those of the last image first.
+fn assemble(mut images: Vec<Image>) -> Result<Vec<u8>, Refusal> {
     const OFFSETS: u16 = 324;
-    let sizes = tiles.iter().map(|t| to_u32(t.len())).collect::<Result<Vec<_>, _>>()?;
-    tags.push(Tag::long(OFFSETS, &vec![0; tiles.len()]));
-    tags.push(Tag::long(325, &sizes));
-    tags.sort_by_key(|tag| tag.id);
-    let values_at = 8 + 2 + 12 * tags.len() + 4;
-    let tiles_at = values_at + tags.iter().map(Tag::outside).sum::<usize>();
-    let total = tiles_at + tiles.iter().map(|t| t.len().next_multiple_of(2)).sum::<usize>();
+    for Image { tags, tiles } in &mut images {
+        let sizes = tiles.iter().map(|t| to_u32(t.len())).collect::<Result<Vec<_>, _>>()?;
+        tags.push(Tag::long(OFFSETS, &vec![0; tiles.len()]));
+        tags.push(Tag::long(325, &sizes));
+        tags.sort_by_key(|tag| tag.id);
+    }
+    let padded = |tile: &Vec<u8>| tile.len().next_multiple_of(2);
+    let tiles_at = HEADER + images.iter().map(Image::directory).sum::<usize>();
+    let total = tiles_at + images.iter().flat_map(|image| &image.tiles).map(padded).sum::<usize>();
     to_u32(total)?;
-    let starts = tiles.iter().scan(tiles_at as u32, |at, tile| {
-        let start = *at;
-        *at += tile.len().next_multiple_of(2) as u32;
-        Some(start)
-    });
-    let offsets = Tag::long(OFFSETS, &starts.collect::<Vec<_>>());
-    if let Some(tag) = tags.iter_mut().find(|tag| tag.id == OFFSETS) {
-        *tag = offsets;
+    let mut at = tiles_at;
+    for Image { tags, tiles } in images.iter_mut().rev() {
+        let starts = tiles.iter().map(|tile| {
+            let start = at as u32;
+            at += padded(tile);
+            start
+        });
+        let offsets = Tag::long(OFFSETS, &starts.collect::<Vec<_>>());
+        tags.iter_mut().filter(|tag| tag.id == OFFSETS).for_each(|tag| *tag = offsets.clone());
     }
 
     let mut out = Vec::with_capacity(total);
-    out.extend(b"II\x2a\0\x08\0\0\0");
-    out.extend((tags.len() as u16).to_le_bytes());
-    let mut at = values_at;
-    for tag in &tags {
-        out.extend(tag.id.to_le_bytes());
-        out.extend(tag.kind.to_le_bytes());
-        out.extend((tag.count as u32).to_le_bytes());
-        if tag.outside() > 0 {
-            out.extend((at as u32).to_le_bytes());
-            at += tag.outside();
-        } else {
-            out.extend(&tag.bytes);
-            out.extend(&[0; 4][tag.bytes.len()..]);
-        }
+    out.extend(b"II\x2a\0");
+    out.extend((HEADER as u32).to_le_bytes());
+    for (number, image) in images.iter().enumerate() {
+        let next = if number + 1 < images.len() { out.len() + image.directory() } else { 0 };
+        image.write_directory(&mut out, next);
     }
-    out.extend([0; 4]);
-    for bytes in tags.iter().filter(|t| t.outside() > 0).map(|t| &t.bytes).chain(tiles) {
-        out.extend(bytes);
+    for tile in images.iter().rev().flat_map(|image| &image.tiles) {
+        out.extend(tile);
         out.resize(out.len().next_multiple_of(2), 0);
     }
     Ok(out)
+}
+
+impl Image {
+    /// Bytes of the entries, their number and the place of the next directory.
+    fn entries(&self) -> usize {
+        2 + 12 * self.tags.len() + 4
+    }
+
+    /// Bytes of the directory with its values.
+    fn directory(&self) -> usize {
+        self.entries() + self.tags.iter().map(Tag::outside).sum::<usize>()
+    }
+
+    /// Appends the directory; `next` is the place of the next one, 0 for none.
+    fn write_directory(&self, out: &mut Vec<u8>, next: usize) {
+        let mut at = out.len() + self.entries();
+        out.extend((self.tags.len() as u16).to_le_bytes());
+        for tag in &self.tags {
+            out.extend(tag.id.to_le_bytes());
+            out.extend(tag.kind.to_le_bytes());
+            out.extend((tag.count as u32).to_le_bytes());
+            if tag.outside() > 0 {
+                out.extend((at as u32).to_le_bytes());
+                at += tag.outside();
+            } else {
+                out.extend(&tag.bytes);
+                out.extend(&[0; 4][tag.bytes.len()..]);
+            }
+        }
+        out.extend((next as u32).to_le_bytes());
+        for bytes in self.tags.iter().filter(|t| t.outside() > 0).map(|t| &t.bytes) {
+            out.extend(bytes);
+            out.resize(out.len().next_multiple_of(2), 0);
+        }
+    }
 }

@@ -19,7 +19,7 @@ const RASTERS: [(&str, &str, &str, &str); 4] = [
     ("terrain", "terrain/*.tif", "image/tiff", "Generated heightfields, GeoTIFF, float32 metres"),
     ("texture", "texture/*.tif", "image/tiff", "Synthesised textures, GeoTIFF, float32 metres"),
     ("dem", "dem/*.metric.tif", "image/tiff", "Measured heights in metres, GeoTIFF"),
-    ("mcap", "mcap/*.mcap", "application/octet-stream", "Recordings of the missions, MCAP"),
+    ("mcap", "mcap/**/*.mcap", "application/octet-stream", "Recordings of the missions, MCAP"),
 ];
 
 /// The text of `croissant.json`.
@@ -36,7 +36,7 @@ pub fn croissant(described: &Described<'_>) -> Value {
         "name": head.title,
         "description": if head.description.is_empty() { &head.title } else { &head.description },
         "license": address_of_license(&head.license),
-        "creator": described.creators().map(|name| json!({ "@type": "sc:Person", "name": name })).collect::<Vec<_>>(),
+        "creator": described.creators().map(creator).collect::<Vec<_>>(),
         "datePublished": head.date,
         "citeAs": citation_line(head),
         "url": page(head).unwrap_or_else(|| "./".to_owned()),
@@ -50,6 +50,10 @@ pub fn croissant(described: &Described<'_>) -> Value {
         dataset["isBasedOn"] = described.sources.iter().map(work).collect();
     }
     dataset
+}
+
+fn creator((name, kind): (&str, &str)) -> Value {
+    json!({ "@type": format!("sc:{kind}"), "name": name })
 }
 
 /// Measured data as a work of its own.

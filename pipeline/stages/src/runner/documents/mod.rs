@@ -49,10 +49,11 @@ impl<'a> Described<'a> {
         self.artifacts.iter().filter(move |artifact| artifact.path.starts_with(&folder))
     }
 
-    /// Who made the release.
-    fn creators(&self) -> impl Iterator<Item = &'a str> {
-        let names = self.head.creators.iter().map(String::as_str);
-        names.chain(self.head.creators.is_empty().then_some("unnamed"))
+    /// Who made the release: names, and their types in the words of schema.org.
+    fn creators(&self) -> impl Iterator<Item = (&'a str, &'static str)> {
+        let head = self.head;
+        let names = head.creators.iter().map(String::as_str).chain(head.creators.is_empty().then_some("unnamed"));
+        names.map(|name| (name, if head.organizations.iter().any(|o| o == name) { "Organization" } else { "Person" }))
     }
 
     /// Tables that have a file.
@@ -209,7 +210,7 @@ pub fn citation(described: &Described<'_>) -> String {
     line("url", head.url.as_deref());
     line("license", is_spdx_identifier(&head.license).then_some(head.license.as_str()));
     text.push_str("authors:\n");
-    for author in described.creators() {
+    for (author, _) in described.creators() {
         let _ = writeln!(text, "  - name: {}", quoted(author));
     }
     if !sources.is_empty() {

@@ -33,7 +33,9 @@ pub fn ro_crate(described: &Described<'_>) -> Value {
     graph.push(json!({ "@id": PROFILE, "@type": "CreativeWork", "name": "Process Run Crate", "version": "0.5" }));
     graph.push(program());
     graph.extend(license(&described.head.license));
-    graph.extend(described.creators().map(|name| json!({ "@id": person(name), "@type": "Person", "name": name })));
+    graph.extend(
+        described.creators().map(|(name, kind)| json!({ "@id": creator_id(name), "@type": kind, "name": name })),
+    );
     graph.extend(described.sources.iter().map(work));
     graph.extend(stages.actions());
     // Words of schema.org that came after the crate's context was frozen.
@@ -59,7 +61,7 @@ fn root(described: &Described<'_>, parts: &[Value], stages: &Stages) -> Value {
         "description": if head.description.is_empty() { &head.title } else { &head.description },
         "datePublished": head.date,
         "license": { "@id": license_id(&head.license) },
-        "author": described.creators().map(|name| json!({ "@id": person(name) })).collect::<Vec<_>>(),
+        "author": described.creators().map(|(name, _)| json!({ "@id": creator_id(name) })).collect::<Vec<_>>(),
         "creditText": citation_line(head),
         "conformsTo": { "@id": PROFILE },
         "hasPart": parts.iter().map(|part| json!({ "@id": part["@id"] })).collect::<Vec<_>>(),
@@ -104,8 +106,8 @@ fn program() -> Value {
     })
 }
 
-fn person(name: &str) -> String {
-    format!("#person-{}", word(name))
+fn creator_id(name: &str) -> String {
+    format!("#creator-{}", word(name))
 }
 
 fn source_id(source: &Source) -> String {
