@@ -73,7 +73,8 @@ fn val_cloud_optimised_files_are_valid() {
     assert_eq!(call.code, 0, "{}{}", call.stdout, call.stderr);
     let call = sastrugi_in(path, &["compare", "plain", "cog", "--json", "--quiet"]);
     let compared: Value = serde_json::from_str(&call.stdout).unwrap();
-    assert_eq!((&compared["answer"], &compared["files"]["packaging"][0]), (&"same".into(), &"terrain/t.tif".into()));
+    assert_eq!(compared["answer"], "same");
+    assert!(compared["files"]["packaging"].as_array().unwrap().contains(&"terrain/t.tif".into()), "{compared}");
 }
 
 /// A terrain of more than two tiles a side.
