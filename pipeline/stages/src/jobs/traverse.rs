@@ -27,6 +27,7 @@ use sastrugi_store::{dem, digest};
 use serde_json::{Map, Value, json};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// Name of the stage.
 pub const STAGE: &str = "traverse";
@@ -62,7 +63,6 @@ fn split(params: &Value) -> Result<(ReplicateParameters, TraverseParameters), Pa
 }
 
 /// What is driven: the same on every terrain.
-#[derive(Clone)]
 struct Drive {
     /// Id; missions are recorded as `<id>-0001`.
     id: String,
@@ -81,7 +81,8 @@ struct Drive {
 }
 
 struct TraverseJob {
-    drive: Drive,
+    /// The same on every terrain, of which there may be many.
+    drive: Arc<Drive>,
     terrain: String,
     group: Option<String>,
     variant: Option<String>,
@@ -128,7 +129,7 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
                 return Err(entry.refuse(ParameterError::new("goal_tolerance_m", message)).into());
             }
             let starts = ReplicateSettings::new(starts, drawn.length_m).map_err(|e| entry.refuse(e))?;
-            let drive = Drive {
+            let drive = Arc::new(Drive {
                 id: one.id,
                 variant: one.sweep,
                 vehicle,
@@ -138,7 +139,7 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
                 head: builder.study.head.clone(),
                 count: drawn.count,
                 seconds_each: (drawn.length_m / raw.speed_m_s).min(raw.timeout_s),
-            };
+            });
             drawn.lines.iter().try_for_each(|lines| add_one(builder, &entry, &envelope.id, &drive, lines))?;
         }
     }
@@ -162,7 +163,7 @@ fn add_one(
     builder: &mut Builder<'_>,
     entry: &Entry<'_>,
     traverse: &str,
-    drive: &Drive,
+    drive: &Arc<Drive>,
     lines: &Lines,
 ) -> Result<(), StudyError> {
     let terrain = lines.heightfield.clone();
@@ -174,7 +175,7 @@ fn add_one(
     let parents = own.into_iter().chain(drive.rasters.iter().flatten().cloned()).collect();
     let item = ItemRef::new(STAGE, &format!("{}@{terrain}", drive.id));
     let job = TraverseJob {
-        drive: drive.clone(),
+        drive: Arc::clone(drive),
         group: field.group.clone(),
         variant: joined(field.variant.as_deref(), drive.variant.as_deref()),
         lines: lines.clone(),
@@ -359,7 +360,7 @@ impl TraverseJob {
             value: number.value,
             source: number.source,
         };
-        let Drive { vehicle, settings, starts, rasters, .. } = &self.drive;
+        let Drive { vehicle, settings, starts, rasters, .. } = &*self.drive;
         let rasters = json!({ "wheel_friction_raster": rasters[0], "rolling_resistance_raster": rasters[1] });
         let more = json!({ "starts": starts, "surface": rasters, "missions": self.lines.settings });
         numbers(vehicle, settings).into_iter().chain(stated("", &more)).map(row).collect()
@@ -419,7 +420,7 @@ impl Job for TraverseJob {
     fn memory_bytes(&self) -> u64 {
         // Heights, ground with its bound, classes and rasters once; samples of every mission, some 1000 bytes each with their
         // wheels; rows of the starts.
-        let Drive { count, seconds_each, starts, settings, .. } = &self.drive;
+        let Drive { count, seconds_each, starts, settings, .. } = &*self.drive;
         let rows = (count * starts.count()) as u64;
         let samples = *count as f64 * seconds_each * f64::from(settings.parameters().sample_rate_hz);
         ((64 << 20) + 48 * self.cells).saturating_add((1000.0 * samples) as u64).saturating_add(400 * rows)

@@ -1,7 +1,7 @@
 //! `compare` for two releases: which files differ, and do their figures?
 //!
 //! Files are compared by the hashes in the manifests. Figures are compared group by group with terrains as the units: a
-//! terrain's value is the mean over its missions. Where both releases have the same terrains, or terrains from the same
+//! terrain's value is the mean over its missions (for all but success, over the successful ones). Where both releases have the same terrains, or terrains from the same
 //! random draws, terrains are compared in pairs, else as two independent groups. Labels of the releases are permuted
 //! (`p`, adjusted by Holm over all figures); a difference of means whose interval of coverage `1 - 2 alpha` lies within the
 //! margin is none that matters (two one-sided tests).
@@ -14,6 +14,7 @@ use sastrugi_numeric::{Streams, sums};
 use sastrugi_schemas::kind::{read_parameters, schema_of};
 use sastrugi_schemas::manifest::Artifact;
 use sastrugi_schemas::tables::{MissionRow, TerrainRow};
+use sastrugi_schemas::topics::EventKind;
 use sastrugi_schemas::{ParameterError, Record};
 use sastrugi_statistics::{MeanDifference, holm, permutation};
 use sastrugi_store::release::Release;
@@ -38,17 +39,26 @@ const OF_TERRAINS: [Figure<TerrainRow>; 7] = [
     ("share_high", |t| t.share_high),
     ("psd_slope", |t| t.psd_slope),
 ];
-/// Figures of a mission; `success` is 1 for the missions that reached their goal.
+/// Figures of a mission; `success` is 1 for the missions that reached their goal, and the others are theirs alone, as in the
+/// report.
 const OF_MISSIONS: [Figure<MissionRow>; 8] = [
-    ("success", |m| f64::from(m.outcome == "success")),
-    ("efficiency", |m| m.efficiency),
-    ("time_s", |m| m.time_s),
-    ("rms_vertical_acceleration_m_s2", |m| m.rms_vertical_acceleration_m_s2),
-    ("rms_pitch_rate_deg_s", |m| m.rms_pitch_rate_deg_s),
-    ("rms_roll_rate_deg_s", |m| m.rms_roll_rate_deg_s),
-    ("max_pitch_deg", |m| m.max_pitch_deg),
-    ("max_roll_deg", |m| m.max_roll_deg),
+    ("success", |m| f64::from(succeeded(m))),
+    ("efficiency", |m| of_success(m, m.efficiency)),
+    ("time_s", |m| of_success(m, m.time_s)),
+    ("rms_vertical_acceleration_m_s2", |m| of_success(m, m.rms_vertical_acceleration_m_s2)),
+    ("rms_pitch_rate_deg_s", |m| of_success(m, m.rms_pitch_rate_deg_s)),
+    ("rms_roll_rate_deg_s", |m| of_success(m, m.rms_roll_rate_deg_s)),
+    ("max_pitch_deg", |m| of_success(m, m.max_pitch_deg)),
+    ("max_roll_deg", |m| of_success(m, m.max_roll_deg)),
 ];
+
+fn succeeded(mission: &MissionRow) -> bool {
+    mission.outcome == EventKind::Success.name()
+}
+
+fn of_success(mission: &MissionRow, value: f64) -> f64 {
+    if succeeded(mission) { value } else { f64::NAN }
+}
 
 /// A figure of a row: its name and value.
 type Figure<R> = (&'static str, fn(&R) -> f64);
