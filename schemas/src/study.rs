@@ -1,6 +1,7 @@
 //! The envelope of a study file: what stands around the parameters of each item. The parameters themselves belong to
 //! the kernels; a section's table is its envelope's keys and the kernel's keys together.
 
+use crate::ParameterError;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -343,6 +344,117 @@ pub struct TraverseItem {
     pub sweep: BTreeMap<String, Vec<serde_json::Value>>,
 }
 
+/// `[[hypothesis]]`: a claim about groups of missions, stated before the run. It computes nothing: the report tests it and shows it
+/// apart from everything that was not stated beforehand.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct HypothesisItem {
+    /// Id, `[a-z0-9][a-z0-9.-]{0,63}`, unique in the study.
+    pub id: String,
+    /// Figure of the missions.
+    pub statistic: Statistic,
+    /// Labels of the groups: two for `difference` and `equivalence`, three or more in their order for `trend`.
+    pub groups: Vec<String>,
+    /// What is claimed.
+    pub test: HypothesisTest,
+    /// Which way the figure goes from the first group to the last; either way when absent. Not for `equivalence`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub direction: Option<Direction>,
+    /// For `equivalence` alone: the difference of means from which on groups count as different, in the unit of the statistic
+    /// (success: percentage points), above 0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub margin: Option<f64>,
+    /// Level of the test, above 0 and at most 0.5.
+    #[serde(default = "default_alpha")]
+    pub alpha: f64,
+    /// Hypotheses with the same text share one level (Holm, 1979); all that name none are one family.
+    #[serde(default)]
+    pub family: String,
+}
+
+fn default_alpha() -> f64 {
+    0.05
+}
+
+impl HypothesisItem {
+    /// Refuses what no test can be made of, whatever the study.
+    ///
+    /// # Errors
+    /// The first key that is wrong.
+    pub fn check(&self) -> Result<(), ParameterError> {
+        let refuse = |key: &str, message: String| Err(ParameterError::new(key, message));
+        let (count, trend) = (self.groups.len(), self.test == HypothesisTest::Trend);
+        if trend && count < 3 {
+            return refuse("groups", format!("has {count}; a trend goes over three or more, in their order"));
+        }
+        if !trend && count != 2 {
+            return refuse("groups", format!("has {count}; this test compares two"));
+        }
+        if let Some(k) = (1..count).find(|&k| self.groups[..k].contains(&self.groups[k])) {
+            return refuse(&format!("groups.{k}"), format!("names \"{}\" twice", self.groups[k]));
+        }
+        let equivalence = self.test == HypothesisTest::Equivalence;
+        match self.margin {
+            None if equivalence => refuse("margin", "is missing; equivalence is claimed within a margin".into())?,
+            Some(_) if !equivalence => refuse("margin", "is for `test = \"equivalence\"` alone".into())?,
+            Some(margin) => drop(ParameterError::positive("margin", margin)?),
+            None => {}
+        }
+        if equivalence && self.direction.is_some() {
+            return refuse("direction", "has no meaning for equivalence".into());
+        }
+        if !(self.alpha > 0.0 && self.alpha <= 0.5) {
+            return refuse("alpha", format!("is {}; it must be above 0 and at most 0.5", self.alpha));
+        }
+        Ok(())
+    }
+}
+
+/// Figure of the missions that a hypothesis is about. Every terrain counts once, by the mean of its missions: of all for
+/// `success`, of the successful ones for the others.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Statistic {
+    /// Share of missions that reach their goal, %.
+    Success,
+    /// Straight distance over path length.
+    Efficiency,
+    /// Time to the goal, s.
+    TimeS,
+    /// Root mean square of the vertical acceleration, m/s2.
+    RmsVerticalAccelerationMS2,
+    /// Root mean square of the derivative of the pitch angle, deg/s.
+    RmsPitchRateDegS,
+    /// Root mean square of the derivative of the roll angle, deg/s.
+    RmsRollRateDegS,
+    /// Largest absolute pitch, deg.
+    MaxPitchDeg,
+    /// Largest absolute roll, deg.
+    MaxRollDeg,
+}
+
+/// What a hypothesis claims.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum HypothesisTest {
+    /// Two groups differ.
+    Difference,
+    /// The figure rises or falls over ordered groups.
+    Trend,
+    /// The means of two groups differ by less than the margin.
+    Equivalence,
+}
+
+/// Which way a figure goes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Direction {
+    /// Up.
+    Rises,
+    /// Down.
+    Falls,
+}
+
 /// `[roughness]`: how every heightfield is classified and described.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
@@ -370,5 +482,36 @@ impl Default for RoughnessSection {
             closing_radius_m: 0.57,
             band_window_m: None,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every rule is broken alone.
+    #[test]
+    fn val_hypotheses_that_no_test_fits_are_refused() {
+        let base = serde_json::json!({ "id": "a", "statistic": "success", "groups": ["x", "y"], "test": "difference" });
+        let refusal = |changes: &[(&str, serde_json::Value)]| {
+            let mut item = base.clone();
+            changes.iter().for_each(|(key, value)| item[*key] = value.clone());
+            serde_json::from_value::<HypothesisItem>(item).unwrap().check().err().map(|e| e.key).unwrap_or_default()
+        };
+        let words = |list: &[&str]| serde_json::json!(list);
+        assert_eq!(refusal(&[]), "");
+        assert_eq!(refusal(&[("groups", words(&["x"]))]), "groups");
+        assert_eq!(refusal(&[("groups", words(&["x", "x"]))]), "groups.1");
+        assert_eq!(refusal(&[("test", "trend".into())]), "groups");
+        assert_eq!(refusal(&[("test", "trend".into()), ("groups", words(&["x", "y", "z"]))]), "");
+        assert_eq!(refusal(&[("test", "equivalence".into())]), "margin");
+        assert_eq!(refusal(&[("test", "equivalence".into()), ("margin", 2.0.into())]), "");
+        assert_eq!(refusal(&[("test", "equivalence".into()), ("margin", (-2.0).into())]), "margin");
+        assert_eq!(refusal(&[("margin", 2.0.into())]), "margin");
+        assert_eq!(refusal(&[("alpha", 0.0.into())]), "alpha");
+        assert_eq!(refusal(&[("alpha", 0.6.into())]), "alpha");
+        assert_eq!(refusal(&[("direction", "falls".into())]), "");
+        let directed = [("test", "equivalence".into()), ("margin", 1.0.into()), ("direction", "falls".into())];
+        assert_eq!(refusal(&directed), "direction");
     }
 }

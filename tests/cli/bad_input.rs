@@ -55,6 +55,32 @@ fn val_studies_are_refused_with_the_line() {
     study_refused("date = \"2026-01-01\"", "date = \"yesterday\"", &["YYYY-MM-DD"]);
 }
 
+/// A hypothesis that cannot be tested is refused before anything runs, with its place.
+#[test]
+fn val_hypotheses_are_refused_with_the_line() {
+    let good =
+        "\n[[hypothesis]]\nid = \"h\"\nstatistic = \"success\"\ngroups = [\"a\", \"b\"]\ntest = \"difference\"\n";
+    let refused = |from: &str, to: &str, words: &[&str]| {
+        assert!(good.contains(from), "{from}");
+        study_refused(
+            "missions = \"short\"\n",
+            &format!("missions = \"short\"\n{}", good.replacen(from, to, 1)),
+            words,
+        );
+    };
+    refused("success", "sucess", &["sucess", "rms_pitch_rate_deg_s", "statistic"]);
+    refused("\"b\"", "\"c\"", &["no missions are driven in a group \"c\"", "there are a, b"]);
+    refused("\"b\"", "\"a\"", &["twice"]);
+    refused("difference", "trend", &["three or more"]);
+    refused("difference", "same", &["same", "equivalence"]);
+    refused("\"difference\"", "\"equivalence\"", &["margin", "is missing"]);
+    refused("\"difference\"", "\"difference\"\nmargin = 1", &["margin", "equivalence"]);
+    refused("\"difference\"", "\"difference\"\nalpha = 0.6", &["alpha", "at most 0.5"]);
+    refused("\"difference\"", "\"difference\"\nalpa = 0.1", &["unknown key `alpa`", "did you mean `alpha`?"]);
+    refused("\"h\"", "\"husky\"", &["is taken by an item of [[traverse]]"]);
+    refused("[[hypothesis]]", &format!("{good}[[hypothesis]]"), &["\"h\"", "is taken"]);
+}
+
 #[test]
 fn val_missing_files_are_input_errors() {
     let folder = area();
@@ -66,6 +92,7 @@ fn val_missing_files_are_input_errors() {
     refused(folder.path(), &["texture", "nothing.json", "-o", "t.tif"], INPUT, &["nothing.json"]);
     refused(folder.path(), &["traverse", "nothing.tif"], INPUT, &["no such file"]);
     refused(folder.path(), &["report", "nothing"], INPUT, &["nothing"]);
+    refused(folder.path(), &["report", "nothing", "--against", "none"], INPUT, &["nothing"]);
     let study = small_study().replace("jacksboro.tif", "gone.tif");
     write(folder.path(), "study.toml", &study);
     refused(folder.path(), &["run", "study.toml"], INPUT, &["gone.tif", "no such file"]);

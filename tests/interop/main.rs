@@ -32,6 +32,8 @@ fn val_readers_agree_with_a_release() {
         let call = check(&python, script, &[&release]);
         assert_eq!(call.code, 0, "{script}: {}{}", call.stdout, call.stderr);
     }
+    let call = check(&python, "check_report.py", &[&release, &release.join("report")]);
+    assert_eq!(call.code, 0, "{}{}", call.stdout, call.stderr);
 }
 
 /// Bags of ROS 2 as rosbags and mcap-ros2-support read them, and `analyze`: the same missions as in the viewer flavour.

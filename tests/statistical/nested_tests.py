@@ -9,8 +9,10 @@ integrals come from adaptive quadrature (`scipy.integrate.quad`), so that nothin
 import itertools
 
 import numpy as np
+import pandas as pd
 from scipy import integrate, optimize, stats
-from statsmodels.stats import power, weightstats
+from statsmodels.regression import mixed_linear_model
+from statsmodels.stats import multitest, power, weightstats
 
 A = [62.0, 71.5, 55.0, 80.0, 66.5, 71.5]
 B = [58.0, 49.0, 71.5, 40.5, 55.0]
@@ -61,6 +63,45 @@ def equivalence():
     print("tconfint_diff, 90 %", compared.tconfint_diff(alpha=0.1, usevar="unequal"), compared.dof_satt())
     print("ttost_paired, margin 3", weightstats.ttost_paired(np.array(D), np.zeros(len(D)), -3, 3)[0])
     print("t.interval, 90 %", stats.t.interval(0.9, len(D) - 1, np.mean(D), stats.sem(D)))
+
+
+def several():
+    p = [0.5, 0.01, 0.03, 0.02, 0.0004, 0.02]
+    print("multipletests, holm", [float(v) for v in multitest.multipletests(p, method="holm")[1]])
+    values = D + [12.0, -9.0]
+    print("quantile, linear", np.quantile(values, [0.25, 0.5, 0.75], method="linear"))
+    inside = tukey(values)
+    print("whiskers", min(inside), max(inside), "outliers", sorted(set(values) - set(inside)))
+    x, y = A[:5], B
+    print("pearsonr", float(stats.pearsonr(x, y).statistic), "spearmanr", float(stats.spearmanr(x, y).statistic))
+
+
+def tukey(values):
+    low, high = np.quantile(values, [0.25, 0.75])
+    return [v for v in values if low - 1.5 * (high - low) <= v <= high + 1.5 * (high - low)]
+
+
+def components():
+    """Balanced nested data: the estimators of the analysis of variance are those of restricted maximum likelihood."""
+    group, member, value = [], [], []
+    for g, members in enumerate(NESTED):
+        for m, repeats in enumerate(members):
+            group += [g] * len(repeats)
+            member += [f"m{m}"] * len(repeats)
+            value += repeats
+    data = pd.DataFrame({"group": group, "member": member, "value": value})
+    fit = mixed_linear_model.MixedLM.from_formula(
+        "value ~ 1", groups="group", re_formula="1", vc_formula={"member": "0 + member"}, data=data
+    ).fit(reml=True, method="powell", xtol=1e-12, ftol=1e-14, maxiter=20000)
+    print("MixedLM, REML", float(fit.cov_re.iloc[0, 0]), float(fit.vcomp[0]), float(fit.scale))
+
+
+NESTED = [
+    [[3.0, 5.0, 4.5], [9.0, 7.5, 8.0], [6.0, 6.5, 4.0]],
+    [[13.0, 14.5, 12.0], [10.0, 11.5, 11.0], [17.0, 16.0, 15.0]],
+    [[8.0, 7.0, 9.5], [12.5, 11.0, 13.0], [9.0, 10.0, 8.5]],
+    [[5.5, 4.0, 6.0], [2.0, 3.5, 1.0], [7.0, 8.0, 6.5]],
+]
 
 
 def distributions():
@@ -135,5 +176,5 @@ def powers():
         print("TTestPower", difference, between, within, n, m, power.TTestPower().power(d, n, 0.05))
 
 
-for part in (permutations, effects, equivalence, distributions, models, powers):
+for part in (permutations, effects, equivalence, several, components, distributions, models, powers):
     part()

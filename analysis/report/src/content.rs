@@ -57,15 +57,6 @@ pub struct TableBlock {
     pub numbers: Numbers,
 }
 
-/// How much room a figure asks for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Size {
-    /// A map or chart among several.
-    Column,
-    /// A chart as wide as the page.
-    Wide,
-}
-
 /// A figure.
 #[derive(Clone, Debug)]
 pub struct Figure {
@@ -79,8 +70,6 @@ pub struct Figure {
     pub description: String,
     /// Drawing.
     pub svg: Svg,
-    /// Room it asks for.
-    pub size: Size,
     /// Numbers behind it.
     pub numbers: Numbers,
 }

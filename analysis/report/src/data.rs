@@ -7,10 +7,11 @@ use crate::ReportError;
 use sastrugi_numeric::Grid;
 use sastrugi_schemas::fit::FitFile;
 use sastrugi_schemas::manifest::FailedItem;
+use sastrugi_schemas::study::HypothesisItem;
 use sastrugi_schemas::tables::{
-    CandidateCurveRow, CandidateRow, CovarianceRow, FitRow, HeightDistributionRow, LikelihoodProfileRow, MissionRow,
-    ParameterRow, ProfilePsdRow, PsdRow, ReplicateRow, SampleRow, ScoreCovarianceRow, ScoreRow, StructureRow,
-    SurfaceRow, TerrainRow,
+    CandidateCurveRow, CandidateRow, CovarianceRow, FitRow, HeightDistributionRow, LikelihoodProfileRow, LogRow,
+    MissionRow, ParameterRow, ProfilePsdRow, PsdRow, ReplicateRow, SampleRow, ScoreCovarianceRow, ScoreRow,
+    StructureRow, SurfaceRow, TerrainRow,
 };
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -52,6 +53,8 @@ pub struct Study {
     pub license: String,
     /// People or groups that made it.
     pub creators: Vec<String>,
+    /// Claims that it states.
+    pub hypotheses: Vec<HypothesisItem>,
 }
 
 /// Rows of a release; every table is sorted by its keys.
@@ -98,8 +101,22 @@ pub struct Data {
     pub replicates: Vec<ReplicateRow>,
     /// Every number of every run.
     pub parameters: Vec<ParameterRow>,
+    /// Hashes of decoded content by path, once the release is sealed.
+    pub contents: BTreeMap<String, String>,
+    /// Another release that this one is compared with.
+    pub against: Option<Against>,
+    /// Analysed logs that the missions are compared with; `None` where none were asked for.
+    pub logs: Option<Vec<LogRow>>,
     /// Files read on demand.
     pub files: Box<dyn Files>,
+}
+
+/// Another release.
+pub struct Against {
+    /// Name of its folder.
+    pub name: String,
+    /// What it holds.
+    pub data: Box<Data>,
 }
 
 /// What carries one label and is compared with other groups.

@@ -21,9 +21,18 @@ mod tests;
 mod release;
 mod write;
 
-pub use write::{Summary, render};
+pub use write::{Summary, render, render_with};
 
 use std::path::PathBuf;
+
+/// What a release is compared with in its report.
+#[derive(Clone, Debug, Default)]
+pub struct Companions {
+    /// Another release.
+    pub against: Option<PathBuf>,
+    /// Tables of analysed logs, as `sastrugi analyze -o` writes them.
+    pub logs: Vec<PathBuf>,
+}
 
 /// Why a report could not be made.
 #[derive(Debug, thiserror::Error)]
@@ -50,6 +59,20 @@ pub enum ReportError {
         /// What is wrong with it.
         reason: String,
     },
+    /// The release to compare with is there but cannot be used.
+    #[error("{path}, which the release is compared with: {reason}")]
+    Other {
+        /// Its folder.
+        path: PathBuf,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// A file is no table of analysed logs.
+    #[error("{reason}; `--logs` takes the table `logs` that `sastrugi analyze -o LOGS.parquet` writes")]
+    Logs {
+        /// The file, and what is wrong with it.
+        reason: String,
+    },
     /// A picture could not be encoded.
     #[error("encode a picture: {0}")]
     Picture(#[from] png::EncodingError),
@@ -58,6 +81,16 @@ pub enum ReportError {
 impl ReportError {
     /// True when the release is the cause (missing or unusable), not the place of the report.
     pub fn unusable_input(&self) -> bool {
-        matches!(self, Self::NotARelease { .. } | Self::Read { .. })
+        matches!(self, Self::NotARelease { .. } | Self::Read { .. } | Self::Other { .. } | Self::Logs { .. })
+    }
+
+    /// The same about the release to compare with.
+    fn of_other(self, path: &std::path::Path) -> Self {
+        match self {
+            Self::Read { path: file, reason } => {
+                Self::Other { path: path.to_owned(), reason: format!("{file}: {reason}") }
+            }
+            other => other,
+        }
     }
 }

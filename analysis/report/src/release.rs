@@ -1,12 +1,13 @@
 //! Reading of an assembled release, sealed or not: the only file that calls `sastrugi-store` for reading.
 
-use crate::ReportError;
-use crate::data::{Artifact, Data, Files, Study};
+use crate::data::{Against, Artifact, Data, Files, Study};
+use crate::{Companions, ReportError};
 use sastrugi_numeric::Grid;
 use sastrugi_schemas::Record;
 use sastrugi_schemas::fit::FitFile;
-use sastrugi_schemas::manifest::Manifest;
-use sastrugi_schemas::tables::SampleRow;
+use sastrugi_schemas::manifest::{self, Manifest};
+use sastrugi_schemas::study::HypothesisItem;
+use sastrugi_schemas::tables::{LogRow, SampleRow};
 use sastrugi_store::release::{MANIFEST, TABLES};
 use sastrugi_store::{dem, digest, parquet};
 use std::fmt::Display;
@@ -29,6 +30,7 @@ impl Data {
         }
         let toml = release.text(STUDY)?.unwrap_or_default();
         let manifest: Option<Manifest> = release.json(MANIFEST)?;
+        let contents = manifest.iter().flat_map(|m| &m.artifacts).filter_map(content).collect();
         let (version, failed) =
             manifest.map_or_else(|| (env!("CARGO_PKG_VERSION").into(), Vec::new()), |m| (m.version, m.failed));
         Ok(Self {
@@ -53,9 +55,40 @@ impl Data {
             missions: release.rows()?,
             replicates: release.rows()?,
             parameters: release.rows()?,
+            contents,
+            against: None,
+            logs: None,
             files: Box::new(release),
         })
     }
+}
+
+impl Data {
+    /// Reads a release and what it is compared with.
+    ///
+    /// # Errors
+    /// As [`Self::open`], for either release; a file that is no table of logs.
+    pub fn open_with(folder: &Path, companions: &Companions) -> Result<Self, ReportError> {
+        let name = |path: &Path| path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
+        let other = |path: &PathBuf| -> Result<Against, ReportError> {
+            let data = Self::open(path).map_err(|e| e.of_other(path))?;
+            Ok(Against { name: name(path), data: Box::new(data) })
+        };
+        let logs = |path: &PathBuf| {
+            parquet::read_table::<LogRow>(path).map_err(|e| ReportError::Logs { reason: e.to_string() })
+        };
+        let mut data = Self::open(folder)?;
+        data.against = companions.against.as_ref().map(other).transpose()?;
+        if !companions.logs.is_empty() {
+            data.logs = Some(companions.logs.iter().map(logs).collect::<Result<Vec<_>, _>>()?.concat());
+        }
+        Ok(data)
+    }
+}
+
+/// Path and hash of a file whose content is hashed.
+fn content(artifact: &manifest::Artifact) -> Option<(String, String)> {
+    Some((artifact.path.clone(), artifact.origin.content_sha256.clone()?))
 }
 
 /// A release folder.
@@ -147,9 +180,9 @@ fn read_error(path: &str, error: impl Display) -> ReportError {
     ReportError::Read { path: path.to_owned(), reason: error.to_string() }
 }
 
-/// `[study]` of a study file; what it does not say is empty.
-fn study(toml: &str) -> Result<Study, toml_edit::TomlError> {
-    let document: toml_edit::DocumentMut = toml.parse()?;
+/// `[study]` and the hypotheses of a study file; what it does not say is empty.
+fn study(toml: &str) -> Result<Study, String> {
+    let document: toml_edit::DocumentMut = toml.parse().map_err(|e: toml_edit::TomlError| e.to_string())?;
     let item = |key: &str| document.get("study").and_then(|s| s.get(key));
     let text = |key: &str| item(key).and_then(|v| v.as_str()).unwrap_or_default().to_owned();
     let list = |key: &str| {
@@ -163,5 +196,30 @@ fn study(toml: &str) -> Result<Study, toml_edit::TomlError> {
         date: text("date"),
         license: text("license"),
         creators: list("creators").unwrap_or_default(),
+        hypotheses: hypotheses(&document)?,
     })
+}
+
+/// `[[hypothesis]]` of a study file.
+fn hypotheses(document: &toml_edit::DocumentMut) -> Result<Vec<HypothesisItem>, String> {
+    let tables = document.get("hypothesis").and_then(|h| h.as_array_of_tables()).into_iter().flatten();
+    let item = |table: &toml_edit::Table| {
+        let values = table.iter().filter_map(|(key, item)| Some((key.to_owned(), json(item.as_value()?))));
+        let item: HypothesisItem =
+            serde_json::from_value(values.collect()).map_err(|e| format!("[[hypothesis]]: {e}"))?;
+        item.check().map_err(|e| format!("[[hypothesis]] \"{}\": {e}", item.id))?;
+        Ok(item)
+    };
+    tables.map(item).collect()
+}
+
+/// A value of a hypothesis: text, number, list of these.
+fn json(value: &toml_edit::Value) -> serde_json::Value {
+    match value {
+        toml_edit::Value::String(v) => v.value().as_str().into(),
+        toml_edit::Value::Integer(v) => (*v.value()).into(),
+        toml_edit::Value::Float(v) => (*v.value()).into(),
+        toml_edit::Value::Array(v) => v.iter().map(json).collect(),
+        _ => serde_json::Value::Null,
+    }
 }

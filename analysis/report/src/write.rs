@@ -1,11 +1,11 @@
 //! From a release to the files of its report.
 
-use crate::ReportError;
 use crate::content::{Block, Figure, Numbers, Section, TableBlock, slug};
 use crate::data::Data;
 use crate::questions;
 use crate::render::html::{self, Head};
 use crate::render::number as set;
+use crate::{Companions, ReportError};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
@@ -28,8 +28,21 @@ pub struct Summary {
 /// A file of the release that is there but cannot be read; a file that cannot be written. What a release does not have is
 /// no error: the page leaves it out.
 pub fn render(release: &Path, out: &Path, progress: &dyn Fn(&str)) -> Result<Summary, ReportError> {
+    render_with(release, &Companions::default(), out, progress)
+}
+
+/// As [`render`], with sections that compare the release with others.
+///
+/// # Errors
+/// As [`render`]; a companion that is missing or is not what it should be.
+pub fn render_with(
+    release: &Path,
+    companions: &Companions,
+    out: &Path,
+    progress: &dyn Fn(&str),
+) -> Result<Summary, ReportError> {
     progress("reading the tables");
-    write(&Data::open(release)?, out, progress)
+    write(&Data::open_with(release, companions)?, out, progress)
 }
 
 /// The report of rows that are already read.

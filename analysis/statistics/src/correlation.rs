@@ -2,7 +2,7 @@
 
 use sastrugi_numeric::sums;
 
-/// Pearson's product-moment correlation of the pairs `(x[i], y[i])`; the longer slice is cut. NaN for fewer than two
+/// Pearson's (1895) product-moment correlation of the pairs `(x[i], y[i])`; the longer slice is cut. NaN for fewer than two
 /// pairs or a constant side.
 pub fn pearson(x: &[f64], y: &[f64]) -> f64 {
     let n = x.len().min(y.len());
@@ -12,7 +12,7 @@ pub fn pearson(x: &[f64], y: &[f64]) -> f64 {
     if r.is_finite() { r.clamp(-1.0, 1.0) } else { f64::NAN }
 }
 
-/// Spearman's rank correlation: Pearson's of the ranks, ties sharing their mean rank.
+/// Spearman's (1904) rank correlation: Pearson's of the ranks, ties sharing their mean rank.
 pub fn spearman(x: &[f64], y: &[f64]) -> f64 {
     let n = x.len().min(y.len());
     pearson(&ranks(&x[..n]), &ranks(&y[..n]))
@@ -48,6 +48,14 @@ mod tests {
         let y = [8.04, 6.95, 7.58, 8.81, 8.33, 9.96, 7.24, 4.26, 10.84, 4.82, 5.68];
         assert!((pearson(&x, &y) - 0.816_42).abs() < 5e-6);
         assert!((spearman(&x, &y) - 0.818_18).abs() < 5e-6);
+    }
+
+    /// scipy 1.17.1, stats.pearsonr and stats.spearmanr (`tests/statistical/nested_tests.py`). Tolerance 1e-14.
+    #[test]
+    fn val_of_scipy() {
+        let (x, y) = ([62.0, 71.5, 55.0, 80.0, 66.5], [58.0, 49.0, 71.5, 40.5, 55.0]);
+        assert!((pearson(&x, &y) + 0.985_547_046_073_543_2).abs() < 1e-14);
+        assert!((spearman(&x, &y) + 1.0).abs() < 1e-14);
     }
 
     #[test]

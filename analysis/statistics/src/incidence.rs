@@ -38,19 +38,29 @@ impl Incidence {
     pub fn of(endings: &[Ending], causes: usize) -> Self {
         let mut sorted: Vec<Ending> = endings.iter().copied().filter(|e| e.at.is_finite()).collect();
         sorted.sort_by(|a, b| a.at.total_cmp(&b.at));
+        Self::of_counted(sorted.into_iter().map(|ending| (ending, 1)), causes)
+    }
+
+    /// The same of endings in the order of their finite distances, each with the number of subjects that ended so: redraws
+    /// keep the order and need no sorting.
+    pub fn of_counted(sorted: impl IntoIterator<Item = (Ending, usize)>, causes: usize) -> Self {
+        let sorted: Vec<(Ending, usize)> = sorted.into_iter().filter(|(_, n)| *n > 0).collect();
+        let count = |is: &dyn Fn(&Ending) -> bool, all: &[(Ending, usize)]| {
+            all.iter().filter(|(e, _)| is(e)).map(|(_, n)| *n).sum::<usize>() as f64
+        };
         let mut incidence = Self { at: Vec::new(), shares: vec![Vec::new(); causes] };
         let mut reached = vec![0.0; causes];
-        let (mut at_risk, mut under_way) = (sorted.len() as f64, 1.0);
-        for ties in sorted.chunk_by(|a, b| a.at == b.at) {
-            let ended = ties.iter().filter(|e| e.cause.is_some()).count() as f64;
+        let (mut at_risk, mut under_way) = (count(&|_| true, &sorted), 1.0);
+        for ties in sorted.chunk_by(|a, b| a.0.at == b.0.at) {
+            let ended = count(&|e| e.cause.is_some(), ties);
             for (k, share) in reached.iter_mut().enumerate() {
-                let own = ties.iter().filter(|e| e.cause == Some(k)).count() as f64;
+                let own = count(&|e| e.cause == Some(k), ties);
                 *share += under_way * own / at_risk;
             }
             under_way *= 1.0 - ended / at_risk;
-            at_risk -= ties.len() as f64;
+            at_risk -= count(&|_| true, ties);
             if ended > 0.0 {
-                incidence.at.push(ties[0].at);
+                incidence.at.push(ties[0].0.at);
                 incidence.shares.iter_mut().zip(&reached).for_each(|(curve, share)| curve.push(*share));
             }
         }

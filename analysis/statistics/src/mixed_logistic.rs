@@ -32,6 +32,7 @@
 //! the rows.
 
 use crate::chi_square;
+use std::collections::BTreeMap;
 
 /// Newton steps at most.
 const STEPS_MAX: usize = 200;
@@ -82,15 +83,16 @@ impl Fit {
         if !terrains.iter().flatten().all(usable) {
             return None;
         }
+        let patterns = patterns(terrains);
         let mut at = vec![0.0; covariates];
         at.push(DEVIATION_START);
-        let mut here = Likelihood::of(terrains, &at);
+        let mut here = Likelihood::of(&patterns, &at);
         for _ in 0..STEPS_MAX {
             let (step, gain) = here.step()?;
             if gain < GAIN_MIN {
                 break;
             }
-            (at, here) = better(terrains, &at, &here, &step)?;
+            (at, here) = better(&patterns, &at, &here, &step)?;
             if terrains.iter().flatten().any(|m| dot(&m.covariates, &at).abs() > LOG_ODDS_MAX) {
                 return None;
             }
@@ -131,6 +133,28 @@ impl Fit {
     }
 }
 
+/// Terrains with the same missions and outcomes: they add the same to the likelihood.
+struct Pattern<'a> {
+    missions: &'a [Missions],
+    terrains: f64,
+}
+
+/// Every pattern once, in the order of its first terrain.
+fn patterns(terrains: &[Vec<Missions>]) -> Vec<Pattern<'_>> {
+    let mut places: BTreeMap<Vec<u64>, usize> = BTreeMap::new();
+    let mut patterns: Vec<Pattern> = Vec::new();
+    for missions in terrains.iter().filter(|t| !t.is_empty()) {
+        let numbers = |m: &Missions| [&m.covariates[..], &[m.successes, m.trials]].concat();
+        let key = missions.iter().flat_map(numbers).map(f64::to_bits).collect();
+        let place = *places.entry(key).or_insert(patterns.len());
+        match patterns.get_mut(place) {
+            Some(pattern) => pattern.terrains += 1.0,
+            None => patterns.push(Pattern { missions, terrains: 1.0 }),
+        }
+    }
+    patterns
+}
+
 /// Logarithm of the likelihood with its derivatives for the coefficients and the deviation.
 struct Likelihood {
     value: f64,
@@ -139,14 +163,14 @@ struct Likelihood {
 }
 
 impl Likelihood {
-    fn of(terrains: &[Vec<Missions>], at: &[f64]) -> Self {
+    fn of(patterns: &[Pattern], at: &[f64]) -> Self {
         let n = at.len();
         let mut all = Self { value: 0.0, score: vec![0.0; n], information: vec![vec![0.0; n]; n] };
-        terrains.iter().filter(|t| !t.is_empty()).for_each(|t| all.add(t, at));
+        patterns.iter().for_each(|p| all.add(p, at));
         all
     }
 
-    fn add(&mut self, terrain: &[Missions], at: &[f64]) {
+    fn add(&mut self, &Pattern { missions: terrain, terrains }: &Pattern, at: &[f64]) {
         let n = at.len();
         let (coefficients, deviation) = (&at[..n - 1], at[n - 1]);
         let fixed: Vec<f64> = terrain.iter().map(|m| dot(&m.covariates, coefficients)).collect();
@@ -173,11 +197,11 @@ impl Likelihood {
                 (0..n).for_each(|j| square[i][j] -= weight * score[i] * score[j]);
             }
         }
-        self.value += highest + libm::log(total) - 0.5 * libm::log(2.0 * std::f64::consts::PI);
+        self.value += terrains * (highest + libm::log(total) - 0.5 * libm::log(2.0 * std::f64::consts::PI));
         for i in 0..n {
-            self.score[i] += mean[i] / total;
+            self.score[i] += terrains * mean[i] / total;
             for j in 0..n {
-                self.information[i][j] += square[i][j] / total + mean[i] * mean[j] / (total * total);
+                self.information[i][j] += terrains * (square[i][j] / total + mean[i] * mean[j] / (total * total));
             }
         }
     }
@@ -198,11 +222,11 @@ impl Likelihood {
 }
 
 /// The first of ever shorter steps that raises the likelihood; the same place where rounding alone is left.
-fn better(terrains: &[Vec<Missions>], at: &[f64], here: &Likelihood, step: &[f64]) -> Option<(Vec<f64>, Likelihood)> {
+fn better(patterns: &[Pattern], at: &[f64], here: &Likelihood, step: &[f64]) -> Option<(Vec<f64>, Likelihood)> {
     (0..40).find_map(|halvings| {
         let share = libm::exp2(-f64::from(halvings));
         let there: Vec<f64> = at.iter().zip(step).map(|(a, s)| a + share * s).collect();
-        let value = Likelihood::of(terrains, &there);
+        let value = Likelihood::of(patterns, &there);
         (value.value >= here.value - 1e-12 * here.value.abs()).then_some((there, value))
     })
 }

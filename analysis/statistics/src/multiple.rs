@@ -26,6 +26,11 @@ mod tests {
         for (a, e) in adjusted.iter().zip(expected) {
             assert!((a - e).abs() < 1e-15 || a.is_nan() && e.is_nan(), "{adjusted:?}");
         }
+        // statsmodels 0.15.0, multitest.multipletests, method "holm" (`tests/statistical/nested_tests.py`). Tolerance 1e-15.
+        let adjusted = holm(&[0.5, 0.01, 0.03, 0.02, 0.0004, 0.02]);
+        for (a, e) in adjusted.iter().zip([0.5, 0.05, 0.08, 0.08, 0.0024, 0.08]) {
+            assert!((a - e).abs() < 1e-15, "{adjusted:?}");
+        }
         assert_eq!(holm(&[0.9, 0.8]), vec![1.0, 1.0]);
         assert!(holm(&[]).is_empty());
     }

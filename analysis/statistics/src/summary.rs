@@ -59,6 +59,14 @@ mod tests {
         assert_eq!((b.count, b.whisker_high, b.outliers), (9, 8.0, vec![30.0]));
     }
 
+    /// numpy 2, numpy.quantile with method "linear", and Tukey's fences (`tests/statistical/nested_tests.py`).
+    #[test]
+    fn val_of_numpy() {
+        let b = BoxPlot::of(&[1.5, -0.5, 3.0, 0.0, 2.5, 0.5, -1.0, 4.0, 12.0, -9.0]).unwrap();
+        assert_eq!((b.quartile_low, b.median, b.quartile_high), (-0.375, 1.0, 2.875));
+        assert_eq!((b.whisker_low, b.whisker_high, b.outliers), (-1.0, 4.0, vec![-9.0, 12.0]));
+    }
+
     #[test]
     fn val_degenerate_samples() {
         assert_eq!(BoxPlot::of(&[]), None);

@@ -87,7 +87,8 @@ pub enum Verb {
     )]
     Analyze(Analyze),
     /// Write the report of a release: one offline HTML page, figures as SVG, numbers as JSON.
-    #[command(after_help = "Example:\n  sastrugi report release -o release-report")]
+    #[command(after_help = "Examples:\n  sastrugi report release -o release-report\n  \
+        sastrugi report release --against release-before --logs field.parquet -o compared")]
     Report(Report),
     /// Put a release into one archive, whose bytes are the same wherever it is packed.
     #[command(
@@ -425,6 +426,12 @@ pub struct Report {
     /// Folder to write, never inside of the release; ./NAME-report when absent.
     #[arg(short, long, value_name = "DIR")]
     pub output: Option<PathBuf>,
+    /// Another release: which groups and figures differ from it?
+    #[arg(long, value_name = "RELEASE")]
+    pub against: Option<PathBuf>,
+    /// Table of analysed logs (`analyze -o`): do the missions match them? May be repeated.
+    #[arg(long, value_name = "LOGS.parquet")]
+    pub logs: Vec<PathBuf>,
 }
 
 /// `analyze`.

@@ -2,6 +2,7 @@
 //! cache and shards, and the verbs that work on single files.
 
 mod error;
+mod hypotheses;
 pub mod jobs;
 pub mod packing;
 pub mod registry;

@@ -1,5 +1,6 @@
 //! The list of stages, and how a study becomes a graph of items.
 
+use crate::hypotheses;
 use crate::jobs::{self, ItemRef, Job};
 use crate::runner::graph::{Graph, InputFile, Node};
 use crate::splits::{self, Splits};
@@ -25,7 +26,7 @@ struct Section {
 }
 
 /// Sections in the order in which they may refer to one another.
-const SECTIONS: [Section; 6] = [
+const SECTIONS: [Section; 7] = [
     Section { name: "dem", envelope: schema_of::<envelope::DemItem>, kinds: Vec::new, add: jobs::dem::add },
     Section {
         name: "terrain",
@@ -51,6 +52,12 @@ const SECTIONS: [Section; 6] = [
         envelope: schema_of::<envelope::TraverseItem>,
         kinds: jobs::traverse::kinds,
         add: jobs::traverse::add,
+    },
+    Section {
+        name: hypotheses::SECTION,
+        envelope: schema_of::<envelope::HypothesisItem>,
+        kinds: Vec::new,
+        add: hypotheses::check,
     },
 ];
 
@@ -213,6 +220,11 @@ impl Builder<'_> {
     /// True when replicates with the same number share their random draws.
     pub fn is_paired(&self) -> bool {
         self.study.head.pairing == Pairing::Common
+    }
+
+    /// The items that are there so far.
+    pub fn nodes(&self) -> &[Node] {
+        self.graph.nodes()
     }
 
     /// Names a family of ids, to which references resolve.

@@ -21,7 +21,10 @@ pub fn stream(data: &Data, item: &str, figure: &str) -> Stream {
 
 /// Median of a group's values, given with their terrains, and its sampling band.
 pub fn band(data: &Data, group: &str, figure: &str, values: &[(&str, f64)]) -> Option<Interval> {
-    let clusters = Clusters::new(&[values.iter().copied().filter(|v| v.1.is_finite()).collect()]);
+    let mut values: Vec<(&str, f64)> = values.iter().copied().filter(|v| v.1.is_finite()).collect();
+    // Redraws keep the order, and the median of sorted values is quick.
+    values.sort_by(|a, b| a.1.total_cmp(&b.1));
+    let clusters = Clusters::new(&[values]);
     clusters.interval(&mut stream(data, group, figure), BAND, |pooled| sums::median(&pooled[0]))
 }
 
@@ -56,6 +59,11 @@ impl<'a> Pairing<'a> {
         Self { blocks: if paired(groups) { missions.map(entry).collect() } else { BTreeMap::new() } }
     }
 
+    /// Every terrain by itself.
+    pub fn of_terrains() -> Self {
+        Self { blocks: BTreeMap::new() }
+    }
+
     /// True when groups share pairs.
     pub fn is_common(&self) -> bool {
         !self.blocks.is_empty()
@@ -67,13 +75,20 @@ impl<'a> Pairing<'a> {
     }
 }
 
+/// Number of clusters, and every item with the number of its cluster in the order of their names.
+pub fn numbered<T: Copy>(items: &[(&str, T)]) -> (usize, Vec<(usize, T)>) {
+    let names: BTreeSet<&str> = items.iter().map(|i| i.0).collect();
+    let numbers: BTreeMap<&str, usize> = names.into_iter().enumerate().map(|(k, name)| (name, k)).collect();
+    (numbers.len(), items.iter().map(|(name, item)| (numbers[name], *item)).collect())
+}
+
 /// Items of several groups by cluster. Groups that have a cluster in common are drawn together.
 #[derive(Clone, Debug)]
 pub struct Clusters<T> {
     /// Clusters in each independent sample.
     samples: Vec<usize>,
-    /// For each group its sample, and its items by cluster of that sample.
-    groups: Vec<(usize, Vec<Vec<T>>)>,
+    /// For each group its sample, and its items with their cluster of that sample, in the order in which they were given.
+    groups: Vec<(usize, Vec<(usize, T)>)>,
 }
 
 impl<T: Copy> Clusters<T> {
@@ -85,23 +100,26 @@ impl<T: Copy> Clusters<T> {
         let of_group = |(g, items): (usize, &Vec<(&str, T)>)| {
             let sample = if common { 0 } else { g };
             let numbers: BTreeMap<&str, usize> = samples[sample].iter().enumerate().map(|(i, n)| (*n, i)).collect();
-            let mut clusters = vec![Vec::new(); numbers.len()];
-            items.iter().for_each(|(name, item)| clusters[numbers[name]].push(*item));
-            (sample, clusters)
+            (sample, items.iter().map(|(name, item)| (numbers[name], *item)).collect())
         };
         let groups = groups.iter().enumerate().map(of_group).collect();
         Self { samples: samples.iter().map(BTreeSet::len).collect(), groups }
     }
 
-    /// Clusters in each independent sample.
-    pub fn samples(&self) -> &[usize] {
-        &self.samples
-    }
-
-    /// The items of every group when these clusters are drawn.
+    /// The items of every group when these clusters are drawn, each as often as its cluster, in the order of all.
     pub fn pooled(&self, drawn: &[Vec<usize>]) -> Vec<Vec<T>> {
-        let group = |(sample, clusters): &(usize, Vec<Vec<T>>)| {
-            drawn[*sample].iter().flat_map(|&c| clusters[c].iter().copied()).collect()
+        let times = |(drawn, n): (&Vec<usize>, &usize)| {
+            let mut times = vec![0; *n];
+            drawn.iter().for_each(|&c| times[c] += 1);
+            times
+        };
+        let times: Vec<Vec<usize>> = drawn.iter().zip(&self.samples).map(times).collect();
+        let group = |(sample, items): &(usize, Vec<(usize, T)>)| {
+            let mut pooled = Vec::with_capacity(items.len());
+            for (cluster, item) in items {
+                (0..times[*sample][*cluster]).for_each(|_| pooled.push(*item));
+            }
+            pooled
         };
         self.groups.iter().map(group).collect()
     }
@@ -136,9 +154,9 @@ mod tests {
         let mut s = Streams::for_seed(1, "clusters-test").stream("pairs");
         let together = Clusters::new(&[a.clone(), a.clone()]);
         let i = together.interval(&mut s, 0.9, difference).unwrap();
-        assert_eq!((together.samples(), i.low, i.high), (&[9][..], 0.0, 0.0));
+        assert_eq!((&together.samples[..], i.low, i.high), (&[9][..], 0.0, 0.0));
         let apart = Clusters::new(&[a, b]);
         let i = apart.interval(&mut s, 0.9, difference).unwrap();
-        assert!(apart.samples() == [9, 9] && i.low < -5.0 && i.high > 5.0, "{i:?}");
+        assert!(apart.samples == [9, 9] && i.low < -5.0 && i.high > 5.0, "{i:?}");
     }
 }

@@ -5,10 +5,12 @@ pub mod comparison;
 pub mod covariance;
 mod curves;
 pub mod failures;
+pub mod logs;
 pub mod missions;
 mod outcome;
 pub mod probability;
 pub mod published;
+pub mod releases;
 mod relief;
 pub mod scoreboard;
 pub mod sensitivity;
@@ -33,7 +35,7 @@ pub struct Question {
 }
 
 /// All questions, in the order of the page.
-pub const ALL: [Question; 10] = [
+pub const ALL: [Question; 12] = [
     failures::QUESTION,
     terrain::QUESTION,
     covariance::QUESTION,
@@ -41,6 +43,8 @@ pub const ALL: [Question; 10] = [
     scoreboard::QUESTION,
     missions::QUESTION,
     comparison::QUESTION,
+    releases::QUESTION,
+    logs::QUESTION,
     published::QUESTION,
     probability::QUESTION,
     sensitivity::QUESTION,

@@ -1,7 +1,7 @@
 //! Shaded relief and deviation maps of one heightfield.
 
 use crate::ReportError;
-use crate::content::{Figure, Numbers, Size, number, text};
+use crate::content::{Figure, Numbers, number, text};
 use crate::data::Data;
 use crate::render::map::{Key, Map};
 use crate::render::{colour, number as set, picture, thin};
@@ -123,7 +123,7 @@ pub fn extent<T>(grid: &Grid<T>) -> String {
 
 fn figure(words: Words, description: String, map: Map, numbers: Numbers) -> Figure {
     let Words { id, title, caption } = words;
-    Figure { id, title, caption, description, svg: map.svg, size: Size::Column, numbers }
+    Figure { id, title, caption, description, svg: map.svg, numbers }
 }
 
 fn numbers(path: &str, grid: &Grid, (low, high): (f64, f64)) -> Numbers {

@@ -2,7 +2,7 @@
 
 use super::number;
 use super::svg::escape;
-use crate::content::{Block, Figure, Heading, Numbers, Section, Size, TableBlock};
+use crate::content::{Block, Figure, Heading, Numbers, Section, TableBlock};
 use sastrugi_schemas::Cell;
 
 /// Style of the page.
@@ -12,6 +12,12 @@ const FIGURE_ROWS_MAX: usize = 60;
 /// Rows of a table that are printed in the page.
 const TABLE_ROWS_MAX: usize = 1500;
 
+/// On a narrow screen a table with more columns than this becomes a list of cards, unless it has very many rows.
+const CARD_COLUMNS_MIN: usize = 3;
+const CARD_ROWS_MAX: usize = 100;
+
+/// Bytes of text beyond which a cell takes a line of its card for itself.
+const CARD_TEXT: usize = 13;
 /// Bytes of text beyond which a cell may break its line.
 const LONG_TEXT: usize = 48;
 
@@ -77,7 +83,8 @@ fn block(block: &Block) -> String {
         Block::Figures(figures) => figure_grid(figures),
         Block::Table(t) => table_block(t),
         Block::FoldedTable(t) => {
-            folded(&format!("{} ({} rows)", t.caption, number::count(t.numbers.rows.len())), &table_block(t))
+            let summary = format!("{} ({} rows)", t.caption, number::count(t.numbers.rows.len()));
+            folded(&summary, &t.id, &table_block(t))
         }
     }
 }
@@ -88,11 +95,7 @@ fn paragraph(class: &str, text: &str) -> String {
 }
 
 fn figure_grid(figures: &[Figure]) -> String {
-    let grid = |run: &[Figure]| {
-        let class = if run[0].size == Size::Wide { "figures wide" } else { "figures" };
-        format!("<div class=\"{class}\">\n{}</div>\n", run.iter().map(figure).collect::<String>())
-    };
-    figures.chunk_by(|a, b| a.size == b.size).map(grid).collect()
+    format!("<div class=\"figures\">\n{}</div>\n", figures.iter().map(figure).collect::<String>())
 }
 
 fn figure(figure: &Figure) -> String {
@@ -100,7 +103,7 @@ fn figure(figure: &Figure) -> String {
     let svg = figure.svg.finish(&figure.id, &figure.title, &figure.description);
     let numbers = match figure.numbers.rows.len() {
         0 => String::new(),
-        1..=FIGURE_ROWS_MAX => folded("Numbers", &table(&figure.numbers, &figure.title)),
+        1..=FIGURE_ROWS_MAX => folded("Numbers", &figure.id, &table(&figure.numbers, &figure.title)),
         n => format!(" <span>({} rows)</span>", number::count(n)),
     };
     format!(
@@ -112,8 +115,10 @@ fn figure(figure: &Figure) -> String {
     )
 }
 
-fn folded(summary: &str, content: &str) -> String {
-    format!("<details><summary>{}</summary>\n{content}</details>\n", escape(summary))
+/// Folded content; on paper its words name the file that holds it.
+fn folded(summary: &str, id: &str, content: &str) -> String {
+    let (summary, id) = (escape(summary), escape(id));
+    format!("<details><summary data-file=\"data/{id}.json\">{summary}</summary>\n{content}</details>\n")
 }
 
 fn table_block(block: &TableBlock) -> String {
@@ -128,13 +133,18 @@ fn table_block(block: &TableBlock) -> String {
 fn table(numbers: &Numbers, caption: &str) -> String {
     let head: String = numbers.columns.iter().enumerate().map(|(i, c)| heading(c, numeric(numbers, i))).collect();
     let decimals: Vec<Option<usize>> = (0..numbers.columns.len()).map(|i| decimals(numbers, i)).collect();
-    let rows: String = numbers.rows.iter().take(TABLE_ROWS_MAX).map(|r| row(r, &decimals)).collect();
+    let cards = numbers.columns.len() > CARD_COLUMNS_MIN && numbers.rows.len() <= CARD_ROWS_MAX;
+    let labels: Vec<String> = numbers.columns.iter().map(|c| if cards { label(c) } else { String::new() }).collect();
+    let format = |i: usize| Format { decimals: decimals[i], label: &labels[i] };
+    let formats: Vec<Format> = (0..labels.len()).map(format).collect();
+    let rows: String = numbers.rows.iter().take(TABLE_ROWS_MAX).map(|r| row(r, &formats)).collect();
+    let class = if cards { "scroll cards" } else { "scroll" };
     let caption = match numbers.rows.len().saturating_sub(TABLE_ROWS_MAX) {
         0 => escape(caption),
         _ => format!("{} (first {TABLE_ROWS_MAX} of {} rows)", escape(caption), number::count(numbers.rows.len())),
     };
     format!(
-        "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"{caption}\"><table><caption>{caption}</caption>\n\
+        "<div class=\"{class}\" tabindex=\"0\" role=\"region\" aria-label=\"{caption}\"><table><caption>{caption}</caption>\n\
          <thead><tr>{head}</tr></thead>\n<tbody>\n{rows}</tbody></table></div>\n"
     )
 }
@@ -176,29 +186,52 @@ fn heading(heading: &Heading, numeric: bool) -> String {
     format!("<th scope=\"col\"{class}>{name}{unit}</th>")
 }
 
-fn row(cells: &[Cell], decimals: &[Option<usize>]) -> String {
-    let cells: String = cells.iter().zip(decimals).map(cell).collect();
+/// Name and unit of a column as the label of a figure in a card.
+fn label(heading: &Heading) -> String {
+    let unit = match number::unit(&heading.unit) {
+        unit if unit.is_empty() => unit,
+        unit => format!(", {unit}"),
+    };
+    format!(" data-label=\"{}{}\"", escape(&heading.name), escape(&unit))
+}
+
+/// How the cells of a column are set.
+struct Format<'a> {
+    decimals: Option<usize>,
+    /// Attribute that names the column; empty where rows are no cards.
+    label: &'a str,
+}
+
+fn row(cells: &[Cell], formats: &[Format]) -> String {
+    let cells: String = cells.iter().zip(formats).map(cell).collect();
     format!("<tr>{cells}</tr>\n")
 }
 
-fn cell((cell, decimals): (&Cell, &Option<usize>)) -> String {
-    match cell {
-        Cell::Null => format!("<td class=\"n\">{}</td>", number::ABSENT),
-        Cell::Text(v) if v.len() > LONG_TEXT => format!("<td class=\"w\">{}</td>", escape(v)),
-        Cell::Text(v) => format!("<td>{}</td>", escape(v)),
-        Cell::F64(v) => {
-            format!("<td class=\"n\">{}</td>", decimals.map_or_else(|| number::plain(*v, 4), |d| number::fixed(*v, d)))
-        }
-        Cell::I64(v) => format!("<td class=\"n\">{v}</td>"),
-        Cell::Bool(v) => format!("<td>{}</td>", if *v { "yes" } else { "no" }),
-        Cell::F32List(v) => list(v.iter().map(|v| f64::from(*v))),
-        Cell::F64List(v) => list(v.iter().copied()),
+fn cell((cell, format): (&Cell, &Format)) -> String {
+    let (class, text) = match cell {
+        Cell::Null => ("n", number::ABSENT.to_owned()),
+        Cell::Text(v) => (class_of_text(v), escape(v)),
+        Cell::F64(v) => ("n", format.decimals.map_or_else(|| number::plain(*v, 4), |d| number::fixed(*v, d))),
+        Cell::I64(v) => ("n", v.to_string()),
+        Cell::Bool(v) => ("", if *v { "yes" } else { "no" }.to_owned()),
+        Cell::F32List(v) => ("", list(v.iter().map(|v| f64::from(*v)))),
+        Cell::F64List(v) => ("", list(v.iter().copied())),
+    };
+    let class = if class.is_empty() { String::new() } else { format!(" class=\"{class}\"") };
+    format!("<td{class}{}>{text}</td>", format.label)
+}
+
+fn class_of_text(text: &str) -> &'static str {
+    match text.len() {
+        n if n > LONG_TEXT => "w",
+        n if n > CARD_TEXT => "l",
+        _ => "",
     }
 }
 
 fn list(values: impl Iterator<Item = f64>) -> String {
     let figure = |v: f64| if v.is_finite() { number::plain(v, 4) } else { number::ABSENT.to_owned() };
-    format!("<td>{}</td>", values.map(figure).collect::<Vec<_>>().join(", "))
+    values.map(figure).collect::<Vec<_>>().join(", ")
 }
 
 #[cfg(test)]

@@ -5,8 +5,8 @@ use crate::data::{Artifact, Data, Files, Study};
 use sastrugi_numeric::{Geometry, Grid, Stream, Streams, sums};
 use sastrugi_schemas::fit::FitFile;
 use sastrugi_schemas::tables::{
-    CandidateCurveRow, CandidateRow, CovarianceRow, FitRow, HeightDistributionRow, LikelihoodProfileRow, MissionRow,
-    ProfilePsdRow, PsdRow, ReplicateRow, SampleRow, StructureRow, SurfaceRow, TerrainRow,
+    CandidateCurveRow, CandidateRow, CovarianceRow, FitRow, HeightDistributionRow, LikelihoodProfileRow, LogRow,
+    MissionRow, ProfilePsdRow, PsdRow, ReplicateRow, SampleRow, StructureRow, SurfaceRow, TerrainRow,
 };
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
@@ -66,7 +66,57 @@ pub fn empty() -> Data {
         missions: Vec::new(),
         replicates: Vec::new(),
         parameters: Vec::new(),
+        contents: BTreeMap::new(),
+        against: None,
+        logs: None,
         files: Box::new(Shelf::default()),
+    }
+}
+
+/// A log of which nothing is known.
+pub fn log() -> LogRow {
+    LogRow {
+        log_id: String::new(),
+        group: None,
+        topic: String::new(),
+        message: String::new(),
+        frame: String::new(),
+        outcome: None,
+        time_s: f64::NAN,
+        path_length_m: f64::NAN,
+        efficiency: f64::NAN,
+        rms_vertical_acceleration_m_s2: f64::NAN,
+        vertical_acceleration_floor_m_s2: f64::NAN,
+        vertical_acceleration_tells: true,
+        rms_pitch_rate_deg_s: f64::NAN,
+        pitch_rate_floor_deg_s: f64::NAN,
+        pitch_rate_tells: true,
+        rms_roll_rate_deg_s: f64::NAN,
+        roll_rate_floor_deg_s: f64::NAN,
+        roll_rate_tells: true,
+        rms_body_pitch_rate_deg_s: f64::NAN,
+        rms_body_roll_rate_deg_s: f64::NAN,
+        max_pitch_deg: f64::NAN,
+        max_roll_deg: f64::NAN,
+        band_low_hz: f64::NAN,
+        band_high_hz: f64::NAN,
+        band_vertical_acceleration_m_s2: f64::NAN,
+        band_source: None,
+        band_vertical_acceleration_floor_m_s2: f64::NAN,
+        band_vertical_acceleration_poses_m_s2: f64::NAN,
+        samples: 0,
+        sample_rate_hz: f64::NAN,
+        pose_rate_hz: f64::NAN,
+        resampled: true,
+        gaps: 0,
+        gap_time_s: f64::NAN,
+        ground_share: f64::NAN,
+        min_clearance_m: f64::NAN,
+        median_clearance_m: f64::NAN,
+        share_low: f64::NAN,
+        share_semi: f64::NAN,
+        share_high: f64::NAN,
+        broken: None,
     }
 }
 

@@ -4,8 +4,10 @@ pub mod made_up;
 mod on_disk;
 pub mod xml;
 
-use crate::data::Data;
+use crate::data::{Against, Data};
 use crate::write::{Summary, write};
+use sastrugi_schemas::study::HypothesisItem;
+use sastrugi_schemas::tables::{LogRow, MissionRow};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -229,6 +231,143 @@ fn val_groups_without_terrains_are_not_compared() {
     let files = report(&data).0;
     assert_sound(&files);
     assert!(!files.contains_key("data/comparison-power.json"));
+}
+
+fn claim(json: serde_json::Value) -> HypothesisItem {
+    let mut all = serde_json::json!({ "id": "claim", "groups": ["2.30", "2.45", "2.60"], "test": "trend" });
+    json.as_object().unwrap().iter().for_each(|(key, value)| all[key] = value.clone());
+    serde_json::from_value(all).unwrap()
+}
+
+/// Claims are tested as the exploratory part tests them: same p. Holm counts the claims of a family only (by hand: the
+/// smaller of two doubles), and a claim of the other direction does not hold.
+#[test]
+fn val_declared_claims_are_tested_apart() {
+    let mut data = made_up::full(6, 24);
+    let pitch = "rms_pitch_rate_deg_s";
+    data.study.hypotheses = vec![
+        claim(serde_json::json!({ "statistic": pitch, "direction": "rises", "family": "a" })),
+        claim(serde_json::json!({ "statistic": "rms_vertical_acceleration_m_s2", "family": "a" })),
+        claim(serde_json::json!({ "statistic": pitch, "direction": "falls" })),
+        claim(
+            serde_json::json!({ "statistic": pitch, "groups": ["2.30", "2.60"], "test": "difference", "family": "b" }),
+        ),
+        claim(
+            serde_json::json!({ "statistic": pitch, "groups": ["2.30", "2.45"], "test": "equivalence", "margin": 99.0, "family": "c" }),
+        ),
+        claim(
+            serde_json::json!({ "statistic": "max_pitch_deg", "groups": ["2.30", "2.45"], "test": "difference", "family": "d" }),
+        ),
+        claim(
+            serde_json::json!({ "statistic": "success", "groups": ["2.30", "9"], "test": "difference", "family": "e" }),
+        ),
+    ];
+    let (files, _) = report(&data);
+    assert_sound(&files);
+    let page = &files["index.html"];
+    let (first, rest) = (page.find("confirmatory").unwrap(), page.find("Everything else is exploratory").unwrap());
+    assert!(first < rest && page.contains(&data.study_sha256));
+    assert!(!page.contains("no hypothesis was registered"));
+    let rows_of = rows(&files, "hypotheses");
+    let p = |k: usize| [6, 7].map(|c| rows_of[k][c].as_f64().unwrap());
+    let trends = rows(&files, "comparison-trend");
+    let explored = trends.iter().find(|r| r[0] == "RMS pitch rate").unwrap();
+    assert_eq!(explored[6].as_f64(), Some(p(0)[0]));
+    let (small, large) = if p(0)[0] <= p(1)[0] { (p(0), p(1)) } else { (p(1), p(0)) };
+    assert!((small[1] - 2.0 * small[0]).abs() < 1e-12 && large[1] >= large[0], "{small:?} {large:?}");
+    assert_eq!(p(2)[0], p(2)[1]);
+    let verdicts: Vec<&str> = rows_of.iter().map(|r| r[1].as_str().unwrap()).collect();
+    assert_eq!(verdicts[0], "supported");
+    assert_eq!(verdicts[2], "not supported: it goes the other way");
+    assert_eq!(verdicts[3], "supported");
+    assert_eq!(verdicts[4], "equivalent within the margin");
+    assert_eq!(verdicts[5], "not supported");
+    assert_eq!(verdicts[6], "cannot tell: too few terrains");
+}
+
+/// Three blocks have eight arrangements of signs: no data could reach 5 %.
+#[test]
+fn val_claims_that_no_data_could_support_cannot_be_told() {
+    let mut data = made_up::full(3, 24);
+    let groups = ["2.30", "2.60"];
+    data.study.hypotheses =
+        vec![claim(serde_json::json!({ "statistic": "success", "groups": groups, "test": "difference" }))];
+    assert_eq!(rows(&report(&data).0, "hypotheses")[0][1], "cannot tell: too few terrains");
+}
+
+/// The same release, whose heights are known by hash: every value is the same. Other heights: terrains are apart.
+#[test]
+fn val_a_release_against_another() {
+    let hashed = |salt: &str| {
+        let mut data = made_up::full(6, 24);
+        data.contents = data.terrains.iter().map(|t| (t.path.clone(), format!("{salt}{}", t.terrain_id))).collect();
+        data
+    };
+    let against = |other: Data| {
+        let mut data = hashed("");
+        data.against = Some(Against { name: "other".into(), data: Box::new(other) });
+        let (files, _) = report(&data);
+        assert_sound(&files);
+        rows(&files, "releases")
+    };
+    let same = against(hashed(""));
+    assert_eq!(same.len(), 3 * 5);
+    for row in &same {
+        assert_eq!(
+            (row[2].as_str(), row[13].as_str()),
+            (Some("the same values"), Some("6 terrains, paired")),
+            "{row:?}"
+        );
+    }
+    let mut rough = hashed("");
+    rough.missions.iter_mut().for_each(|m| m.rms_pitch_rate_deg_s *= 1.5);
+    let differs = against(rough);
+    assert_eq!(differs.iter().filter(|r| r[0] == "RMS pitch rate" && r[6].as_f64() < Some(0.0)).count(), 3);
+    let apart = against(hashed("x"));
+    assert!(apart.iter().all(|r| r[13] == "6 + 6 terrains" && r[9].as_f64() > Some(0.5)), "{apart:?}");
+    let mut foreign = hashed("");
+    foreign.terrains.iter_mut().for_each(|t| t.group = Some("elsewhere".into()));
+    foreign.missions.iter_mut().for_each(|m| m.group = None);
+    let mut data = hashed("");
+    data.against = Some(Against { name: "other".into(), data: Box::new(foreign) });
+    assert!(report(&data).0["index.html"].contains("no group of missions in common"));
+    assert!(!report(&hashed("")).0["index.html"].contains("id=\"releases\""));
+}
+
+/// A log with a mission's own figures lies among its group, one that is far rougher lies above, one below its noise floor
+/// cannot tell.
+#[test]
+fn val_logs_beside_missions() {
+    let mut data = made_up::full(6, 24);
+    let median = |of: fn(&MissionRow) -> f64| {
+        let group = data.mission_groups().swap_remove(0);
+        sastrugi_numeric::sums::median(&group.rows.iter().map(|m| of(m)).collect::<Vec<_>>())
+    };
+    let (pitch, roll) = (median(|m| m.rms_pitch_rate_deg_s), median(|m| m.rms_roll_rate_deg_s));
+    let log = LogRow {
+        log_id: "drive.mcap".into(),
+        group: Some("2.30".into()),
+        sample_rate_hz: 20.0,
+        efficiency: f64::NAN,
+        rms_vertical_acceleration_m_s2: 1e3,
+        vertical_acceleration_tells: true,
+        rms_pitch_rate_deg_s: pitch,
+        pitch_rate_tells: true,
+        rms_roll_rate_deg_s: roll,
+        roll_rate_tells: false,
+        ..made_up::log()
+    };
+    let other = LogRow { log_id: "other.mcap".into(), group: None, sample_rate_hz: 10.0, ..log.clone() };
+    data.logs = Some(vec![log, other]);
+    let (files, summary) = report(&data);
+    assert_sound(&files);
+    assert!(summary.figures.iter().any(|f| f == "log-drive.mcap"), "{:?}", summary.figures);
+    let found = rows(&files, "logs-beside-missions");
+    assert_eq!(found.len(), 8 + 8 * 3);
+    let verdicts: Vec<&str> = found[..4].iter().map(|r| r[3].as_str().unwrap()).collect();
+    assert_eq!(verdicts, ["no value", "above them", "like the missions", "cannot tell: below three noise floors"]);
+    assert_eq!(found[1][10].as_f64(), Some(100.0));
+    assert!(files["index.html"].contains("Sampled at another rate than the missions (20 Hz)"));
 }
 
 /// Figures by group and changes of the paper, each with a verdict that its own row bears out.

@@ -1,7 +1,7 @@
 //! Reports of releases that `sastrugi-store` wrote.
 
 use super::{assert_sound, made_up};
-use crate::{ReportError, Summary, render};
+use crate::{Companions, ReportError, Summary, render, render_with};
 use sastrugi_schemas::manifest::{FailedItem, Origin};
 use sastrugi_store::dem::{self, Crs};
 use sastrugi_store::release::{Head, ReleaseBuilder};
@@ -86,6 +86,41 @@ fn val_failed_items_are_listed() {
     let (files, _) = report(&dest);
     assert!(files["index.html"].contains("1 item of the study failed"));
     assert!(files["data/failed.json"].contains("too small"));
+}
+
+/// Claims of the study are read from its file; one that no test fits is a damaged file.
+#[test]
+fn val_hypotheses_are_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let builder = assembled(&folder.path().join("release"));
+    let staging = builder.staging().to_owned();
+    let claim =
+        "[[hypothesis]]\nid = \"h\"\nstatistic = \"success\"\ngroups = [\"2.30\", \"2.60\"]\ntest = \"equivalence\"\n";
+    fs::write(staging.join("study.toml"), format!("{STUDY}{claim}margin = 10\nalpha = 0.1\n")).unwrap();
+    let (files, _) = report(&staging);
+    assert!(files["data/hypotheses.json"].contains("differ by less than 10 points"));
+    fs::write(staging.join("study.toml"), format!("{STUDY}{claim}")).unwrap();
+    let error = render(&staging, &folder.path().join("out"), &|_| ()).unwrap_err();
+    assert!(error.to_string().contains("margin"), "{error}");
+}
+
+/// A companion that is not what it should be is refused in one sentence.
+#[test]
+fn val_unusable_companions_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let builder = assembled(&folder.path().join("release"));
+    let staging = builder.staging().to_owned();
+    let error = |companions: Companions| {
+        let error = render_with(&staging, &companions, &folder.path().join("out"), &|_| ()).unwrap_err();
+        assert!(error.unusable_input());
+        error.to_string()
+    };
+    let against = |path: &Path| error(Companions { against: Some(path.to_owned()), ..Companions::default() });
+    assert!(against(&folder.path().join("nowhere")).contains("no release"));
+    let logs = |path: &Path| error(Companions { logs: vec![path.to_owned()], ..Companions::default() });
+    assert!(logs(&folder.path().join("no.parquet")).contains("sastrugi analyze -o"));
+    assert!(logs(&staging.join("tables/missions/part-0000.parquet")).contains("sastrugi analyze -o"));
+    assert!(logs(&staging.join("study.toml")).contains("sastrugi analyze -o"));
 }
 
 #[test]

@@ -5,6 +5,7 @@ use crate::args::{Common, Merge, Pack, Place, Plan, Report, Run, Traverse, Verif
 use crate::failure::{Code, Failure};
 use crate::output::{bytes, columns, print, seconds};
 use crate::progress::Teller;
+use sastrugi_report::Companions;
 use sastrugi_stages::packing;
 use sastrugi_stages::runner::execute::Limits;
 use sastrugi_stages::runner::shard::Part;
@@ -167,12 +168,14 @@ fn parse_recompute(text: &str) -> Result<Recompute, Failure> {
 /// `report`.
 pub fn report(args: &Report, common: &Common) -> Verdict {
     let output = args.output.clone().unwrap_or_else(|| default_report(&args.release));
-    if studies::resolved(&output).starts_with(studies::resolved(&args.release)) {
+    let within = |release: &PathBuf| studies::resolved(&output).starts_with(studies::resolved(release));
+    if [&args.release].into_iter().chain(&args.against).any(within) {
         let message = "the report cannot go into the release, which is sealed; name a folder beside it with -o";
         return Err(Failure::usage(message));
     }
+    let companions = Companions { against: args.against.clone(), logs: args.logs.clone() };
     let teller = Teller::new(common.quiet);
-    let summary = sastrugi_report::render(&args.release, &output, &|phase| teller.say(phase));
+    let summary = sastrugi_report::render_with(&args.release, &companions, &output, &|phase| teller.say(phase));
     let summary = summary.map_err(|e| if e.unusable_input() { Failure::input(e) } else { Failure::failed(e) })?;
     let page = output.join("index.html");
     let text = format!("{}: {} files", page.display(), summary.files.len());

@@ -1,9 +1,10 @@
 //! Whether groups of missions differ, by tests whose unit is the terrain.
 
+mod declared;
 mod model;
 mod planning;
-mod values;
-mod verdicts;
+pub(super) mod values;
+pub(super) mod verdicts;
 
 use super::Question;
 use super::clusters::{LEVEL, Pairing, REPLICATES};
@@ -21,7 +22,7 @@ pub const QUESTION: Question =
     Question { id: "comparison", name: "Comparison", title: "Do the groups differ?", answer };
 
 /// Level of the tests.
-const ALPHA: f64 = 0.05;
+pub const ALPHA: f64 = 0.05;
 /// Random arrangements of a test; where there are no more than these, all are looked at.
 const DRAWS: usize = 9999;
 /// Fewest of them: with very many terrains an arrangement takes long, and this many still tell 0.001.
@@ -31,30 +32,39 @@ const LAID_MAX: usize = 3_000_000;
 
 fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     let groups = data.mission_groups();
-    if groups.len() < 2 {
-        return Ok(Vec::new());
-    }
     let pairing = Pairing::among(&groups);
-    let figures = values::figures(&groups, &pairing);
+    let mut blocks = declared::blocks(data, &groups, &pairing);
+    if groups.len() > 1 {
+        blocks.extend(exploratory(data, &groups, &pairing));
+    }
+    Ok(blocks)
+}
+
+/// Everything that no hypothesis of the study asked for.
+fn exploratory(data: &Data, groups: &[Group<MissionRow>], pairing: &Pairing) -> Vec<Block> {
+    let heading = |_| Block::Heading("Everything else is exploratory".into());
+    let mut blocks: Vec<Block> = data.study.hypotheses.first().map(heading).into_iter().collect();
+    let figures = values::figures(groups, pairing);
     let verdicts = verdicts::verdicts(data, &figures);
     if verdicts.iter().all(|v| v.test.is_none()) {
-        return Ok(vec![Block::Warning(
+        blocks.push(Block::Warning(
             "Groups cannot be compared: there are too few terrains for a test. Missions are no substitute, because those on \
              one terrain resemble each other."
                 .into(),
-        )]);
+        ));
+        return blocks;
     }
-    let mut blocks = vec![
+    blocks.extend([
         Block::Text(verdicts::in_words(&verdicts)),
-        Block::Text(introduction(&pairing)),
-        Block::Text(refusal(&groups, &figures)),
+        Block::Text(introduction(data, pairing)),
+        Block::Text(refusal(groups, &figures)),
         Block::Figures(verdicts::drawing(&figures, &verdicts).into_iter().collect()),
         Block::Table(verdicts::table_of_pairs(&verdicts)),
         Block::Table(verdicts::table_of_trends(&verdicts)),
-    ];
-    blocks.extend(model::blocks(&groups, &pairing));
-    blocks.extend(planning::blocks(data, &figures, &pairing));
-    Ok(blocks)
+    ]);
+    blocks.extend(model::blocks(groups, pairing));
+    blocks.extend(planning::blocks(data, &figures, pairing));
+    blocks
 }
 
 /// Random arrangements of a test of so many values.
@@ -62,7 +72,11 @@ fn draws(values: usize) -> usize {
     (LAID_MAX / values.max(1)).clamp(DRAWS_MIN, DRAWS)
 }
 
-fn introduction(pairing: &Pairing) -> String {
+fn introduction(data: &Data, pairing: &Pairing) -> String {
+    let registered = match data.study.hypotheses.len() {
+        0 => "Exploratory: no hypothesis was registered before the run.",
+        _ => "Exploratory: nothing below was declared before the run, and its p values count as hints.",
+    };
     let tests = if pairing.is_common() {
         "Groups share their random draws, so terrains are compared within blocks: signed-rank tests of pairs, shifts and deltas \
          of differences within blocks, and Page's trend; signs or labels are laid anew within blocks."
@@ -71,7 +85,7 @@ fn introduction(pairing: &Pairing) -> String {
          terrains."
     };
     format!(
-        "Exploratory: no hypothesis was registered before the run. Every terrain counts once, by the mean of its missions \
+        "{registered} Every terrain counts once, by the mean of its missions \
          (success: of all; other figures: of the successful ones). {tests} p is the share of up to {} random arrangements, \
          or of all where they are fewer, that are as extreme. The shift is Hodges and Lehmann's, delta is Cliff's; \
          {} % intervals draw terrains or blocks anew ({REPLICATES} samples, percentiles). Groups are equivalent, at {} %, \

@@ -2,9 +2,10 @@
 
 use crate::data::Group;
 use crate::questions::clusters::Pairing;
-use crate::questions::missions::METRICS;
+use crate::questions::missions::{METRICS, Metric};
 use crate::questions::outcome::successful;
 use sastrugi_numeric::sums;
+use sastrugi_schemas::study::Statistic;
 use sastrugi_schemas::tables::MissionRow;
 use std::collections::BTreeMap;
 
@@ -37,20 +38,44 @@ impl Values<'_> {
     }
 }
 
+/// Figures that hypotheses may be about, beside those that every report compares.
+const EFFICIENCY: Metric =
+    Metric { column: "efficiency", name: "straight distance over path length", unit: "", of: |m| m.efficiency };
+const MAX_PITCH: Metric =
+    Metric { column: "max_pitch_deg", name: "largest pitch", unit: "°", of: |m| m.max_pitch_deg };
+const MAX_ROLL: Metric = Metric { column: "max_roll_deg", name: "largest roll", unit: "°", of: |m| m.max_roll_deg };
+
 /// Success, then every figure of the successful missions.
 pub fn figures<'a>(groups: &'a [Group<'a, MissionRow>], pairing: &Pairing<'a>) -> Vec<Figure<'a>> {
-    let success = Figure {
-        name: "success on a terrain",
-        unit: "%",
-        column: "success",
-        groups: groups.iter().map(|g| values(g, pairing, |m| if successful(m) { 100.0 } else { 0.0 })).collect(),
+    let metrics = METRICS.iter().map(|metric| of_successful(metric, groups, pairing));
+    std::iter::once(success(groups, pairing)).chain(metrics).collect()
+}
+
+/// The figure that a hypothesis is about.
+pub fn figure<'a>(statistic: Statistic, groups: &'a [Group<'a, MissionRow>], pairing: &Pairing<'a>) -> Figure<'a> {
+    let [acceleration, pitch_rate, roll_rate, time] = &METRICS;
+    let metric = match statistic {
+        Statistic::Success => return success(groups, pairing),
+        Statistic::Efficiency => &EFFICIENCY,
+        Statistic::TimeS => time,
+        Statistic::RmsVerticalAccelerationMS2 => acceleration,
+        Statistic::RmsPitchRateDegS => pitch_rate,
+        Statistic::RmsRollRateDegS => roll_rate,
+        Statistic::MaxPitchDeg => &MAX_PITCH,
+        Statistic::MaxRollDeg => &MAX_ROLL,
     };
-    let metrics = METRICS.iter().map(|metric| {
-        let value = |m: &MissionRow| if successful(m) { (metric.of)(m) } else { f64::NAN };
-        let groups = groups.iter().map(|g| values(g, pairing, value)).collect();
-        Figure { name: metric.name, unit: metric.unit, column: metric.column, groups }
-    });
-    std::iter::once(success).chain(metrics).collect()
+    of_successful(metric, groups, pairing)
+}
+
+fn success<'a>(groups: &'a [Group<'a, MissionRow>], pairing: &Pairing<'a>) -> Figure<'a> {
+    let groups = groups.iter().map(|g| values(g, pairing, |m| if successful(m) { 100.0 } else { 0.0 })).collect();
+    Figure { name: "success on a terrain", unit: "%", column: "success", groups }
+}
+
+fn of_successful<'a>(metric: &Metric, groups: &'a [Group<'a, MissionRow>], pairing: &Pairing<'a>) -> Figure<'a> {
+    let value = |m: &MissionRow| if successful(m) { (metric.of)(m) } else { f64::NAN };
+    let groups = groups.iter().map(|g| values(g, pairing, value)).collect();
+    Figure { name: metric.name, unit: metric.unit, column: metric.column, groups }
 }
 
 fn values<'a>(

@@ -2,9 +2,9 @@
 
 use super::values::{Figure, Values, common_blocks};
 use super::{ALPHA, draws};
-use crate::content::{Figure as Drawing, Numbers, Size, TableBlock, count, number, text};
+use crate::content::{Figure as Drawing, Numbers, TableBlock, count, number, text};
 use crate::data::Data;
-use crate::questions::clusters::{LEVEL, REPLICATES, stream};
+use crate::questions::clusters::{REPLICATES, stream};
 use crate::render::axis::Axis;
 use crate::render::chart::{Entry, Mark, RowLabel, Rows};
 use crate::render::number as set;
@@ -33,10 +33,39 @@ pub struct Verdict {
 
 /// What is measured beside a test.
 pub enum Measure {
-    /// A pair: the effect, and the margin within which the groups are equivalent.
-    Pair { effect: Option<Effect>, margin: f64 },
+    /// A pair: the effect, and the difference of means.
+    Pair { effect: Option<Effect>, difference: Option<MeanDifference> },
     /// A trend: correlation of order and value.
     Trend { correlation: f64, interval: Option<Interval> },
+}
+
+/// Test of two samples of terrains, with sizes of their difference.
+pub struct Pair {
+    pub test: Option<Permutation>,
+    pub effect: Option<Effect>,
+    pub difference: Option<MeanDifference>,
+}
+
+impl Pair {
+    /// Of samples that were drawn apart. Streams are named by what is compared and the figure.
+    pub fn between(data: &Data, (item, column): (&str, &str), [from, to]: [&[f64]; 2], alpha: f64) -> Self {
+        let [mut labels, mut redraws] = ["test", "effect"].map(|of| stream(data, item, &format!("{of} {column}")));
+        Self {
+            test: permutation::rank_sum(from, to, draws(from.len() + to.len()), &mut labels),
+            effect: Effect::between(from, to, REPLICATES, 1.0 - alpha, &mut redraws),
+            difference: MeanDifference::between(from, to),
+        }
+    }
+
+    /// Of pairs, from their differences.
+    pub fn of_differences(data: &Data, (item, column): (&str, &str), differences: &[f64], alpha: f64) -> Self {
+        let [mut labels, mut redraws] = ["test", "effect"].map(|of| stream(data, item, &format!("{of} {column}")));
+        Self {
+            test: permutation::signed_rank(differences, draws(2 * differences.len()), &mut labels),
+            effect: Effect::of_pairs(differences, REPLICATES, 1.0 - alpha, &mut redraws),
+            difference: MeanDifference::of_pairs(differences),
+        }
+    }
 }
 
 /// All tests of the figures, adjusted as one family.
@@ -44,9 +73,10 @@ pub fn verdicts(data: &Data, figures: &[Figure]) -> Vec<Verdict> {
     let mut verdicts = Vec::new();
     for figure in figures {
         let groups: Vec<&Values> = figure.groups.iter().filter(|g| !g.means.is_empty()).collect();
-        verdicts.extend(pairs(groups.len()).into_iter().map(|(a, b)| pair(data, figure, groups[a], groups[b])));
+        verdicts
+            .extend(pairs(groups.len()).into_iter().map(|(a, b)| pair(data, figure, [groups[a], groups[b]], ALPHA)));
         if groups.len() > 2 && ordered(&groups) {
-            verdicts.push(over_groups(data, figure, &groups));
+            verdicts.push(over_groups(data, figure, &groups, ALPHA));
         }
     }
     let p: Vec<f64> = verdicts.iter().map(|v| v.test.map_or(f64::NAN, |t| t.p)).collect();
@@ -65,28 +95,24 @@ fn ordered(groups: &[&Values]) -> bool {
     groups.iter().all(number)
 }
 
-fn pair(data: &Data, figure: &Figure, from: &Values, to: &Values) -> Verdict {
+/// The test of a pair of groups at a level, and intervals of the coverage that goes with it.
+pub fn pair(data: &Data, figure: &Figure, [from, to]: [&Values; 2], alpha: f64) -> Verdict {
     let groups = format!("{} to {}", from.name, to.name);
-    let mut labels = stream(data, &groups, &format!("test {}", figure.column));
-    let mut redraws = stream(data, &groups, &format!("effect {}", figure.column));
     let blocks = common_blocks(&[from, to]);
-    let (of, test, effect, difference) = if blocks.is_empty() {
+    let (of, pair) = if blocks.is_empty() {
         let (a, b) = (from.numbers(), to.numbers());
-        let test = permutation::rank_sum(&a, &b, draws(a.len() + b.len()), &mut labels);
-        let effect = Effect::between(&a, &b, REPLICATES, LEVEL, &mut redraws);
-        (format!("{} + {} terrains", a.len(), b.len()), test, effect, MeanDifference::between(&a, &b))
+        (format!("{} + {} terrains", a.len(), b.len()), Pair::between(data, (&groups, figure.column), [&a, &b], alpha))
     } else {
         let d: Vec<f64> = blocks.iter().map(|b| b[1] - b[0]).collect();
-        let test = permutation::signed_rank(&d, draws(2 * d.len()), &mut labels);
-        let effect = Effect::of_pairs(&d, REPLICATES, LEVEL, &mut redraws);
-        (set::counted(d.len(), "block"), test, effect, MeanDifference::of_pairs(&d))
+        (set::counted(d.len(), "block"), Pair::of_differences(data, (&groups, figure.column), &d, alpha))
     };
-    let margin = difference.map_or(f64::NAN, |d| d.smallest_margin(ALPHA));
-    let size = Measure::Pair { effect, margin };
+    let Pair { test, effect, difference } = pair;
+    let size = Measure::Pair { effect, difference };
     Verdict { figure: figure.name, unit: figure.unit, groups, of, test, adjusted: f64::NAN, size }
 }
 
-fn over_groups(data: &Data, figure: &Figure, groups: &[&Values]) -> Verdict {
+/// The test of a trend at a level, and an interval of the coverage that goes with it.
+pub fn over_groups(data: &Data, figure: &Figure, groups: &[&Values], alpha: f64) -> Verdict {
     let mut labels = stream(data, "trend", &format!("test {}", figure.column));
     let mut redraws = stream(data, "trend", &format!("effect {}", figure.column));
     let blocks = common_blocks(groups);
@@ -97,7 +123,7 @@ fn over_groups(data: &Data, figure: &Figure, groups: &[&Values]) -> Verdict {
             let taken = |(g, v): (&Vec<f64>, &Vec<usize>)| v.iter().map(|&k| g[k]).collect();
             trend::correlation_of_groups(&values.iter().zip(drawn).map(taken).collect::<Vec<_>>())
         };
-        let interval = cluster_interval(&sizes, REPLICATES, LEVEL, &mut redraws, drawn);
+        let interval = cluster_interval(&sizes, REPLICATES, 1.0 - alpha, &mut redraws, drawn);
         let counts = sizes.iter().map(usize::to_string).collect::<Vec<_>>().join(" + ");
         let test = trend::of_groups(&values, draws(sizes.iter().sum()), &mut labels);
         (format!("{counts} terrains"), test, trend::correlation_of_groups(&values), interval)
@@ -105,7 +131,7 @@ fn over_groups(data: &Data, figure: &Figure, groups: &[&Values]) -> Verdict {
         let drawn = |drawn: &[Vec<usize>]| {
             trend::correlation_of_blocks(&drawn[0].iter().map(|&k| blocks[k].clone()).collect::<Vec<_>>())
         };
-        let interval = cluster_interval(&[blocks.len()], REPLICATES, LEVEL, &mut redraws, drawn);
+        let interval = cluster_interval(&[blocks.len()], REPLICATES, 1.0 - alpha, &mut redraws, drawn);
         let test = trend::of_blocks(&blocks, draws(groups.len() * blocks.len()), &mut labels);
         (set::counted(blocks.len(), "block"), test, trend::correlation_of_blocks(&blocks), interval)
     };
@@ -144,11 +170,11 @@ pub fn table_of_pairs(verdicts: &[Verdict]) -> TableBlock {
         ("groups", ""),
         ("compared", ""),
         ("shift", ""),
-        ("low", ""),
-        ("high", ""),
+        ("shift, low", ""),
+        ("shift, high", ""),
         ("delta", ""),
-        ("low", ""),
-        ("high", ""),
+        ("delta, low", ""),
+        ("delta, high", ""),
         ("p", ""),
         ("p, Holm", ""),
         ("equivalent within", ""),
@@ -156,10 +182,11 @@ pub fn table_of_pairs(verdicts: &[Verdict]) -> TableBlock {
     let query = "tables/missions, plain run: mean by terrain (or block); success over all missions, others over successful ones";
     let mut numbers = Numbers::new(query, &columns).with_mixed_units();
     for v in verdicts {
-        let Measure::Pair { effect, margin } = &v.size else { continue };
+        let Measure::Pair { effect, difference } = &v.size else { continue };
+        let margin = difference.map_or(f64::NAN, |d| d.smallest_margin(ALPHA));
         let ends = |i: Option<Interval>| i.map_or([f64::NAN; 3], |i| [i.estimate, i.low, i.high]).map(number);
         let head = [text(v.figure), text(v.unit), text(&v.groups), text(&v.of)];
-        let tail = [number(v.test.map_or(f64::NAN, |t| t.p)), number(v.adjusted), number(*margin)];
+        let tail = [number(v.test.map_or(f64::NAN, |t| t.p)), number(v.adjusted), number(margin)];
         let sizes = ends(effect.map(|e| e.shift)).into_iter().chain(ends(effect.map(|e| e.delta)));
         numbers.row(head.into_iter().chain(sizes).chain(tail));
     }
@@ -255,7 +282,6 @@ pub fn drawing(figures: &[Figure], verdicts: &[Verdict]) -> Option<Drawing> {
                 .into(),
         description: format!("Cliff's delta of pairs of groups, between −1 and 1. {}.", parts.join("; ")),
         svg: rows.svg,
-        size: Size::Column,
         numbers,
     })
 }

@@ -1,7 +1,7 @@
 //! The covariance of a fit's residual at every lag, in all directions.
 
 use crate::ReportError;
-use crate::content::{Figure, Numbers, Size, number, slug, text};
+use crate::content::{Figure, Numbers, number, slug, text};
 use crate::data::Data;
 use crate::questions::relief::{MAP_WIDTH, extent};
 use crate::render::map::{Key, Map};
@@ -33,7 +33,6 @@ pub fn figure(data: &Data, fit: &FitRow) -> Result<Option<Figure>, ReportError> 
         caption: "Lag zero in the middle; round rings are those of an isotropic texture.".into(),
         description: format!("Map of the covariance of {path} about lag zero: {}.", extent(&grid)),
         svg: Map::new(&picture, MAP_WIDTH, &key).svg,
-        size: Size::Column,
         numbers,
     }))
 }

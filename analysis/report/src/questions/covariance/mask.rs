@@ -1,7 +1,7 @@
 //! Which cells of the DEM a fit was made from.
 
 use crate::ReportError;
-use crate::content::{Figure, Numbers, Size, count, slug, text};
+use crate::content::{Figure, Numbers, count, slug, text};
 use crate::data::Data;
 use crate::questions::relief::{MAP_WIDTH, extent};
 use crate::render::chart::Mark;
@@ -43,7 +43,6 @@ pub fn figure(data: &Data, fit: &FitRow) -> Result<Option<Figure>, ReportError> 
         caption: "Which cells entered the covariance, and why others did not.".into(),
         description: format!("Map of the cells of {path}: {}, {} used.", extent(&codes), share(0)),
         svg: map.svg,
-        size: Size::Column,
         numbers,
     }))
 }

@@ -10,7 +10,7 @@ use super::Question;
 use super::curves::HEIGHT;
 use super::relief::{Style, Words, deviations, exaggeration, exaggeration_words, limit_m, relief};
 use crate::ReportError;
-use crate::content::{Block, Figure, Numbers, Size, TableBlock, number, slug, text};
+use crate::content::{Block, Figure, Numbers, TableBlock, number, slug, text};
 use crate::data::Data;
 use crate::render::axis::Axis;
 use crate::render::chart::{Mark, Plot, WIDTH};
@@ -185,7 +185,7 @@ fn figure(id: String, fit: &FitRow, bins: &[&CovarianceRow], plot: Plot, banded:
     let query = format!("tables/covariance where fit_id = '{}' and azimuth_deg is null", fit.fit_id);
     let numbers = Numbers::select(query, bins.iter().copied(), &names);
     let title = format!("{}, {} mode.", fit.fit_id, fit.mode);
-    Figure { id, title, caption, description, svg: plot.svg, size: Size::Column, numbers }
+    Figure { id, title, caption, description, svg: plot.svg, numbers }
 }
 
 /// A parameter of every fit: name, unit, figure.

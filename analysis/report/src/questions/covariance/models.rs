@@ -2,7 +2,7 @@
 
 use super::super::curves::HEIGHT;
 use super::verdict;
-use crate::content::{Figure, Numbers, Size, TableBlock, slug, text};
+use crate::content::{Figure, Numbers, TableBlock, slug, text};
 use crate::data::Data;
 use crate::render::axis::Axis;
 use crate::render::chart::{Entry, Mark, Plot, WIDTH};
@@ -72,7 +72,6 @@ fn candidates(data: &Data, fit: &FitRow) -> Option<Figure> {
         caption: "Each candidate after the same detrending and trimming as the data, the best by AICc first.".into(),
         description: format!("Covariance against lag with {} candidate models.", drawn.len()),
         svg: plot.svg,
-        size: Size::Column,
         numbers: Numbers::select(query, rows, &names),
     })
 }
@@ -127,7 +126,6 @@ fn profile(data: &Data, fit: &FitRow) -> Option<Figure> {
         ),
         description: format!("Profile likelihood over ranges from {}.", span(ends)),
         svg: plot.svg,
-        size: Size::Column,
         numbers: Numbers::select(query, points, &["point", "range_m", "chi2_rise"]),
     })
 }
@@ -177,7 +175,6 @@ fn directions(data: &Data, fit: &FitRow) -> Option<Figure> {
         caption: format!("Sectors about azimuths clockwise from north, opposite directions together. {verdict}"),
         description: format!("Covariance against lag in {} directions. {verdict}", sectors.len()),
         svg: plot.svg,
-        size: Size::Column,
         numbers: Numbers::select(query, rows, &names),
     })
 }

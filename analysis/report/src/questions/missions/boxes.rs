@@ -1,7 +1,7 @@
 //! Box plots by group, with sampling bands of the medians and the paper's figures where there are any.
 
-use super::{METRICS, Metric};
-use crate::content::{Figure, Numbers, Size, TableBlock, count, number, slug, text};
+use super::{METRICS, Metric, from_missions};
+use crate::content::{Figure, Numbers, TableBlock, count, number, slug, text};
 use crate::data::{Data, Group};
 use crate::papers;
 use crate::questions::clusters::band;
@@ -52,7 +52,10 @@ pub fn compared<'a>(data: &Data, groups: &[Group<'a, MissionRow>]) -> Vec<Compar
         unit: "%",
         figure: "success",
         n_is: "terrains",
-        query: "tables/missions, share of outcome = 'success' by terrain".into(),
+        query: format!(
+            "select \"group\", terrain_id, 100 * avg(if(outcome = 'success', 1, 0)) {} group by all",
+            from_missions(data, None)
+        ),
         samples: samples(data, groups, "success", success_shares),
     };
     let metric = |m: &'static Metric| Compared {
@@ -60,7 +63,7 @@ pub fn compared<'a>(data: &Data, groups: &[Group<'a, MissionRow>]) -> Vec<Compar
         unit: m.unit,
         figure: m.column,
         n_is: "successful missions",
-        query: format!("tables/missions where outcome = 'success', column {}", m.column),
+        query: format!("select \"group\", terrain_id, {} {}", m.column, from_missions(data, Some("success"))),
         samples: samples(data, groups, m.column, |g| successful(g, m)),
     };
     std::iter::once(success).chain(METRICS.iter().map(metric)).collect()
@@ -169,7 +172,6 @@ pub fn figure(data: &Data, compared: &Compared) -> Option<Figure> {
         caption: format!("n counts {}.{beyond}", compared.n_is),
         description: describe(samples, &axis_title),
         svg: rows.svg,
-        size: Size::Column,
         numbers: numbers(compared),
         id,
     })

@@ -1,8 +1,8 @@
 //! How far missions came: cumulative incidence of the ways to fail, over the distance along the line.
 
-use crate::content::{Block, Figure, Numbers, Size, count, number, slug, text};
+use crate::content::{Block, Figure, Numbers, count, number, slug, text};
 use crate::data::{Data, Group};
-use crate::questions::clusters::{Clusters, LEVEL, REPLICATES, stream};
+use crate::questions::clusters::{LEVEL, REPLICATES, numbered, stream};
 use crate::questions::outcome;
 use crate::render::axis::Axis;
 use crate::render::chart::{Entry, Mark, Plot, WIDTH};
@@ -63,13 +63,16 @@ fn ending(mission: &MissionRow) -> Ending {
 }
 
 fn curves<'a>(data: &Data, group: &'a Group<'a, MissionRow>, length: f64) -> Curves<'a> {
-    let items: Vec<(&str, Ending)> = group.rows.iter().map(|m| (m.terrain_id.as_str(), ending(m))).collect();
-    let incidence = Incidence::of(&items.iter().map(|i| i.1).collect::<Vec<_>>(), CAUSES.len());
-    let clusters = Clusters::new(&[items]);
+    let items = group.rows.iter().map(|m| (m.terrain_id.as_str(), ending(m))).filter(|i| i.1.at.is_finite());
+    let mut items: Vec<(&str, Ending)> = items.collect();
+    items.sort_by(|a, b| a.1.at.total_cmp(&b.1.at));
+    let incidence = Incidence::of_counted(items.iter().map(|i| (i.1, 1)), CAUSES.len());
+    let (clusters, items) = numbered(&items);
     let mut stream = stream(data, &group.name, "progress_m");
-    let several = clusters.samples().iter().all(|n| *n > 1);
-    let redrawn = bootstrap::redraw(clusters.samples(), if several { REPLICATES } else { 0 }, &mut stream, |drawn| {
-        Incidence::of(&clusters.pooled(drawn)[0], CAUSES.len())
+    let redrawn = bootstrap::redraw(&[clusters], if clusters > 1 { REPLICATES } else { 0 }, &mut stream, |drawn| {
+        let mut times = vec![0; clusters];
+        drawn[0].iter().for_each(|&c| times[c] += 1);
+        Incidence::of_counted(items.iter().map(|(c, ending)| (*ending, times[*c])), CAUSES.len())
     });
     let band = |cause: usize, at: f64| {
         let values: Vec<f64> = redrawn.iter().map(|i| i.share(cause, at)).collect();
@@ -109,7 +112,6 @@ fn figure(curves: &Curves, length: f64, top: f64) -> Figure {
         caption: format!("Missions that failed, by distance; {} in all.", set::count(rows)),
         description: describe(curves, &causes, length),
         svg: plot.svg,
-        size: Size::Column,
         numbers: numbers(curves, length),
     }
 }

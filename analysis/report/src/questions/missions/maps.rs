@@ -1,7 +1,7 @@
 //! Missions on the class map of one terrain of each group.
 
 use crate::ReportError;
-use crate::content::{Figure, Numbers, Size, slug};
+use crate::content::{Figure, Numbers, slug};
 use crate::data::{Data, Group};
 use crate::questions::outcome;
 use crate::questions::relief::{MAP_WIDTH, exaggeration, extent};
@@ -96,7 +96,6 @@ fn figure(data: &Data, drawn: &Drawn) -> Result<Option<Figure>, ReportError> {
         ),
         description: format!("Map of missions, {}; missions by outcome: {}.", extent(&codes), outcomes.join(", ")),
         svg: map.svg,
-        size: Size::Column,
         numbers: Numbers::select(query, missions.iter().copied(), &columns),
     }))
 }

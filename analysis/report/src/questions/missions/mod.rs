@@ -52,7 +52,7 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     }
     let pairing = Pairing::of(data);
     let compared = boxes::compared(data, &groups);
-    let mut figures = vec![outcomes::stacked(&groups)];
+    let mut figures = vec![outcomes::stacked(data, &groups)];
     figures.extend(compared.iter().filter_map(|c| boxes::figure(data, c)));
     let mut blocks = vec![
         Block::Text(introduction(data, &groups, &pairing)),
@@ -67,6 +67,14 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     blocks.extend(parameters(data).map(Block::FoldedTable));
     blocks.push(Block::FoldedTable(all(data)));
     Ok(blocks)
+}
+
+/// The end of a query of duckdb, in the folder of the release: missions of the plain run, of one outcome or of all.
+fn from_missions(data: &Data, outcome: Option<&str>) -> String {
+    let plain = data.missions.iter().any(|m| m.variant.is_none()).then(|| "variant is null".to_owned());
+    let rules: Vec<String> = plain.into_iter().chain(outcome.map(|word| format!("outcome = '{word}'"))).collect();
+    let rules = if rules.is_empty() { String::new() } else { format!(" where {}", rules.join(" and ")) };
+    format!("from 'tables/missions/*.parquet'{rules}")
 }
 
 const MAPS: &str = "One terrain of each group: the one whose share of successful missions is in the middle (the lower middle of \

@@ -1,7 +1,8 @@
 //! Outcomes by group: stacked bars with their counts.
 
-use crate::content::{Figure, Numbers, Size, count, text};
-use crate::data::Group;
+use super::from_missions;
+use crate::content::{Figure, Numbers, count, text};
+use crate::data::{Data, Group};
 use crate::questions::outcome::{self, ALL};
 use crate::render::axis::Axis;
 use crate::render::chart::{Entry, Mark, RowLabel, Rows};
@@ -11,7 +12,7 @@ use sastrugi_schemas::Cell;
 use sastrugi_schemas::tables::MissionRow;
 
 /// One bar per group.
-pub fn stacked(groups: &[Group<MissionRow>]) -> Figure {
+pub fn stacked(data: &Data, groups: &[Group<MissionRow>]) -> Figure {
     let counts: Vec<[usize; ALL.len()]> = groups.iter().map(|g| outcome::counts(g.rows.iter().copied())).collect();
     let label = |g: &Group<MissionRow>| RowLabel { name: g.name.clone(), detail: format!("n = {}", g.rows.len()) };
     let labels: Vec<RowLabel> = groups.iter().map(label).collect();
@@ -26,8 +27,7 @@ pub fn stacked(groups: &[Group<MissionRow>]) -> Figure {
         caption: "Figures in the bars are counts of missions.".into(),
         description: describe(groups, &counts),
         svg: rows.svg,
-        size: Size::Column,
-        numbers: numbers(groups, &counts, &kinds),
+        numbers: numbers(data, groups, &counts, &kinds),
     }
 }
 
@@ -55,10 +55,11 @@ fn describe(groups: &[Group<MissionRow>], counts: &[[usize; ALL.len()]]) -> Stri
     format!("Missions by outcome. {}.", groups.iter().zip(counts).map(group).collect::<Vec<_>>().join("; "))
 }
 
-fn numbers(groups: &[Group<MissionRow>], counts: &[[usize; ALL.len()]], kinds: &[usize]) -> Numbers {
+fn numbers(data: &Data, groups: &[Group<MissionRow>], counts: &[[usize; ALL.len()]], kinds: &[usize]) -> Numbers {
     let names = kinds.iter().map(|&i| (ALL[i].name, "1"));
     let columns: Vec<(&str, &str)> = [("group", ""), ("missions", "1")].into_iter().chain(names).collect();
-    let mut numbers = Numbers::new("tables/missions, counts by group and outcome", &columns);
+    let query = format!("select \"group\", outcome, count(*) {} group by all", from_missions(data, None));
+    let mut numbers = Numbers::new(query, &columns);
     for (group, counts) in groups.iter().zip(counts) {
         let cells = kinds.iter().map(|&i| count(counts[i]));
         let head: [Cell; 2] = [text(&group.name), count(group.rows.len())];

@@ -2,11 +2,11 @@
 
 use super::maps::{Drawn, of_mission};
 use crate::ReportError;
-use crate::content::{Figure, Heading, Numbers, Size, number, slug};
+use crate::content::{Figure, Heading, Numbers, number, slug};
 use crate::data::{Data, Group};
 use crate::questions::outcome::{self, ALL};
 use crate::render::axis::Axis;
-use crate::render::chart::{Entry, Mark, Plot, axis_room};
+use crate::render::chart::{Entry, Mark, Plot, WIDTH, axis_room};
 use crate::render::svg::{Anchor, Paint, Stroke, Svg};
 use crate::render::{number as set, thin};
 use sastrugi_schemas::RoughnessClass;
@@ -20,8 +20,7 @@ const ROLL: Stroke = Stroke { paint: Paint::Series(1), width: 1.6, dash: "5 2.5"
 const HEAVE: Stroke = Stroke { paint: Paint::Series(2), width: 1.1, dash: "", opacity: 1.0 };
 /// Height of the band of classes, px.
 const BAND: f64 = 12.0;
-const WIDTH: f64 = 900.0;
-const ANGLES: f64 = 270.0;
+const ANGLES: f64 = 230.0;
 const HEAVES: f64 = 190.0;
 /// Outcomes that are shown, by their numbers: success, tipped, stuck.
 const SHOWN: [usize; 3] = [0, 2, 1];
@@ -177,13 +176,5 @@ fn finish(id: String, mission: &MissionRow, samples: &[SampleRow], heaves: &[f64
     let mut numbers = Numbers::select(query, samples, &columns);
     numbers.columns.push(Heading { name: "vertical_acceleration_m_s2".into(), unit: "m/s2".into() });
     numbers.rows.iter_mut().zip(heaves).for_each(|(row, a)| row.push(number(*a)));
-    Figure {
-        id,
-        title: format!("A mission with outcome: {outcome}."),
-        caption,
-        description,
-        svg,
-        size: Size::Wide,
-        numbers,
-    }
+    Figure { id, title: format!("A mission with outcome: {outcome}."), caption, description, svg, numbers }
 }

@@ -4,7 +4,7 @@ use super::Question;
 use super::clusters::{LEVEL, REPLICATES, stream};
 use super::outcome;
 use crate::ReportError;
-use crate::content::{Block, Figure, Numbers, Size, TableBlock, count, number, slug, text};
+use crate::content::{Block, Figure, Numbers, TableBlock, count, number, slug, text};
 use crate::data::{Data, Group};
 use crate::render::axis::Axis;
 use crate::render::chart::{Entry, Mark, Plot, RowLabel, Rows, WIDTH};
@@ -177,7 +177,6 @@ fn histogram(group: &Split) -> Figure {
             group.name
         ),
         svg: plot.svg,
-        size: Size::Column,
         numbers,
     }
 }
@@ -203,7 +202,6 @@ fn stacked(groups: &[&Split]) -> Figure {
         caption: "n counts missions. Intervals stand in the table.".into(),
         description: format!("Shares of the variance. {}.", groups.iter().map(in_words).collect::<Vec<_>>().join("; ")),
         svg: rows.svg,
-        size: Size::Column,
         numbers: components_of(groups.iter().copied()),
     }
 }

@@ -3,7 +3,7 @@
 use super::Question;
 use super::curves::HEIGHT;
 use crate::ReportError;
-use crate::content::{Block, Figure, Numbers, Size, TableBlock, slug};
+use crate::content::{Block, Figure, Numbers, TableBlock, slug};
 use crate::data::Data;
 use crate::render::axis::Axis;
 use crate::render::chart::{Mark, Plot, WIDTH};
@@ -86,7 +86,6 @@ fn figure(texture: &str, score: &ScoreRow, curve: &[&ScoreCovarianceRow], x: Axi
             set::significant(score.covariance_error_max, 2)
         ),
         svg: plot.svg,
-        size: Size::Column,
         numbers: Numbers::select(query, curve.iter().copied(), &names),
     }
 }

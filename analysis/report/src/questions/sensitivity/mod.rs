@@ -5,7 +5,7 @@ use super::clusters::{Clusters, LEVEL, block, stream};
 use super::missions::METRICS;
 use super::outcome::successful;
 use crate::ReportError;
-use crate::content::{Block, Figure, Numbers, Size, TableBlock, count, number, text};
+use crate::content::{Block, Figure, Numbers, TableBlock, count, number, text};
 use crate::data::{Data, Group};
 use crate::render::axis::Axis;
 use crate::render::chart::{Entry, Mark, RowLabel, Rows};
@@ -185,7 +185,6 @@ fn figure(effects: &[Effect]) -> Figure {
         caption: format!("Marks are changes from the plain run, lines their 95 % intervals.{more}"),
         description: describe(effects),
         svg: rows.svg,
-        size: Size::Column,
         numbers: numbers(effects),
     }
 }
@@ -253,11 +252,11 @@ fn table(data: &Data, effects: &[Effect]) -> TableBlock {
         ("low", "points"),
         ("high", "points"),
         ("acceleration", "m/s2"),
-        ("change", "%"),
+        ("its change", "%"),
         ("pitch rate", "deg/s"),
-        ("change", "%"),
+        ("its change", "%"),
         ("roll rate", "deg/s"),
-        ("change", "%"),
+        ("its change", "%"),
     ];
     let mut numbers = Numbers::new("tables/missions by variant and group; medians where outcome = 'success'", &columns);
     for e in effects {

@@ -2,7 +2,7 @@
 
 use super::{median, representative};
 use crate::ReportError;
-use crate::content::{Figure, Numbers, Size, count, number, slug, text};
+use crate::content::{Figure, Numbers, count, number, slug, text};
 use crate::data::{Data, Group};
 use crate::papers;
 use crate::questions::clusters::band;
@@ -149,7 +149,6 @@ fn shares_figure(data: &Data, rows: Rows, groups: &[&Group<TerrainRow>], bars: &
             .into(),
         description: format!("Median shares. {}.", groups.iter().map(in_words).collect::<Vec<_>>().join("; ")),
         svg: rows.svg,
-        size: Size::Column,
         numbers: share_numbers(groups, bars),
     }
 }
@@ -202,7 +201,6 @@ fn map(data: &Data, group: &Group<TerrainRow>) -> Result<Option<Figure>, ReportE
         caption: format!("{}, closed class map over its relief.", terrain.terrain_id),
         description: format!("Map of roughness classes, {}.", extent(&codes)),
         svg: map.svg,
-        size: Size::Column,
         numbers,
     }))
 }

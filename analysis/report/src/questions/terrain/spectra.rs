@@ -1,7 +1,7 @@
 //! Power spectral densities with their fitted slopes, and height distributions, one frame per group on common axes.
 
 use super::median;
-use crate::content::{Figure, Numbers, Size, slug};
+use crate::content::{Figure, Numbers, slug};
 use crate::data::{Data, Group};
 use crate::questions::curves::{self, Curve};
 use crate::render::chart::Plot;
@@ -81,5 +81,5 @@ fn query(table: &str, group: &Group<TerrainRow>) -> String {
 }
 
 fn finish(id: String, title: String, caption: &str, description: String, plot: Plot, numbers: Numbers) -> Figure {
-    Figure { id, title, caption: caption.into(), description, svg: plot.svg, size: Size::Column, numbers }
+    Figure { id, title, caption: caption.into(), description, svg: plot.svg, numbers }
 }

@@ -12,7 +12,7 @@ use super::relief::{
     Style, Words, deviations, exaggeration, exaggeration_words, limit_m, middle_range, relief, relief_of,
 };
 use crate::ReportError;
-use crate::content::{Block, Figure, Numbers, Size, TableBlock, slug};
+use crate::content::{Block, Figure, Numbers, TableBlock, slug};
 use crate::data::{self, Data};
 use crate::render::chart::Plot;
 use crate::render::svg::{Paint, Stroke};
@@ -172,7 +172,6 @@ impl Chart<'_> {
             caption: with_measured(self.caption, self.measured, curves),
             description: format!("{} {}.", self.caption, names_of(curves)),
             svg: plot.svg,
-            size: Size::Column,
             numbers,
         }
     }
