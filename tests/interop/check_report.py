@@ -62,9 +62,9 @@ def quartiles(document):
 
 def recording():
     """A mission's row and its recording say the same."""
-    path, outcome, time_s = duckdb.sql(
+    [(path, outcome, time_s)] = duckdb.sql(
         "select path, outcome, time_s from 'tables/missions/*.parquet' where outcome = 'success' order by path limit 1"
-    ).fetchone()
+    ).fetchall()
     with open(path, "rb") as stream:
         records = {record.name: record.metadata for record in make_reader(stream, validate_crcs=True).iter_metadata()}
     found = records["outcome"]
