@@ -23,7 +23,8 @@ pub fn check(builder: &mut Builder<'_>) -> Result<(), BuildError> {
         builder.claim(&entry, SECTION, &item.id)?;
         item.check().map_err(|e| entry.refuse(e))?;
         let known = groups(builder);
-        for (k, group) in item.groups.iter().enumerate().filter(|(_, group)| !known.contains(group.as_str())) {
+        let unknown = item.groups.iter().enumerate().find(|(_, group)| !known.contains(group.as_str()));
+        if let Some((k, group)) = unknown {
             let error = entry.error(&format!("groups.{k}"), format!("no missions are driven in a group \"{group}\""));
             return Err(suggesting(error, group, &known).into());
         }
