@@ -215,7 +215,7 @@ fn in_words(placed: &[Placed]) -> String {
     let logs = placed.iter().map(|p| p.log).max().map_or(0, |last| last + 1);
     let parts: Vec<String> = words.iter().filter_map(part).collect();
     format!(
-        "{} of {}, each beside a group of missions. {}.",
+        "{} of {}, each beside a group of missions: {}.",
         set::counted(placed.len(), "figure"),
         set::counted(logs, "log"),
         parts.join("; ")
@@ -224,7 +224,7 @@ fn in_words(placed: &[Placed]) -> String {
 
 fn introduction() -> String {
     format!(
-        "Columns of the same name mean the same in `missions` and `logs` (`sastrugi analyze`). Beside each figure of a log stand the missions that \
+        "Columns of the same name mean the same in the tables missions and logs (sastrugi analyze). Beside each figure of a log stand the missions that \
          reached their goal: their 5th, 50th and 95th percentile, and the place of the log among them, which is the share of missions below it \
          (equal ones count half) with a {} % interval that draws whole terrains anew ({REPLICATES} redraws, percentiles). A log \
          is like the missions where the interval lies within {} to {} %. One log is one drive: it may be an odd one. Below three \
@@ -243,7 +243,7 @@ fn rates(data: &Data, logs: &[LogRow]) -> Option<String> {
     (!logs.is_empty()).then(|| {
         format!(
             "Sampled at another rate than the missions ({} Hz), so that accelerations and rates are not of one band: {}. Analyse \
-             these logs with `--rate`.",
+             these logs with --rate.",
             set::plain(missions, 4),
             logs.join(", ")
         )
