@@ -9,6 +9,10 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// Bootstrap samples behind an interval.
 pub const REPLICATES: usize = 1000;
+/// Fewest of them: of very many missions a sample takes long, and this many still tell the ends of a band.
+const REPLICATES_MIN: usize = 250;
+/// Values that the samples of an interval hold in all, beyond which there are fewer of them.
+const DRAWN_MAX: usize = 10_000_000;
 /// Nominal coverage of an interval of an estimate.
 pub const LEVEL: f64 = 0.95;
 /// Coverage of a sampling band, 5 to 95 %.
@@ -126,7 +130,9 @@ impl<T: Copy> Clusters<T> {
 
     /// Percentile interval of a statistic of the items of every group; `None` with fewer than two clusters.
     pub fn interval(&self, stream: &mut Stream, level: f64, statistic: impl Fn(&[Vec<T>]) -> f64) -> Option<Interval> {
-        cluster_interval(&self.samples, REPLICATES, level, stream, |drawn| statistic(&self.pooled(drawn)))
+        let values: usize = self.groups.iter().map(|g| g.1.len()).sum();
+        let replicates = (DRAWN_MAX / values.max(1)).clamp(REPLICATES_MIN, REPLICATES);
+        cluster_interval(&self.samples, replicates, level, stream, |drawn| statistic(&self.pooled(drawn)))
     }
 }
 

@@ -98,7 +98,7 @@ fn introduction(data: &Data, groups: &[Group<MissionRow>], pairing: &Pairing) ->
     };
     format!(
         "{} missions driven by {}; {} reached their goal.{variants} Missions on one terrain resemble each other: intervals draw \
-         whole {} anew ({REPLICATES} samples, percentiles); with fewer than about ten in a group they are too short. The \
+         whole {} anew ({REPLICATES} samples, fewer beyond 10 000 values; percentiles); with fewer than about ten in a group they are too short. The \
          sampling band of a figure holds 5 to 95 % of what such redraws give. Boxes are quartiles (linear between order \
          statistics), whiskers reach the last value within 1.5 interquartile ranges, circles lie beyond. Everything here is \
          exploratory.",
