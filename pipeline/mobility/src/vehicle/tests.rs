@@ -593,7 +593,7 @@ fn val_recording_is_complete() {
     assert!(recording.imu.iter().all(|sample| (norm(sample.orientation) - 1.0).abs() < 1e-14));
     // Every fifth measurement stands at the instant of a state, which holds it to half a step of 2^-20.
     for (state, sample) in recording.states.iter().zip(recording.imu.iter().step_by(5)) {
-        assert!((0..4).all(|k| (state.orientation[k] - sample.orientation[k]).abs() <= f64::powi(2.0, -21)));
+        assert!((0..4).all(|k| (state.orientation[k] - sample.orientation[k]).abs() <= 0.5 / 1_048_576.0));
     }
     let names: Vec<&str> = recording.vehicle.wheels.iter().map(|w| w.name.as_str()).collect();
     assert_eq!(names, ["front_left_wheel", "front_right_wheel", "rear_left_wheel", "rear_right_wheel"]);
