@@ -113,6 +113,16 @@ pub fn rank_sum(first: &[f64], second: &[f64], draws: usize, stream: &mut Stream
     within_blocks(&labels, &[scores.len()], draws, stream, |labels| linear(labels, &scores).abs())
 }
 
+/// Second less first of every pair; 0 where they are equal but for rounding, as means of the same value over other numbers of
+/// missions are: a sign counts in a test however small the difference.
+pub fn differences(pairs: impl IntoIterator<Item = [f64; 2]>) -> Vec<f64> {
+    let difference = |[first, second]: [f64; 2]| {
+        let equal = (second - first).abs() <= EQUAL * first.abs().max(second.abs());
+        if equal { 0.0 } else { second - first }
+    };
+    pairs.into_iter().map(difference).collect()
+}
+
 /// Two-sided signed-rank test (F. Wilcoxon, 1945), ties of the magnitudes sharing their mean rank, zeros ranked and
 /// without a sign (J. Pratt, 1959). The statistic is the magnitude of the sum of signed ranks.
 pub fn signed_rank(differences: &[f64], draws: usize, stream: &mut Stream) -> Option<Permutation> {

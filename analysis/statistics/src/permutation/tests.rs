@@ -120,3 +120,13 @@ fn stat_level_of_the_two_group_tests() {
     }
     assert!(found.iter().all(|n| (57..=151).contains(n)), "{found:?} of 2000");
 }
+
+/// Means of equal values differ by rounding when there are more of them; that is no sign.
+#[test]
+fn val_rounding_is_no_difference() {
+    let mean = |n: usize| (0..n).map(|_| 0.1).sum::<f64>() / n as f64;
+    let pairs = [3, 6, 7, 10].map(|n| [mean(1), mean(n)]);
+    assert!(pairs.iter().any(|[a, b]| a != b));
+    assert_eq!(differences(pairs), [0.0; 4]);
+    assert_eq!(differences([[1.0, 1.5], [2.0, 1.0], [0.0, 0.0], [0.0, 1e-12]]), [0.5, -1.0, 0.0, 1e-12]);
+}

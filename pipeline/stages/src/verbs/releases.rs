@@ -357,7 +357,8 @@ fn quantity(key: &Key, a: &Figures, b: &Figures, parameters: &Parameters, stream
     let (by_a, by_b) = (a.means(key), b.means(key));
     let paired = by_a.keys().eq(by_b.keys()) && by_a.keys().all(|terrain| a.shares_ground(b, terrain));
     let [first, second] = [&by_a, &by_b].map(|means| means.values().copied().collect::<Vec<f64>>());
-    let differences: Vec<f64> = if paired { second.iter().zip(&first).map(|(b, a)| b - a).collect() } else { vec![] };
+    let pairs = first.iter().zip(&second).map(|(a, b)| [*a, *b]);
+    let differences = if paired { permutation::differences(pairs) } else { vec![] };
     let mut stream = streams.stream(&format!("{table}/{group}/{figure}"));
     let test = match paired {
         true => permutation::paired(&differences, DRAWS, &mut stream, |d| sums::mean(d).abs()),

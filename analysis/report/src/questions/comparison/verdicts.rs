@@ -103,7 +103,7 @@ pub fn pair(data: &Data, figure: &Figure, [from, to]: [&Values; 2], alpha: f64) 
         let (a, b) = (from.numbers(), to.numbers());
         (format!("{} + {} terrains", a.len(), b.len()), Pair::between(data, (&groups, figure.column), [&a, &b], alpha))
     } else {
-        let d: Vec<f64> = blocks.iter().map(|b| b[1] - b[0]).collect();
+        let d = permutation::differences(blocks.iter().map(|b| [b[0], b[1]]));
         (set::counted(d.len(), "block"), Pair::of_differences(data, (&groups, figure.column), &d, alpha))
     };
     let Pair { test, effect, difference } = pair;

@@ -226,7 +226,7 @@ fn introduction() -> String {
     format!(
         "Columns of the same name mean the same in the tables missions and logs (sastrugi analyze). Beside each figure of a log stand the missions that \
          reached their goal: their 5th, 50th and 95th percentile, and the place of the log among them, which is the share of missions below it \
-         (equal ones count half) with a {} % interval that draws whole terrains anew ({REPLICATES} redraws, percentiles). A log \
+         (equal ones count half) with a {} % interval that draws whole terrains anew ({REPLICATES} redraws, fewer beyond 10 000 missions; percentiles). A log \
          is like the missions where the interval lies within {} to {} %. One log is one drive: it may be an odd one. Below three \
          noise floors the log itself cannot tell. A log that names a group stands beside that group only. Exploratory.",
         set::fixed(100.0 * LEVEL, 0),

@@ -11,7 +11,7 @@ use crate::data::{Against, Data, Group};
 use crate::render::number as set;
 use sastrugi_numeric::sums;
 use sastrugi_schemas::tables::MissionRow;
-use sastrugi_statistics::holm;
+use sastrugi_statistics::{holm, permutation};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Registry entry.
@@ -82,9 +82,9 @@ fn compare(data: &Data, there: &Figure, here: &Figure, same_terrains: bool) -> O
     let means = [sums::mean(&a), sums::mean(&b)];
     let margin = if here.column == "success" { MARGIN_POINTS } else { MARGIN_SHARE * means[0].abs() };
     let item = format!("{} against other release", to.name);
-    let pairs: Vec<(f64, f64)> = from.means.iter().filter_map(|(name, v)| Some((*v, *to.means.get(name)?))).collect();
+    let pairs = || from.means.iter().filter_map(|(name, v)| Some([*v, *to.means.get(name)?]));
     let (of, pair, equal) = if same_terrains {
-        let d: Vec<f64> = pairs.iter().map(|(a, b)| b - a).collect();
+        let d = permutation::differences(pairs());
         let equal = d.iter().all(|d| *d == 0.0) && a.len() == b.len();
         (
             format!("{}, paired", set::counted(d.len(), "terrain")),
