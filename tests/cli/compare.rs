@@ -152,7 +152,7 @@ fn stat_releases_are_compared_by_terrain() {
     assert!(answers(&seeds).iter().all(|answer| *answer != "different"), "{seeds}");
     assert_eq!(seeds["quantities"][0]["terrains"], serde_json::json!([12, 12]));
     assert_eq!((&seeds["quantities"][0]["paired"], &seeds["same_study_and_version"]), (&false.into(), &false.into()));
-    // A margin of three standard deviations is met by what is drawn alike.
+    // A margin of three times the mean is met by what is drawn alike.
     let wide = json(path, &["compare", "one", "two", "--margin", "3", "--fail-on-difference"], 0);
     assert!(answers(&wide).iter().all(|answer| *answer == "same"), "{wide}");
 

@@ -6,7 +6,7 @@ use crate::questions;
 use crate::render::html::{self, Head};
 use crate::render::number as set;
 use crate::{Companions, ReportError};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// What a report consists of.
@@ -143,11 +143,7 @@ fn head(data: &Data) -> Head {
 /// What is in the release, in figures; kinds it does not hold are left out.
 fn key_figures(data: &Data) -> Vec<(String, String)> {
     let stage = |name: &str| data.of_stage(name).count();
-    let mut folders: BTreeMap<&str, usize> = BTreeMap::new();
-    for artifact in &data.artifacts {
-        *folders.entry(artifact.path.split('/').next().unwrap_or_default()).or_default() += 1;
-    }
-    let recordings = folders.get("mcap").copied().unwrap_or(0);
+    let recordings = data.artifacts.iter().filter(|a| a.path.ends_with(".mcap")).count();
     let counts = [
         (stage("terrain"), "terrain"),
         (stage("dem"), "measured DEM"),

@@ -100,7 +100,7 @@ pub enum Verb {
         Two releases: files by their hashes, then the figures of the tables missions and terrains, group by group, with\n\
         terrains as the units. `--fail-on-difference` ends with exit code 4 when a figure is different, or, for releases of\n\
         the same study by the same version, when a file is missing or any byte differs.\n\nExamples:\n  \
-        sastrugi compare release other-release --margin 0.25\n  \
+        sastrugi compare release other-release --margin 0.1\n  \
         sastrugi compare site.tif synthetic.tif --outer-scale 2\n  \
         sastrugi compare site.json synthetic.json --equivalence-sigma 0.05 --fail-on-difference")]
     Compare(Compare),
@@ -496,7 +496,7 @@ pub struct Compare {
     /// End with exit code 4 when any quantity is different (releases of one study and version: any byte).
     #[arg(long)]
     pub fail_on_difference: bool,
-    /// Releases: difference of means that counts as the same, in standard deviations between terrains (0.5).
+    /// Releases: difference of means that counts as the same, as a share of A's mean (0.05; 5 points for success and shares).
     #[arg(long, value_name = "SHARE", allow_negative_numbers = true)]
     pub margin: Option<f64>,
     /// Window of the moving average that separates background from texture, m.

@@ -60,6 +60,9 @@ fn of_success(mission: &MissionRow, value: f64) -> f64 {
     if succeeded(mission) { value } else { f64::NAN }
 }
 
+/// Figures that are shares of one: their margin is in points.
+const SHARES: [&str; 4] = ["success", "share_low", "share_semi", "share_high"];
+
 /// A figure of a row: its name and value.
 type Figure<R> = (&'static str, fn(&R) -> f64);
 
@@ -67,7 +70,7 @@ type Figure<R> = (&'static str, fn(&R) -> f64);
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Parameters {
-    /// Difference of means that counts as none, as a share of the standard deviation between terrains of a release.
+    /// Difference of means that counts as none: a share of A's mean; for success and the shares of classes, of one.
     pub margin: f64,
     /// Probability of any false "different" in the comparison, and of each false "same".
     pub alpha: f64,
@@ -75,7 +78,7 @@ pub struct Parameters {
 
 impl Default for Parameters {
     fn default() -> Self {
-        Self { margin: 0.5, alpha: 0.05 }
+        Self { margin: 0.05, alpha: 0.05 }
     }
 }
 
@@ -368,8 +371,8 @@ fn quantity(key: &Key, a: &Figures, b: &Figures, parameters: &Parameters, stream
     };
     let difference =
         if paired { MeanDifference::of_pairs(&differences) } else { MeanDifference::between(&first, &second) };
-    let margin = parameters.margin * pooled_deviation(&first, &second);
-    let margin = (margin > 0.0).then_some(margin);
+    let scale = if SHARES.contains(&figure) { 1.0 } else { sums::mean(&first).abs() };
+    let margin = Some(parameters.margin * scale).filter(|margin| *margin > 0.0);
     let interval = difference.map(|d| d.interval(1.0 - parameters.alpha));
     Quantity {
         table,
@@ -388,12 +391,6 @@ fn quantity(key: &Key, a: &Figures, b: &Figures, parameters: &Parameters, stream
         p_equivalence: difference.zip(margin).map(|(d, margin)| d.equivalence_p(margin)),
         answer: if first == second { Answer::Same } else { Answer::CannotTell },
     }
-}
-
-/// Standard deviation between the terrains of a release, from both; NaN where one has fewer than two.
-fn pooled_deviation(a: &[f64], b: &[f64]) -> f64 {
-    let variance = |values: &[f64]| sums::variance(values) * values.len() as f64 / (values.len() as f64 - 1.0);
-    (0.5 * (variance(a) + variance(b))).sqrt()
 }
 
 /// Answers: equal values are the same; so are means within the margin; other figures are different by the adjusted `p`.
@@ -442,7 +439,7 @@ mod tests {
 
     const FIGURES: [&str; 4] = ["a", "b", "c", "d"];
 
-    /// Normal values of four figures on terrains whose random streams are named by `seed`, raised by `shift`.
+    /// Normal values of mean 10 of four figures on terrains whose random streams are named by `seed`, raised by `shift`.
     fn drawn(terrains: usize, seed: u64, shift: f64) -> Figures {
         let mut stream = Streams::for_seed(seed, "drawn").stream("values");
         let mut figures = Figures::default();
@@ -450,7 +447,7 @@ mod tests {
             let terrain = format!("t-{k:04}");
             for name in FIGURES {
                 let by_terrain = figures.values.entry(("missions", "g".to_owned(), name, "m")).or_default();
-                by_terrain.insert(terrain.clone(), (shift + stream.normal(), 1));
+                by_terrain.insert(terrain.clone(), (10.0 + shift + stream.normal(), 1));
             }
             figures.grounds.insert(terrain, (None, Some(seed.to_string())));
         }
@@ -471,7 +468,7 @@ mod tests {
     #[test]
     fn stat_any_difference_is_found_seldom_where_there_is_none() {
         let any = |k: u64| {
-            let found = compared(&drawn(7, 2 * k + 10, 0.0), &drawn(7, 2 * k + 11, 0.0), 0.5);
+            let found = compared(&drawn(7, 2 * k + 10, 0.0), &drawn(7, 2 * k + 11, 0.0), 0.05);
             found.iter().any(|q| q.answer == Answer::Different)
         };
         let wrong = (0..200).filter(|k| any(*k)).count();
@@ -483,22 +480,22 @@ mod tests {
         let a = drawn(20, 1, 0.0);
         let all = |quantities: Vec<Quantity>, answer| quantities.iter().all(|q| q.answer == answer);
         // Equal values; the same terrains raised by a little more and by a little less than the margin.
-        assert!(all(compared(&a, &a, 0.5), Answer::Same));
+        assert!(all(compared(&a, &a, 0.05), Answer::Same));
         let raised = |by: f64| {
             let mut b = drawn(20, 1, 0.0);
             let sums = b.values.values_mut().flat_map(BTreeMap::values_mut);
             sums.enumerate().for_each(|(k, (sum, _))| *sum += by + 1e-3 * (k % 7) as f64);
             b
         };
-        let (above, below) = (compared(&a, &raised(1.0), 0.5), compared(&a, &raised(0.1), 0.5));
+        let (above, below) = (compared(&a, &raised(1.0), 0.05), compared(&a, &raised(0.1), 0.05));
         // Two of 2^20 arrangements of signs are as extreme; of the 9999 that are drawn none is expected.
         assert!(above.iter().all(|q| q.paired && q.p.is_some_and(|p| p <= 3e-4)), "{above:?}");
         assert!(all(above, Answer::Different) && all(below, Answer::Same));
         // Other terrains: too few to tell, far apart, and a single one.
-        assert!(all(compared(&drawn(4, 2, 0.0), &drawn(4, 3, 0.0), 0.5), Answer::CannotTell));
-        let apart = compared(&a, &drawn(20, 2, 5.0), 0.5);
+        assert!(all(compared(&drawn(4, 2, 0.0), &drawn(4, 3, 0.0), 0.05), Answer::CannotTell));
+        let apart = compared(&a, &drawn(20, 2, 5.0), 0.05);
         assert!(apart.iter().all(|q| !q.paired) && all(apart, Answer::Different));
-        let one = compared(&drawn(1, 2, 0.0), &drawn(1, 3, 0.0), 0.5);
-        assert!(one.iter().all(|q| q.p == Some(1.0) && q.margin.is_none()) && all(one, Answer::CannotTell));
+        let one = compared(&drawn(1, 2, 0.0), &drawn(1, 3, 0.0), 0.05);
+        assert!(one.iter().all(|q| q.p == Some(1.0) && q.p_equivalence.is_none()) && all(one, Answer::CannotTell));
     }
 }
