@@ -64,6 +64,10 @@ fn check_output(folder: &Path, output: &Path) -> Result<(), Error> {
     if output.is_dir() {
         return Err(Error::Usage(format!("{}: is a folder; -o names a file", output.display())));
     }
+    if output.exists() && output.extension().is_none_or(|ending| ending != "tar") {
+        let advice = "is there already and is no .tar; name another file with -o";
+        return Err(Error::Usage(format!("{}: {advice}", output.display())));
+    }
     Ok(())
 }
 

@@ -1,6 +1,6 @@
 //! Terrains for training, validation and test: one part for each terrain and everything on it, every group in the same shares.
 //!
-//! What must not be torn apart is one unit: terrains that share their random draws (`pairing = "common"`), and a texture and
+//! What must not be torn apart is one unit: terrains that share their random draws (`pairing = "common"`, or one `seed`), and a texture and
 //! the heightfield that it lies on. Units are drawn group by group; units whose terrains are of several groups are
 //! drawn together with those of the same groups. A unit's place in the draw comes from its own random stream, so that more
 //! terrains move few others.
@@ -105,6 +105,11 @@ fn units(study: &Study, fields: &BTreeMap<String, Heightfield>, graph: &Graph) -
         if let Some(word) = shared_draw(study, field) {
             forest.join(id, &word);
         }
+        // Explicit seeds may give one stream twice. The sign sorts after all ids, so that none of these words stands for a unit.
+        let stream = graph.find(&field.item).and_then(|p| graph.node(p).stream.clone());
+        if let Some(stream) = stream {
+            forest.join(id, &format!("~{stream}"));
+        }
     }
     let mut units: BTreeMap<String, Unit> = BTreeMap::new();
     for (id, field) in fields {
@@ -204,6 +209,15 @@ mod tests {
         let drawn = splits(&text).unwrap();
         assert!((1..=10).all(|k| drawn[&format!("a-{k:04}")] == drawn[&format!("b-{k:04}")]));
         assert_eq!(number(&drawn, "a"), [6, 2, 2]);
+    }
+
+    /// Replicate k of a seed draws as seed + k - 1 does: the same heights are never in two parts.
+    #[test]
+    fn val_terrains_of_one_seed_stay_together() {
+        let seeded = |id: &str, seed: u32| terrain(id, "a", 8).replace("count", &format!("seed = {seed}\ncount"));
+        let drawn = splits(&format!("{HEAD}split = [0.5, 0.0, 0.5]\n{}{}", seeded("a", 7), seeded("b", 10))).unwrap();
+        assert!((4..=8).all(|k| drawn[&format!("a-{k:04}")] == drawn[&format!("b-{:04}", k - 3)]));
+        assert!(number(&drawn, "").iter().sum::<usize>() == 16);
     }
 
     #[test]

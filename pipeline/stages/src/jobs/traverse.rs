@@ -23,7 +23,7 @@ use sastrugi_schemas::topics::{EventKind, Recording};
 use sastrugi_schemas::{Kind, ParameterError};
 use sastrugi_store::mcap::{MissionMcap, TerrainView, bag_metadata, write_mission};
 use sastrugi_store::parquet::{TableMetadata, TableWriter};
-use sastrugi_store::{dem, digest};
+use sastrugi_store::{atomic, dem, digest};
 use serde_json::{Map, Value, json};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -288,7 +288,7 @@ impl TraverseJob {
         let mut products = Vec::new();
         if self.drive.head.mcap == McapFlavour::Ros2 {
             let (bag, place) = (format!("{id}.metadata.yaml"), format!("mcap/{}/{id}/metadata.yaml", self.terrain));
-            std::fs::write(work.output(&bag), bag_metadata(&file, &summary)).map_err(|e| fail(&e))?;
+            atomic::write(&work.output(&bag), bag_metadata(&file, &summary).as_bytes()).map_err(|e| fail(&e))?;
             products.push(Product::released(&bag, place, None));
         }
         let recorded = Product::released(&file, release_path, Some(summary.content_sha256));

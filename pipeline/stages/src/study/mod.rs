@@ -10,7 +10,7 @@ pub use text::{StudyError, StudyText};
 
 use sastrugi_schemas::ParameterError;
 use sastrugi_schemas::kind::{read_parameters, schema_of};
-use sastrugi_schemas::study::{RoughnessSection, StudyHead};
+use sastrugi_schemas::study::{McapFlavour, RoughnessSection, StudyHead};
 use serde_json::{Map, Value};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -90,6 +90,7 @@ fn read_head(root: &Map<String, Value>, text: &StudyText) -> Result<StudyHead, S
         check_doi(head.doi.as_deref()),
         check_split(head.split.as_ref()),
         check_organizations(&head),
+        check_epoch(&head),
     ];
     checks.into_iter().collect::<Result<Vec<()>, _>>().map_err(|e| section_error(text, "study", e))?;
     Ok(head)
@@ -221,7 +222,21 @@ fn check_url(url: Option<&str>) -> Result<(), ParameterError> {
     }
 }
 
-/// DOIs are `10.`, four to nine digits, `/`, and a suffix (the pattern of the Citation File Format).
+/// Recordings count seconds in 32 bits, ROS 2 with a sign.
+fn check_epoch(head: &StudyHead) -> Result<(), ParameterError> {
+    let (last_s, year) = match head.mcap {
+        McapFlavour::Viewer => (u64::from(u32::MAX), 2106),
+        McapFlavour::Ros2 => (i32::MAX as u64, 2038),
+    };
+    // A year is left for the missions.
+    if head.epoch_ns / 1_000_000_000 + 366 * 86_400 <= last_s {
+        return Ok(());
+    }
+    let rule = format!("such recordings end in {year}; it must lie a year before, in ns since 1970-01-01");
+    Err(ParameterError::new("epoch_ns", format!("is {}; {rule}", head.epoch_ns)))
+}
+
+/// Organisations are among the creators.
 fn check_organizations(head: &StudyHead) -> Result<(), ParameterError> {
     match head.organizations.iter().find(|name| !head.creators.contains(name)) {
         Some(name) => {
@@ -231,6 +246,7 @@ fn check_organizations(head: &StudyHead) -> Result<(), ParameterError> {
     }
 }
 
+/// DOIs are `10.`, four to nine digits, `/`, and a suffix (the pattern of the Citation File Format).
 fn check_doi(doi: Option<&str>) -> Result<(), ParameterError> {
     let right = |doi: &str| {
         let (registrant, suffix) = doi.strip_prefix("10.")?.split_once('/')?;
@@ -288,6 +304,8 @@ mod tests {
         at(&HEAD.replace("seed", "sead"), "unknown key `sead`", "sead");
         at(&HEAD.replace("\"x\"", "\"X y\""), "a-z", "\"X y\"");
         at(&HEAD.replace("seed = 1", "seed = -1"), "seed", "-1");
+        at(&format!("{HEAD}mcap = \"ros2\"\nepoch_ns = 3000000000000000000\n"), "2038", "3000000000000000000");
+        at(&format!("{HEAD}epoch_ns = 5000000000000000000\n"), "2106", "5000000000000000000");
         at(&format!("{HEAD}version = \" \"\n"), "1.0.0", "\" \"");
         at(&format!("{HEAD}url = \"example.org\"\n"), "https://", "\"example.org\"");
         for doi in ["https://doi.org/10.5281/zenodo.1", "10.5281", "10.52/a", "10.5281/a b", "10.5281/"] {

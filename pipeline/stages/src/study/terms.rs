@@ -56,9 +56,18 @@ fn known(license: &str) -> Option<Known> {
     FAMILIES.iter().find_map(|&(family, terms)| {
         let rest = name.strip_prefix(family)?;
         let version = rest.strip_prefix('-').unwrap_or(rest);
-        let right = rest.is_empty() || (rest.starts_with('-') && version.starts_with(|c: char| c.is_ascii_digit()));
+        let right = rest.is_empty() || (rest.starts_with('-') && is_version(version));
         right.then(|| Known { family, version: version.to_owned(), terms })
     })
+}
+
+/// True for a number, with a region or organisation behind it where there is one (`3.0-IGO`); an expression of several licences is
+/// no version.
+fn is_version(text: &str) -> bool {
+    let (number, port) = text.split_once('-').unwrap_or((text, ""));
+    let digits =
+        number.starts_with(|c: char| c.is_ascii_digit()) && number.bytes().all(|b| b.is_ascii_digit() || b == b'.');
+    digits && port.len() <= 3 && port.bytes().all(|b| b.is_ascii_alphabetic())
 }
 
 /// What stands between the licence of a release and that of data it is made from.
@@ -145,6 +154,9 @@ mod tests {
         assert!(matches!(between("terms of the agency", "CC-BY-4.0"), Some(Objection::Unknown(_))));
         assert!(matches!(between("CC-BY-4.0", "MIT"), Some(Objection::Unknown(_))));
         assert!(matches!(between("CC-BYE-4.0", "CC-BY-4.0"), Some(Objection::Unknown(_))));
+        assert!(matches!(between("CC-BY-4.0 AND CC-BY-NC-4.0", "CC-BY-4.0"), Some(Objection::Unknown(_))));
+        assert!(matches!(between("CC-BY-4.0", "CC-BY-4.0 OR CC0-1.0"), Some(Objection::Unknown(_))));
+        assert_eq!(between("CC-BY-3.0-IGO", "CC-BY-4.0"), None);
         assert!(matches!(between("CC-BY-SA-4.0", "CC-BY-SA-3.0"), Some(Objection::Conflict(_))));
         let item = serde_json::json!({ "id": "a", "file": "a.tif" });
         assert_eq!(objection(&serde_json::from_value(item).unwrap(), "CC-BY-4.0"), None);

@@ -43,7 +43,7 @@ const GRID_CELLS: usize = 128;
 const POINT_BYTES: u32 = 16;
 /// `sensor_msgs/PointField`: single precision.
 const FLOAT32: u8 = 7;
-/// Exact values, and none that is unknown.
+/// Covariances of zero: the simulation knows no error. Readers of `sensor_msgs/Imu` take them for unknown ones.
 const EXACT: Covariance = [[0.0; 6]; 6];
 
 fn schema(topic: &Topic) -> Result<Vec<u8>, McapError> {
