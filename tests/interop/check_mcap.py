@@ -10,12 +10,10 @@ import math
 from pathlib import Path
 
 import numpy as np
-import pyarrow.parquet as pq
-import rasterio
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
-from common import ContentHash, expect, manifest, run
+from common import ContentHash, expect, manifest, read_raster, run, table
 
 TOPICS = {
     "/terrain/mesh", "/terrain/grid", "/vehicle/shape", "/vehicle/path", "/tf", "/vehicle/pose", "/vehicle/state",
@@ -163,16 +161,6 @@ def check_ground(path, found, raster):
     distance, _ = off_mesh(found["mesh"], ground(raster, found["contacts"]))
     expect(distance <= GROUND_TOLERANCE_M, f"{path}: the mesh is {distance} m off the terrain under a wheel")
     found["mesh_off_terrain_m"] = distance
-
-
-def read_raster(path):
-    with rasterio.open(path) as raster:
-        return raster.read(1).astype(float), raster.transform
-
-
-def table(release, name):
-    files = sorted((release / "tables" / name).glob("*.parquet"))
-    return [row for file in files for row in pq.read_table(file).to_pylist()]
 
 
 def public(found):

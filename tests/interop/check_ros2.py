@@ -7,15 +7,13 @@ import functools
 import math
 
 import numpy as np
-import pyarrow.parquet as pq
-import rasterio
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.interfaces import Nodetype
 from rosbags.rosbag2 import Reader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from common import ContentHash, expect, manifest, run
+from common import ContentHash, expect, manifest, read_raster, run, table
 
 TOPICS = {
     "/tf_static": "tf2_msgs/msg/TFMessage",
@@ -216,16 +214,6 @@ def check_terrain(path, messages, raster):
     off = np.abs(points["z"] + origin[2] - heights[np.rint(row).astype(int), np.rint(col).astype(int)]).max()
     expect(off <= CELL_HEIGHT_TOLERANCE_M, f"{path}: a point of the cloud is {off} m off the terrain")
     return len(points)
-
-
-def read_raster(path):
-    with rasterio.open(path) as raster:
-        return raster.read(1).astype(float), raster.transform
-
-
-def table(release, name):
-    files = sorted((release / "tables" / name).glob("*.parquet"))
-    return [row for file in files for row in pq.read_table(file).to_pylist()]
 
 
 def check_release(release):

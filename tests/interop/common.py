@@ -6,6 +6,9 @@ import struct
 import sys
 from pathlib import Path
 
+import pyarrow.parquet as pq
+import rasterio
+
 
 class Mismatch(Exception):
     """An independent reader does not see what the release says."""
@@ -45,6 +48,18 @@ class ContentHash:
 
 def manifest(release):
     return json.loads((release / "manifest.json").read_text())
+
+
+def read_raster(path):
+    """Heights or codes of a GeoTIFF, and its transform from columns and rows."""
+    with rasterio.open(path) as raster:
+        return raster.read(1).astype(float), raster.transform
+
+
+def table(release, name):
+    """The rows of a table, in the order of its files."""
+    files = sorted((release / "tables" / name).glob("*.parquet"))
+    return [row for file in files for row in pq.read_table(file).to_pylist()]
 
 
 def is_release(path):
