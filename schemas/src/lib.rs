@@ -1,6 +1,7 @@
 //! What crosses a boundary: the study envelope, parameter errors and kinds, rows of every Parquet table, the fit file,
 //! the manifest, MCAP topics and roughness classes. No algorithms, no file formats.
 
+pub mod answer;
 pub mod class;
 pub mod coregistration;
 pub mod fit;
@@ -11,6 +12,7 @@ pub mod study;
 pub mod tables;
 pub mod topics;
 
+pub use answer::Answer;
 pub use class::RoughnessClass;
 pub use kind::{Kind, ParameterError};
 pub use tables::{Cell, Column, ColumnType, Record, Table};

@@ -2,6 +2,8 @@
 //! the kernels; a section's table is its envelope's keys and the kernel's keys together.
 
 use crate::ParameterError;
+use crate::tables::MissionRow;
+use crate::topics::EventKind;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -355,6 +357,9 @@ pub struct HypothesisItem {
     pub statistic: Statistic,
     /// Labels of the groups: two for `difference` and `equivalence`, three or more in their order for `trend`.
     pub groups: Vec<String>,
+    /// Id of the `[[traverse]]` whose missions are meant; needed where several drive these groups.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub traverse: Option<String>,
     /// What is claimed.
     pub test: HypothesisTest,
     /// Which way the figure goes from the first group to the last; either way when absent. Not for `equivalence`.
@@ -364,7 +369,7 @@ pub struct HypothesisItem {
     /// (success: percentage points), above 0.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub margin: Option<f64>,
-    /// Level of the test, above 0 and at most 0.5.
+    /// Level of the test, above 0 and below 0.5.
     #[serde(default = "default_alpha")]
     pub alpha: f64,
     /// Hypotheses with the same text share one level (Holm, 1979); all that name none are one family.
@@ -403,8 +408,8 @@ impl HypothesisItem {
         if equivalence && self.direction.is_some() {
             return refuse("direction", "has no meaning for equivalence".into());
         }
-        if !(self.alpha > 0.0 && self.alpha <= 0.5) {
-            return refuse("alpha", format!("is {}; it must be above 0 and at most 0.5", self.alpha));
+        if !(self.alpha > 0.0 && self.alpha < 0.5) {
+            return refuse("alpha", format!("is {}; it must be above 0 and below 0.5", self.alpha));
         }
         Ok(())
     }
@@ -431,6 +436,51 @@ pub enum Statistic {
     MaxPitchDeg,
     /// Largest absolute roll, deg.
     MaxRollDeg,
+}
+
+impl Statistic {
+    /// All of them.
+    pub const ALL: [Self; 8] = [
+        Self::Success,
+        Self::Efficiency,
+        Self::TimeS,
+        Self::RmsVerticalAccelerationMS2,
+        Self::RmsPitchRateDegS,
+        Self::RmsRollRateDegS,
+        Self::MaxPitchDeg,
+        Self::MaxRollDeg,
+    ];
+
+    /// Column of the table `missions`; `success` is that of no column.
+    pub const fn column(self) -> &'static str {
+        match self {
+            Self::Success => "success",
+            Self::Efficiency => "efficiency",
+            Self::TimeS => "time_s",
+            Self::RmsVerticalAccelerationMS2 => "rms_vertical_acceleration_m_s2",
+            Self::RmsPitchRateDegS => "rms_pitch_rate_deg_s",
+            Self::RmsRollRateDegS => "rms_roll_rate_deg_s",
+            Self::MaxPitchDeg => "max_pitch_deg",
+            Self::MaxRollDeg => "max_roll_deg",
+        }
+    }
+
+    /// Value of a mission: of success 100 or 0 (%), of others NaN unless it reached its goal.
+    pub fn of(self, mission: &MissionRow) -> f64 {
+        let succeeded = mission.outcome == EventKind::Success.name();
+        match self {
+            Self::Success if succeeded => 100.0,
+            Self::Success => 0.0,
+            _ if !succeeded => f64::NAN,
+            Self::Efficiency => mission.efficiency,
+            Self::TimeS => mission.time_s,
+            Self::RmsVerticalAccelerationMS2 => mission.rms_vertical_acceleration_m_s2,
+            Self::RmsPitchRateDegS => mission.rms_pitch_rate_deg_s,
+            Self::RmsRollRateDegS => mission.rms_roll_rate_deg_s,
+            Self::MaxPitchDeg => mission.max_pitch_deg,
+            Self::MaxRollDeg => mission.max_roll_deg,
+        }
+    }
 }
 
 /// What a hypothesis claims.

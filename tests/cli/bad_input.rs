@@ -75,10 +75,13 @@ fn val_hypotheses_are_refused_with_the_line() {
     refused("difference", "same", &["same", "equivalence"]);
     refused("\"difference\"", "\"equivalence\"", &["margin", "is missing"]);
     refused("\"difference\"", "\"difference\"\nmargin = 1", &["margin", "equivalence"]);
-    refused("\"difference\"", "\"difference\"\nalpha = 0.6", &["alpha", "at most 0.5"]);
+    refused("\"difference\"", "\"difference\"\nalpha = 0.6", &["alpha", "below 0.5"]);
     refused("\"difference\"", "\"difference\"\nalpa = 0.1", &["unknown key `alpa`", "did you mean `alpha`?"]);
     refused("\"h\"", "\"husky\"", &["is taken by an item of [[traverse]]"]);
     refused("[[hypothesis]]", &format!("{good}[[hypothesis]]"), &["\"h\"", "is taken"]);
+    refused("\"difference\"", "\"difference\"\ntraverse = \"nobody\"", &["traverse", "nobody", "husky"]);
+    let second = "[[traverse]]\nid = \"again\"\nmissions = \"short\"\n\n[[hypothesis]]";
+    refused("[[hypothesis]]", second, &["traverse", "is missing", "again, husky"]);
 }
 
 #[test]

@@ -1,13 +1,16 @@
 """Follows figures of a report to the rows of the release and to a recording.
 
-    python check_report.py RELEASE REPORT    the queries that the report states run in duckdb and give its numbers; so do its
-                                             medians and quartiles; a mission of the last figure ends in its recording as in its row
+    python check_report.py RELEASE REPORT    every query that the report states runs in duckdb and gives its numbers, or rows that they
+                                             are computed from: medians, quartiles, shifts and deltas are computed from them once
+                                             more; files that it names are there; a mission ends in its recording as in its row
 """
 
 import json
+import math
 import os
 import sys
 from pathlib import Path
+from statistics import fmean as mean, median
 
 import duckdb
 from mcap.reader import make_reader
@@ -37,12 +40,78 @@ def alike(ours, theirs):
 
 
 def same_rows(name, ours, theirs):
-    """Rows whose first column is the group; the report names missions without a group by the kind of their terrain."""
-    unnamed = {row[0] for row in ours} - {row[0] for row in theirs}
-    theirs = [(next(iter(unnamed), None) if row[0] is None else row[0], *row[1:]) for row in theirs]
+    """Rows in any order; the report names missions and terrains without a group by the kind of their terrain."""
+    named = {row[0] for row in ours} - {row[0] for row in theirs}
+    if len(named) == 1 and any(row[0] is None for row in theirs):
+        theirs = [(*named, *row[1:]) if row[0] is None else row for row in theirs]
     expect(len(ours) == len(theirs), f"{name}: {len(ours)} rows in the report, {len(theirs)} in duckdb")
-    for a, b in zip(sorted(ours), sorted(theirs)):
+    order = lambda row: [(value is None, str(type(value)), 0 if value is None else value) for value in row]
+    for a, b in zip(sorted(ours, key=order), sorted(theirs, key=order)):
         expect(alike(a, b), f"{name}: {a} in the report, {b} in duckdb")
+
+
+def plain(value):
+    """What is not a number is null in the report; numbers are of one type."""
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return float(value) if isinstance(value, int) and not isinstance(value, bool) else value
+
+
+def runs(path, document):
+    """A query runs, and gives the rows of the report or rows for them."""
+    rows = [tuple(map(plain, row)) for row in duckdb.sql(document["query"]).fetchall()]
+    ours = [tuple(map(plain, row)) for row in document["rows"]]
+    expect(rows or not ours, f"{path.stem}: nothing comes of {document['query']}")
+    if document["query_gives"] == "rows":
+        outcomes(document, rows) if path.stem == "outcomes" else same_rows(path.stem, ours, rows)
+
+
+def compared(document):
+    """Shift and delta of two groups from the rows of the query: the obvious way."""
+    names = [column[0] for column in duckdb.sql(document["query"]).description]
+    missions = [dict(zip(names, row)) for row in duckdb.sql(document["query"]).fetchall()]
+    for row in document["rows"]:
+        figure, groups, of, shift, delta = row[0], row[2].split(" to "), row[3], row[4], row[7]
+        if len({m["group"] for m in missions} & set(groups)) < 2:
+            continue
+        first, second = (of_group(missions, figure, group, "block" in of) for group in groups)
+        if "block" in of:
+            first, second = in_both(first, second)
+            d = [mean(b) - mean(a) for a, b in zip(first, second)]
+            d = [0.0 if abs(v) < 1e-9 * max(map(abs, d)) else v for v in d]
+            found = (median([(d[i] + d[j]) / 2 for i in range(len(d)) for j in range(i, len(d))]), mean(list(map(sign, d))))
+        else:
+            a, b = ([mean(list(missions.values())) for missions in of.values()] for of in (first, second))
+            pairs = [y - x for x in a for y in b]
+            scale = max(map(abs, a + b))
+            found = (median(pairs), mean([sign(v) if abs(v) > 1e-9 * scale else 0 for v in pairs]))
+        size = max(abs(shift), 1e-3)
+        expect(abs(found[0] - shift) < 1e-6 * size and abs(found[1] - delta) < 1e-6, f"comparison, {row}: {found}")
+
+
+def of_group(missions, figure, group, blocks):
+    """Values by pair in every terrain, or in every block of paired terrains."""
+    column = COLUMNS.get(figure)
+    clusters = {}
+    for m in missions:
+        if m["group"] != group or (column and m["outcome"] != "success"):
+            continue
+        value = m[column] if column else 100.0 * (m["outcome"] == "success")
+        if value is not None:
+            cluster = m["pair_id"].rpartition("-")[0] if blocks else m["terrain_id"]
+            clusters.setdefault(cluster, {})[m["pair_id"]] = value
+    return clusters
+
+
+def in_both(first, second):
+    """The missions of pairs that both groups have, block by block."""
+    pairs = [(block, sorted(first[block].keys() & second[block].keys())) for block in sorted(first.keys() & second.keys())]
+    pairs = [(block, ids) for block, ids in pairs if ids]
+    return ([[of[block][pair] for pair in ids] for block, ids in pairs] for of in (first, second))
+
+
+def sign(value):
+    return (value > 0) - (value < 0)
 
 
 def outcomes(document, rows):
@@ -74,21 +143,22 @@ def recording():
 def check(release):
     report = Path(sys.argv[2]).resolve()
     os.chdir(release)
-    queries = 0
+    queries, files = 0, 0
     for path in sorted((report / "data").glob("*.json")):
         document = json.loads(path.read_text())
-        if not document["query"].startswith("select "):
-            continue
-        queries += 1
-        rows = duckdb.sql(document["query"]).fetchall()
-        if path.stem == "outcomes":
-            outcomes(document, rows)
+        if document["query_gives"] == "file":
+            files += 1
+            name = document["query"].split(",")[0]
+            expect("LOGS.parquet" in name or os.path.exists(name), f"{path.stem}: there is no {name}")
         else:
-            same_rows(path.stem, [tuple(row) for row in document["rows"]], rows)
-    expect(queries >= 5, f"{queries} queries in the report")
+            queries += 1
+            runs(path, document)
+        if path.stem == "comparison":
+            compared(document)
+    expect(queries >= 10, f"{queries} queries in the report")
     quartiles(json.loads((report / "data" / "mission-medians.json").read_text()))
     recording()
-    return {"queries": queries}
+    return {"queries": queries, "files": files}
 
 
 if __name__ == "__main__":

@@ -57,6 +57,35 @@ def effects():
     print("paired shift", np.median(walsh), "paired delta", np.mean(np.sign(D)))
 
 
+def intervals():
+    for n, x in ((10, 0), (10, 3), (10, 10), (10, 3.5)):
+        low = stats.beta.ppf(0.025, x, n - x + 1) if x > 0 else 0.0
+        high = stats.beta.ppf(0.975, x + 1, n - x) if x < n else 1.0
+        print("beta.ppf", n, x, low, high)
+    for n, m in ((3, 3), (4, 4), (5, 6), (10, 10), (20, 20)):
+        # The p of U = k - 1, for samples that have it: the second group above all of the first but k - 1 pairs.
+        tails = [stats.mannwhitneyu(*with_u(n, m, u), alternative="less", method="exact").pvalue for u in range(n * m // 2)]
+        print("mannwhitneyu", n, m, sum(p <= 0.025 for p in tails))
+    for n in (5, 6, 10, 20):
+        tails = [stats.wilcoxon(with_w(n, w), alternative="less", method="exact").pvalue for w in range(n * (n + 1) // 4)]
+        print("wilcoxon", n, sum(p <= 0.025 for p in tails))
+
+
+def with_u(n, m, u):
+    """Samples of n and m values of which u pairs have the first above the second."""
+    first = np.array([u // n + (k < u % n) for k in range(n)]) - 0.5 + np.arange(n) * 1e-6
+    return first, np.arange(m, dtype=float)
+
+
+def with_w(n, w):
+    """Differences of magnitudes 1 to n of which the positive ones sum to w."""
+    d = -np.arange(1.0, n + 1)
+    for rank in range(n, 0, -1):
+        if rank <= w:
+            d[rank - 1], w = rank, w - rank
+    return d
+
+
 def equivalence():
     print("ttost_ind, margin 25", weightstats.ttost_ind(B, A, -25, 25, usevar="unequal")[0])
     compared = weightstats.CompareMeans.from_data(B, A)
@@ -176,5 +205,5 @@ def powers():
         print("TTestPower", difference, between, within, n, m, power.TTestPower().power(d, n, 0.05))
 
 
-for part in (permutations, effects, equivalence, several, components, distributions, models, powers):
+for part in (permutations, effects, intervals, equivalence, several, components, distributions, models, powers):
     part()

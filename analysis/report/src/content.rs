@@ -77,14 +77,28 @@ pub struct Figure {
 /// Numbers behind a figure or in a table, and where in the release they come from.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Numbers {
-    /// Query: table or file of the release and the rows taken.
+    /// Query of duckdb in the folder of the release, or a file.
     pub query: String,
+    /// What the query gives.
+    pub gives: Gives,
     /// Name and unit of each column.
     pub columns: Vec<Heading>,
     /// Rows, each as long as `columns`.
     pub rows: Vec<Vec<Cell>>,
     /// True where the rows of a column have units of their own: each figure is then set by its own digits.
     pub mixed: bool,
+}
+
+/// What a query gives.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Gives {
+    /// The rows themselves, in any order.
+    Rows,
+    /// What they are computed from.
+    Input,
+    /// It is a file.
+    File,
 }
 
 /// Heading of a column.
@@ -100,7 +114,17 @@ impl Numbers {
     /// No rows yet.
     pub fn new(query: impl Into<String>, columns: &[(&str, &str)]) -> Self {
         let columns = columns.iter().map(|&(name, unit)| Heading { name: name.into(), unit: unit.into() }).collect();
-        Self { query: query.into(), columns, rows: Vec::new(), mixed: false }
+        Self { query: query.into(), gives: Gives::Rows, columns, rows: Vec::new(), mixed: false }
+    }
+
+    /// No rows yet, which are computed from what the query gives.
+    pub fn computed(query: impl Into<String>, columns: &[(&str, &str)]) -> Self {
+        Self { gives: Gives::Input, ..Self::new(query, columns) }
+    }
+
+    /// No rows yet, about a file.
+    pub fn of_file(path: impl Into<String>, columns: &[(&str, &str)]) -> Self {
+        Self { gives: Gives::File, ..Self::new(path, columns) }
     }
 
     /// The same for rows that have units of their own.
@@ -108,16 +132,16 @@ impl Numbers {
         Self { mixed: true, ..self }
     }
 
-    /// Columns of table rows, with the names and units of the contract; a name the table lacks is left out.
-    pub fn select<'a, R: Record + 'a>(
-        query: impl Into<String>,
-        rows: impl IntoIterator<Item = &'a R>,
-        names: &[&str],
-    ) -> Self {
+    /// Columns of the rows of a table of the release that meet a condition (all where it is empty), with the names and units of the
+    /// contract; a name the table lacks is left out.
+    pub fn select<'a, R: Record + 'a>(condition: &str, rows: impl IntoIterator<Item = &'a R>, names: &[&str]) -> Self {
         let all = R::TABLE.columns;
         let indices: Vec<usize> = names.iter().filter_map(|n| all.iter().position(|c| c.name == *n)).collect();
         let columns: Vec<(&str, &str)> = indices.iter().map(|&i| (all[i].name, all[i].unit)).collect();
-        let mut numbers = Self::new(query, &columns);
+        let quoted = |name: &str| if name == "group" { "\"group\"".to_owned() } else { name.to_owned() };
+        let list = columns.iter().map(|c| quoted(c.0)).collect::<Vec<_>>().join(", ");
+        let rule = if condition.is_empty() { String::new() } else { format!(" where {condition}") };
+        let mut numbers = Self::new(format!("select {list} from 'tables/{}/*.parquet'{rule}", R::TABLE.name), &columns);
         for row in rows {
             let cells = row.cells();
             numbers.rows.push(indices.iter().filter_map(|&i| cells.get(i).cloned()).collect());
@@ -133,7 +157,7 @@ impl Numbers {
     /// The file under `data/`.
     pub fn to_json(&self, id: &str, title: &str) -> Value {
         let rows: Vec<Vec<Value>> = self.rows.iter().map(|r| r.iter().map(value).collect()).collect();
-        json!({ "id": id, "title": title, "query": self.query, "columns": self.columns, "rows": rows })
+        json!({ "id": id, "title": title, "query": self.query, "query_gives": self.gives, "columns": self.columns, "rows": rows })
     }
 }
 
@@ -197,9 +221,10 @@ mod tests {
     #[test]
     fn val_selected_columns_keep_name_unit_and_order() {
         let row = PsdRow { terrain_id: "a".into(), bin: 0, frequency_cycles_m: 0.5, psd_m4: f64::NAN, modes: 4 };
-        let numbers = Numbers::select("tables/psd", [&row], &["modes", "psd_m4", "no such column", "terrain_id"]);
+        let numbers = Numbers::select("modes > 3", [&row], &["modes", "psd_m4", "no such column", "terrain_id"]);
         let names: Vec<&str> = numbers.columns.iter().map(|c| c.name.as_str()).collect();
         assert_eq!(names, ["modes", "psd_m4", "terrain_id"]);
+        assert_eq!(numbers.query, "select modes, psd_m4, terrain_id from 'tables/psd/*.parquet' where modes > 3");
         assert_eq!(numbers.columns[1].unit, "m4");
         let json = numbers.to_json("x", "t");
         assert_eq!(json["rows"][0], json!([4, null, "a"]));

@@ -122,8 +122,12 @@ pub struct Against {
 /// What carries one label and is compared with other groups.
 #[derive(Clone, Debug)]
 pub struct Group<'a, R> {
-    /// Label.
+    /// Label, with the run where the release has several.
     pub name: String,
+    /// Label alone.
+    pub label: String,
+    /// Id of the run, of missions.
+    pub run: Option<String>,
     /// Number among all groups of the release: its colour.
     pub index: usize,
     /// Its rows, in the order of the table.
@@ -134,7 +138,7 @@ impl Data {
     /// Generated terrains by group, groups in natural order: the plain ones, all where every one is a variant.
     pub fn terrain_groups(&self) -> Vec<Group<'_, TerrainRow>> {
         let all: Vec<&TerrainRow> = self.of_stage("terrain").collect();
-        self.grouped(plain(all, |t| t.variant.is_none()).into_iter().map(|t| (label(t), t)))
+        self.grouped(plain(all, |t| t.variant.is_none()).into_iter().map(|t| ((label(t), None), t)))
     }
 
     /// Missions of the plain run by group, groups in natural order; all missions where every one belongs to a variant.
@@ -142,21 +146,55 @@ impl Data {
         self.groups_of(plain(self.missions.iter().collect(), |m| m.variant.is_none()))
     }
 
-    /// Missions by group, groups in natural order.
+    /// Missions by group, groups in natural order. Where the release has several runs each is a group of its own: other vehicles or
+    /// other ways are no repetitions.
     pub fn groups_of<'a>(&'a self, missions: Vec<&'a MissionRow>) -> Vec<Group<'a, MissionRow>> {
         let labels: BTreeMap<&str, &str> = self.terrains.iter().map(|t| (t.terrain_id.as_str(), label(t))).collect();
         let of_terrain = |m: &MissionRow| labels.get(m.terrain_id.as_str()).copied();
-        self.grouped(missions.into_iter().map(|m| (m.group.as_deref().or(of_terrain(m)).unwrap_or("all"), m)))
+        let runs = self.runs();
+        let name = |m: &'a MissionRow| (m.group.as_deref().or(of_terrain(m)).unwrap_or("all"), run(&runs, m));
+        self.grouped(missions.into_iter().map(|m| (name(m), m)))
     }
 
-    /// Rows by label; a label has the same number whatever is grouped.
-    fn grouped<'a, R>(&'a self, rows: impl Iterator<Item = (&'a str, &'a R)>) -> Vec<Group<'a, R>> {
-        let missions = self.missions.iter().filter_map(|m| m.group.as_deref());
-        let names: BTreeSet<Natural> = self.terrains.iter().map(label).chain(missions).map(natural).collect();
+    /// Ids of the runs: those of the plain missions, to which variants belong.
+    fn runs(&self) -> Vec<&str> {
+        let plain = plain(self.missions.iter().collect(), |m| m.variant.is_none());
+        let ids: BTreeSet<&str> = plain.into_iter().map(|m| m.traverse_id.as_str()).collect();
+        ids.into_iter().collect()
+    }
+
+    /// True when plain missions belong to several runs.
+    pub fn has_several_runs(&self) -> bool {
+        self.runs().len() > 1
+    }
+
+    /// Rows by label and run; both have the same number whatever is grouped.
+    fn grouped<'a, R>(&'a self, rows: impl Iterator<Item = (Of<'a>, &'a R)>) -> Vec<Group<'a, R>> {
+        let runs = self.runs();
+        let named = |label: &str, run: Option<&str>| match run {
+            Some(run) if runs.len() > 1 => format!("{label}, {run}"),
+            _ => label.to_owned(),
+        };
+        let missions: BTreeSet<_> =
+            self.missions.iter().filter_map(|m| Some((m.group.as_deref()?, run(&runs, m)))).collect();
+        let terrains = self.terrains.iter().map(|t| (label(t), None));
+        let names: BTreeSet<Natural> =
+            terrains.chain(missions).map(|(label, run)| natural(&named(label, run))).collect();
         let index = |key: &Natural| names.iter().position(|n| n == key).unwrap_or(names.len());
-        let mut groups: BTreeMap<Natural, Vec<&R>> = BTreeMap::new();
-        rows.for_each(|(name, row)| groups.entry(natural(name)).or_default().push(row));
-        groups.into_iter().map(|(key, rows)| Group { index: index(&key), name: key.1, rows }).collect()
+        let mut groups: BTreeMap<Natural, (Of, Vec<&R>)> = BTreeMap::new();
+        let mut keys: BTreeMap<Of, Natural> = BTreeMap::new();
+        for (of, row) in rows {
+            let key = keys.entry(of).or_insert_with(|| natural(&named(of.0, of.1)));
+            groups.entry(key.clone()).or_insert_with(|| (of, Vec::new())).1.push(row);
+        }
+        let group = |(key, ((label, run), rows)): (Natural, (Of, _))| Group {
+            index: index(&key),
+            name: key.1,
+            label: label.to_owned(),
+            run: run.map(str::to_owned),
+            rows,
+        };
+        groups.into_iter().map(group).collect()
     }
 
     /// Heightfields that a stage made.
@@ -234,6 +272,14 @@ fn plain<R>(mut rows: Vec<&R>, is_plain: impl Fn(&R) -> bool) -> Vec<&R> {
     rows
 }
 
+/// The run that a mission or its plain one belongs to: values of a sweep add to its id after a point.
+fn run<'a>(runs: &[&'a str], mission: &MissionRow) -> Option<&'a str> {
+    let belongs = |run: &&&str| {
+        mission.traverse_id.strip_prefix(**run).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
+    };
+    runs.iter().filter(belongs).max_by_key(|run| run.len()).copied()
+}
+
 /// The rows of one key in a table that is sorted by it.
 fn of_key<'a, R>(rows: &'a [R], key: impl Fn(&R) -> &str, id: &str) -> &'a [R] {
     let from = rows.partition_point(|r| key(r) < id);
@@ -244,6 +290,9 @@ fn of_key<'a, R>(rows: &'a [R], key: impl Fn(&R) -> &str, id: &str) -> &'a [R] {
 pub fn label(terrain: &TerrainRow) -> &str {
     terrain.group.as_deref().unwrap_or(&terrain.kind)
 }
+
+/// Label and run.
+type Of<'a> = (&'a str, Option<&'a str>);
 
 /// Sorting key of a label (numbers before words, numbers by value), and the label.
 type Natural = (Vec<(u64, String)>, String);

@@ -3,6 +3,7 @@
 //!
 //! * [`questions`]: one folder per question that the page answers (query, figure, table), listed in one registry.
 //! * [`papers`]: published figures as data.
+//! * [`releases`]: two releases beside each other, for the page and for the verb `compare`.
 //! * [`mod@render`]: drawing, which knows nothing of what it draws.
 //! * [`data`]: the only way to the release's rows and files.
 //!
@@ -14,6 +15,7 @@ pub mod content;
 pub mod data;
 pub mod papers;
 pub mod questions;
+pub mod releases;
 pub mod render;
 #[cfg(test)]
 mod tests;

@@ -66,8 +66,9 @@ impl Components {
     pub fn of(groups: &[Group]) -> Option<Self> {
         let known: Vec<&Group> = groups.iter().filter(|g| g.count > 0.0).collect();
         let total = |f: fn(&Group) -> f64| known.iter().map(|g| f(g)).sum::<f64>();
-        let (n, b, a) = (total(|g| g.count), total(|g| g.members), known.len() as f64);
-        if !(a > 1.0 && b > a && n > b) {
+        let (n, a) = (total(|g| g.count), known.len() as f64);
+        let (member, repeat) = Self::within_groups(groups)?;
+        if a < 2.0 {
             return None;
         }
         let mean = total(|g| g.sum) / n;
@@ -75,10 +76,22 @@ impl Components {
         let k1 = total(|g| g.count * g.count) / n;
         let k3 = total(|g| g.squared_counts) / n;
         let between: f64 = known.iter().map(|g| g.count * (g.sum / g.count - mean) * (g.sum / g.count - mean)).sum();
-        let repeat = total(|g| g.within) / (n - b);
-        let member = (total(|g| g.between) - (b - a) * repeat) / (n - k12);
         let group = (between - (a - 1.0) * repeat - (k12 - k3) * member) / (n - k1);
         Some(Self { group, member, repeat })
+    }
+
+    /// Variance between the members of a group and between the repeats of a member, of one group or several; `None` unless a group
+    /// has two members and a member two repeats.
+    pub fn within_groups(groups: &[Group]) -> Option<(f64, f64)> {
+        let known: Vec<&Group> = groups.iter().filter(|g| g.count > 0.0).collect();
+        let total = |f: fn(&Group) -> f64| known.iter().map(|g| f(g)).sum::<f64>();
+        let (n, b, a) = (total(|g| g.count), total(|g| g.members), known.len() as f64);
+        if !(b > a && n > b) {
+            return None;
+        }
+        let repeat = total(|g| g.within) / (n - b);
+        let member = (total(|g| g.between) - (b - a) * repeat) / (n - total(|g| g.squared_counts / g.count));
+        Some((member, repeat))
     }
 
     /// Shares of the total in 0..1, negative estimates counted as 0: group, member, repeat. `None` when nothing varies.

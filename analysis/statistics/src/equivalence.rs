@@ -15,6 +15,7 @@
 //! enough to normal for a mean of ten or more; below that the t distribution is an assumption.
 
 use crate::bootstrap::Interval;
+use crate::permutation::EQUAL;
 use crate::student;
 use sastrugi_numeric::sums;
 
@@ -30,57 +31,76 @@ pub struct MeanDifference {
 }
 
 impl MeanDifference {
-    /// Of two independent groups; `None` when either has fewer than two values or neither varies.
+    /// Of two independent groups; `None` when either has fewer than two values.
     pub fn between(first: &[f64], second: &[f64]) -> Option<Self> {
         let parts = [first, second].map(squared_error);
         let total = parts[0] + parts[1];
         let per_freedom =
             parts[0] * parts[0] / (first.len() as f64 - 1.0) + parts[1] * parts[1] / (second.len() as f64 - 1.0);
-        let freedom = total * total / per_freedom;
+        let freedom = if total > 0.0 { total * total / per_freedom } else { (first.len() + second.len()) as f64 - 2.0 };
         let estimate = sums::mean(second) - sums::mean(first);
         Self { estimate, standard_error: total.sqrt(), freedom }.if_known()
     }
 
-    /// Of paired groups, from the differences within blocks; `None` with fewer than two or when they are equal.
+    /// Of paired groups, from the differences within blocks; `None` with fewer than two.
     pub fn of_pairs(differences: &[f64]) -> Option<Self> {
         let standard_error = squared_error(differences).sqrt();
         let estimate = sums::mean(differences);
         Self { estimate, standard_error, freedom: differences.len() as f64 - 1.0 }.if_known()
     }
 
-    /// Interval of that coverage.
+    /// False where no value varies: nothing then tells how far the estimate may be off.
+    pub fn scatters(&self) -> bool {
+        self.standard_error > 0.0
+    }
+
+    /// Interval of that coverage; its ends are NaN where nothing varies.
     pub fn interval(&self, level: f64) -> Interval {
-        let reach = self.standard_error * student::quantile(0.5 * (1.0 + level), self.freedom);
+        let error = if self.scatters() { self.standard_error } else { f64::NAN };
+        let reach = error * student::quantile(0.5 * (1.0 + level), self.freedom);
         Interval { estimate: self.estimate, low: self.estimate - reach, high: self.estimate + reach, level }
     }
 
-    /// Probability, at most, of a difference so well within the margin when the true one is not.
+    /// Probability, at most, of a difference so well within the margin when the true one is not; NaN where nothing varies.
     pub fn equivalence_p(&self, margin: f64) -> f64 {
-        let beyond = |distance: f64| student::cdf(-distance / self.standard_error, self.freedom);
-        beyond(margin + self.estimate).max(beyond(margin - self.estimate))
+        self.above(-margin).max(self.above_mirrored(-margin))
+    }
+
+    /// Probability, at most, of a difference so far beyond the margin when the true one is not; NaN where nothing varies.
+    pub fn beyond_p(&self, margin: f64) -> f64 {
+        let p = 2.0 * self.above(margin).min(self.above_mirrored(margin));
+        if p > 1.0 { 1.0 } else { p }
     }
 
     /// The smallest margin within which the groups are equivalent at level `alpha`: the farther end of the interval of
-    /// coverage `1 - 2 alpha`.
+    /// coverage `1 - 2 alpha`; NaN where nothing varies.
     pub fn smallest_margin(&self, alpha: f64) -> f64 {
         let i = self.interval(1.0 - 2.0 * alpha);
         i.low.abs().max(i.high.abs())
     }
 
+    /// One-sided p against a true difference of at most `bound`.
+    fn above(&self, bound: f64) -> f64 {
+        let error = if self.scatters() { self.standard_error } else { f64::NAN };
+        student::cdf((bound - self.estimate) / error, self.freedom)
+    }
+
+    /// The same of the first less the second.
+    fn above_mirrored(&self, bound: f64) -> f64 {
+        Self { estimate: -self.estimate, ..*self }.above(bound)
+    }
+
     fn if_known(self) -> Option<Self> {
-        (self.standard_error > 0.0 && self.freedom > 0.0 && self.estimate.is_finite()).then_some(self)
+        (self.standard_error.is_finite() && self.freedom > 0.0 && self.estimate.is_finite()).then_some(self)
     }
 }
 
-/// Equivalence by inclusion: true when an interval (of coverage `1 - 2 alpha` for a claim at level alpha) lies within
-/// the margins.
-pub fn within(interval: &Interval, margin: f64) -> bool {
-    -margin < interval.low && interval.high < margin
-}
-
-/// Squared standard error of a mean; NaN for fewer than two values.
+/// Squared standard error of a mean, 0 where values differ by rounding alone; NaN for fewer than two values.
 fn squared_error(values: &[f64]) -> f64 {
-    sums::variance(values) / (values.len() as f64 - 1.0)
+    let largest = values.iter().fold(0.0f64, |largest, v| largest.max(v.abs()));
+    let variance = sums::variance(values);
+    let rounding = EQUAL * largest;
+    if variance <= rounding * rounding && values.len() > 1 { 0.0 } else { variance / (values.len() as f64 - 1.0) }
 }
 
 #[cfg(test)]

@@ -3,8 +3,9 @@
 //!
 //! What such tests look at is one number per terrain, because missions on one terrain resemble each other:
 //! [`permutation`] (do two groups differ?), [`trend`] (do ordered groups rise or fall?), [`effect`] (by how much?),
-//! [`equivalence`] (by less than a margin?), [`mixed_logistic`] (success, with an intercept of the terrain), [`power`] (how many
-//! terrains would be needed?), [`multiple`] (several tests at once).
+//! [`difference`] (all of these at once), [`equivalence`] (by less than a margin?), [`conformal`] (is one more drive like these?),
+//! [`mixed_logistic`] (success, with an intercept of the terrain), [`power`] (how many terrains would be needed?), [`multiple`] (several
+//! tests at once).
 //!
 //! Values that are not finite are not data: callers drop them first (`sastrugi_numeric::sums::finite`). Nothing here
 //! draws a random number except from the stream it is given, and the bits do not depend on the CPU.
@@ -12,7 +13,9 @@
 pub mod bootstrap;
 pub mod chi_square;
 pub mod components;
+pub mod conformal;
 pub mod correlation;
+pub mod difference;
 pub mod effect;
 pub mod equivalence;
 pub mod incidence;
@@ -21,15 +24,19 @@ pub mod multiple;
 pub mod normal;
 pub mod permutation;
 pub mod power;
+pub mod proportion;
+mod rank_distribution;
 pub mod student;
 pub mod summary;
 pub mod trend;
 
 pub use bootstrap::{Interval, cluster_interval};
 pub use components::Components;
+pub use conformal::Place;
+pub use difference::Difference;
 pub use effect::Effect;
 pub use equivalence::MeanDifference;
 pub use incidence::{Ending, Incidence};
 pub use multiple::holm;
-pub use permutation::Permutation;
+pub use permutation::{Arrangements, Permutation};
 pub use summary::BoxPlot;

@@ -125,12 +125,6 @@ impl Fit {
         let freedom = self.coefficients.len().saturating_sub(simpler.coefficients.len());
         (chi2, freedom, chi_square::above(chi2, freedom))
     }
-
-    /// Share of the terrain in the variance of the latent scale, whose logistic part has variance pi^2 / 3.
-    pub fn latent_share(&self) -> f64 {
-        let terrain = self.deviation * self.deviation;
-        terrain / (terrain + std::f64::consts::PI * std::f64::consts::PI / 3.0)
-    }
 }
 
 /// Terrains with the same missions and outcomes: they add the same to the likelihood.

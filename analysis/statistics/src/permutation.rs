@@ -14,13 +14,39 @@
 //!
 //! The second form (A. Davison and D. Hinkley, 1997, equation 4.11) counts the observed arrangement as one of them, so
 //! that the test keeps its level with any number of draws. Cost: one evaluation of the statistic per arrangement.
+//!
+//! Of rank statistics of very many values the exact variance over all arrangements is used with the normal distribution
+//! (A. Wald and J. Wolfowitz, 1944): random arrangements would be slow, and no p below one in their number.
 
 use crate::correlation::ranks;
+use crate::normal;
 use sastrugi_numeric::{Stream, sums};
 
-/// Relative difference below which a statistic counts as equal to the observed one: sums in another order round
-/// otherwise.
-const EQUAL: f64 = 1e-10;
+/// Relative difference below which numbers count as equal: sums in another order round otherwise.
+pub(crate) const EQUAL: f64 = 1e-10;
+/// Values from which rank statistics are taken for normal.
+const NORMAL_FROM: usize = 300;
+/// Random arrangements of a test, where several tests at once do not call for more.
+const DRAWS: usize = 9999;
+/// With as many arrangements as this times the tests over their level, Holm's adjustment leaves p that are found.
+const DRAWS_PER_TEST: f64 = 4.0;
+
+/// Random arrangements for each of several tests that are adjusted together to a level; where there are no more than these,
+/// all are looked at.
+pub fn draws(tests: usize, alpha: f64) -> usize {
+    DRAWS.max((DRAWS_PER_TEST * tests as f64 / alpha).min(1e6) as usize)
+}
+
+/// Where the arrangements of a test come from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Arrangements {
+    /// All that there are, with their number.
+    All(usize),
+    /// Drawn at random; the number includes the observed one.
+    Drawn(usize),
+    /// The normal distribution of a rank statistic with the exact variance of all arrangements.
+    Normal,
+}
 
 /// Result of a permutation test.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,10 +55,20 @@ pub struct Permutation {
     pub observed: f64,
     /// Probability of a statistic at least as large under the null hypothesis, in (0, 1].
     pub p: f64,
-    /// Arrangements that were looked at, the observed one included.
-    pub arrangements: usize,
-    /// True when these are all there are.
-    pub exact: bool,
+    /// What it is a share of.
+    pub arrangements: Arrangements,
+}
+
+impl Permutation {
+    /// The least p that any data of these numbers of values could have: of two arrangements, one the mirror of the other, both are
+    /// as extreme.
+    pub fn least_p(&self) -> f64 {
+        match self.arrangements {
+            Arrangements::All(n) => 2.0 / n as f64,
+            Arrangements::Drawn(n) => 1.0 / n as f64,
+            Arrangements::Normal => 0.0,
+        }
+    }
 }
 
 /// The test of any statistic of labels that move within blocks. `blocks` are the lengths of consecutive runs of
@@ -63,7 +99,8 @@ pub fn within_blocks(
             }
         }
         let p = large as f64 / arrangements as f64;
-        return (arrangements > 1).then_some(Permutation { observed, p, arrangements, exact: true });
+        let arrangements = Arrangements::All(arrangements);
+        return (all > 1.0).then_some(Permutation { observed, p, arrangements });
     }
     let mut large = 1;
     for _ in 0..draws {
@@ -72,7 +109,34 @@ pub fn within_blocks(
     }
     let arrangements = draws + 1;
     let p = large as f64 / arrangements as f64;
-    (draws > 0).then_some(Permutation { observed, p, arrangements, exact: false })
+    (draws > 0).then_some(Permutation { observed, p, arrangements: Arrangements::Drawn(arrangements) })
+}
+
+/// The two-sided test of the sum of label times score, scores having mean 0 in every block: by arrangements as
+/// [`within_blocks`], of more values than those can be laid by the normal distribution.
+pub(crate) fn linear_within_blocks(
+    labels: &[usize],
+    scores: &[f64],
+    blocks: &[usize],
+    draws: usize,
+    stream: &mut Stream,
+) -> Option<Permutation> {
+    if labels.len() < NORMAL_FROM || number_of_arrangements(labels, blocks) <= draws as f64 {
+        return within_blocks(labels, blocks, draws, stream, |labels| linear(labels, scores).abs());
+    }
+    let observed = linear(labels, scores).abs();
+    let mut at = 0;
+    let of_block = |n: &usize| {
+        let of = at..at + n;
+        at += n;
+        let labels: Vec<f64> = labels[of.clone()].iter().map(|l| *l as f64).collect();
+        // Squares about the means are n times the variances.
+        let squares = [&labels, &scores[of]].map(|v| sums::variance(v) * *n as f64);
+        if *n > 1 { squares[0] * squares[1] / (*n as f64 - 1.0) } else { 0.0 }
+    };
+    let variance: f64 = blocks.iter().map(of_block).sum();
+    let p = if variance > 0.0 { (2.0 * normal::cdf(-observed / variance.sqrt())).min(1.0) } else { 1.0 };
+    observed.is_finite().then_some(Permutation { observed, p, arrangements: Arrangements::Normal })
 }
 
 /// Two independent groups and any statistic of both, large when they differ.
@@ -110,7 +174,7 @@ pub fn paired(
 pub fn rank_sum(first: &[f64], second: &[f64], draws: usize, stream: &mut Stream) -> Option<Permutation> {
     let scores = centred_ranks(&[first, second].concat());
     let labels = labels_of(&[first.len(), second.len()]);
-    within_blocks(&labels, &[scores.len()], draws, stream, |labels| linear(labels, &scores).abs())
+    linear_within_blocks(&labels, &scores, &[scores.len()], draws, stream)
 }
 
 /// Second less first of every pair; 0 where they are equal but for rounding, as means of the same value over other numbers of
@@ -126,12 +190,14 @@ pub fn differences(pairs: impl IntoIterator<Item = [f64; 2]>) -> Vec<f64> {
 /// Two-sided signed-rank test (F. Wilcoxon, 1945), ties of the magnitudes sharing their mean rank, zeros ranked and
 /// without a sign (J. Pratt, 1959). The statistic is the magnitude of the sum of signed ranks.
 pub fn signed_rank(differences: &[f64], draws: usize, stream: &mut Stream) -> Option<Permutation> {
-    paired(&signed_ranks(differences), draws, stream, |d| sums::sum(d).abs())
+    let scores: Vec<f64> = signed_ranks(differences).into_iter().flat_map(|rank| [-rank, rank]).collect();
+    let labels: Vec<usize> = differences.iter().flat_map(|_| [0, 1]).collect();
+    linear_within_blocks(&labels, &scores, &vec![2; differences.len()], draws, stream)
 }
 
 /// Rank of the magnitude of each value with the value's sign, 0 for zeros.
 pub(crate) fn signed_ranks(differences: &[f64]) -> Vec<f64> {
-    let magnitudes: Vec<f64> = differences.iter().map(|d| d.abs()).collect();
+    let magnitudes = tied(&differences.iter().map(|d| d.abs()).collect::<Vec<_>>());
     let signed = |(d, rank): (&f64, f64)| if *d == 0.0 { 0.0 } else { rank.copysign(*d) };
     differences.iter().zip(ranks(&magnitudes)).map(signed).collect()
 }
@@ -139,7 +205,21 @@ pub(crate) fn signed_ranks(differences: &[f64]) -> Vec<f64> {
 /// Ranks less their mean: their sums are multiples of one half and exact.
 pub(crate) fn centred_ranks(values: &[f64]) -> Vec<f64> {
     let mean = 0.5 * (values.len() + 1) as f64;
-    ranks(values).iter().map(|r| r - mean).collect()
+    ranks(&tied(values)).iter().map(|r| r - mean).collect()
+}
+
+/// The values, those that are equal but for rounding made equal: each of a run of neighbours becomes the least of them.
+pub(crate) fn tied(values: &[f64]) -> Vec<f64> {
+    let mut order: Vec<usize> = (0..values.len()).collect();
+    order.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
+    let mut tied = values.to_vec();
+    for pair in order.windows(2) {
+        let [low, high] = [values[pair[0]], values[pair[1]]];
+        if high - low <= EQUAL * low.abs().max(high.abs()) {
+            tied[pair[1]] = tied[pair[0]];
+        }
+    }
+    tied
 }
 
 /// Sum of label times score.

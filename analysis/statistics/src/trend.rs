@@ -11,35 +11,59 @@
 //! `T` is the statistic `L` of E. Page, Journal of the American Statistical Association 58, 1963, less its
 //! expectation). Both tests are two-sided, and by permutation: see [`crate::permutation`]. With two groups the first is
 //! the rank-sum test. Cost: one pass per arrangement.
+//!
+//! The size of a trend is a rank correlation. Its interval over independent groups is that of D. Bonett and T. Wright
+//! (Psychometrika 65, 2000): on the scale of Fisher's `z = artanh r`, with variance `(1 + r^2 / 2) / (n - 3)`; over blocks
+//! it is that of a mean of bounded values, [`crate::proportion`], which is too wide rather than too short.
 
-use crate::correlation::{pearson, spearman};
-use crate::permutation::{Permutation, centred_ranks, labels_of, linear, within_blocks};
+use crate::bootstrap::Interval;
+use crate::correlation::spearman;
+use crate::permutation::{Permutation, centred_ranks, labels_of, linear_within_blocks, tied};
+use crate::{normal, proportion};
 use sastrugi_numeric::Stream;
 
 /// Trend over independent groups, each with the values of its terrains.
 pub fn of_groups(groups: &[Vec<f64>], draws: usize, stream: &mut Stream) -> Option<Permutation> {
     let scores = centred_ranks(&groups.concat());
     let labels = labels_of(&sizes(groups));
-    within_blocks(&labels, &[scores.len()], draws, stream, |labels| linear(labels, &scores).abs())
+    linear_within_blocks(&labels, &scores, &[scores.len()], draws, stream)
 }
 
 /// Trend over paired groups: each block holds one value of every group, in the order of the groups.
 pub fn of_blocks(blocks: &[Vec<f64>], draws: usize, stream: &mut Stream) -> Option<Permutation> {
     let scores: Vec<f64> = blocks.iter().flat_map(|b| centred_ranks(b)).collect();
     let labels: Vec<usize> = blocks.iter().flat_map(|b| 0..b.len()).collect();
-    within_blocks(&labels, &sizes(blocks), draws, stream, |labels| linear(labels, &scores).abs())
+    linear_within_blocks(&labels, &scores, &sizes(blocks), draws, stream)
 }
 
-/// Size of the trend over independent groups: Spearman's correlation of the group's number and the value, in -1..1.
-pub fn correlation_of_groups(groups: &[Vec<f64>]) -> f64 {
+/// Size of the trend over independent groups: Spearman's correlation of the group's number and the value, in -1..1, with its
+/// interval; -1..1 for fewer than four values. `None` when all labels or all values are equal.
+pub fn correlation_of_groups(groups: &[Vec<f64>], level: f64) -> Option<Interval> {
+    let values = tied(&groups.concat());
     let labels: Vec<f64> = labels_of(&sizes(groups)).iter().map(|l| *l as f64).collect();
-    spearman(&labels, &groups.concat())
+    let estimate = spearman(&labels, &values);
+    let mut interval = Interval { estimate, low: -1.0, high: 1.0, level };
+    // At |r| = 1 the scale ends; the value next to it that this many ranks can have is near enough.
+    let n = values.len() as f64;
+    let r = estimate.clamp(1.0 / (n * n) - 1.0, 1.0 - 1.0 / (n * n));
+    if values.len() > 3 {
+        let reach = normal::quantile(0.5 * (1.0 + level)) * ((1.0 + 0.5 * r * r) / (n - 3.0)).sqrt();
+        let z = libm::atanh(r);
+        interval.low = libm::tanh(z - reach).min(estimate);
+        interval.high = libm::tanh(z + reach).max(estimate);
+    }
+    estimate.is_finite().then_some(interval)
 }
 
-/// Size of the trend over paired groups: correlation of the group's number and the rank within the block, in -1..1.
-pub fn correlation_of_blocks(blocks: &[Vec<f64>]) -> f64 {
-    let labels: Vec<f64> = blocks.iter().flat_map(|b| (0..b.len()).map(|k| k as f64)).collect();
-    pearson(&labels, &blocks.iter().flat_map(|b| centred_ranks(b)).collect::<Vec<_>>())
+/// Size of the trend over paired groups: the mean over blocks of Spearman's correlation of the group's number and the value, in
+/// -1..1, blocks of equal values counting as 0, with its interval. `None` without blocks of two or more groups.
+pub fn correlation_of_blocks(blocks: &[Vec<f64>], level: f64) -> Option<Interval> {
+    let of_block = |block: &Vec<f64>| {
+        let r = spearman(&(0..block.len()).map(|k| k as f64).collect::<Vec<_>>(), &tied(block));
+        if r.is_finite() { r } else { 0.0 }
+    };
+    let correlations: Vec<f64> = blocks.iter().map(of_block).collect();
+    blocks.iter().any(|b| b.len() > 1).then(|| proportion::between_ends(&correlations, level))?
 }
 
 fn sizes(groups: &[Vec<f64>]) -> Vec<usize> {

@@ -3,9 +3,10 @@
 
 use crate::jobs::traverse;
 use crate::registry::{BuildError, Builder};
-use crate::study::StudyError;
 use crate::study::keys::nearest;
-use sastrugi_schemas::study::HypothesisItem;
+use crate::study::{Entry, StudyError};
+use sastrugi_schemas::ParameterError;
+use sastrugi_schemas::study::{HypothesisItem, TraverseItem};
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
 
@@ -28,6 +29,7 @@ pub fn check(builder: &mut Builder<'_>) -> Result<(), BuildError> {
             let error = entry.error(&format!("groups.{k}"), format!("no missions are driven in a group \"{group}\""));
             return Err(suggesting(error, group, &known).into());
         }
+        check_run(builder, &entry, &item)?;
     }
     Ok(())
 }
@@ -43,7 +45,39 @@ fn suggesting(error: StudyError, group: &str, known: &BTreeSet<&str>) -> StudyEr
 
 /// Groups of the missions that are driven, as the report knows them: the label of the heightfield, its kind where it has none.
 fn groups<'b>(builder: &'b Builder<'_>) -> BTreeSet<&'b str> {
-    let driven = builder.nodes().iter().filter(|node| node.item.stage == traverse::STAGE);
-    let fields = driven.filter_map(|node| builder.heightfields.get(traverse::terrain_of(&node.item.id)));
-    fields.map(|field| field.group.as_deref().unwrap_or(&field.kind)).collect()
+    driven(builder).map(|(_, group)| group).collect()
+}
+
+/// Run and group of everything that is driven.
+fn driven<'b>(builder: &'b Builder<'_>) -> impl Iterator<Item = (&'b str, &'b str)> {
+    let items = builder.nodes().iter().map(|node| &node.item).filter(|item| item.stage == traverse::STAGE);
+    items.filter_map(|item| {
+        let field = builder.heightfields.get(traverse::terrain_of(&item.id))?;
+        Some((traverse::run_of(&item.id), field.group.as_deref().unwrap_or(&field.kind)))
+    })
+}
+
+/// Refuses a run that is none, and the lack of one where several drive the groups: their missions are no repetitions of each other.
+fn check_run(builder: &Builder<'_>, entry: &Entry<'_>, item: &HypothesisItem) -> Result<(), BuildError> {
+    let mut plain = BTreeSet::new();
+    for entry in builder.study.entries(traverse::STAGE)? {
+        let (run, _): (TraverseItem, Value) = entry.read()?;
+        if run.sweep.is_empty() {
+            plain.insert(run.id);
+        }
+    }
+    let of_groups = driven(builder).filter(|(_, group)| item.groups.iter().any(|g| g == group)).map(|(run, _)| run);
+    let runs: BTreeSet<&str> = of_groups.filter(|run| plain.contains(*run)).collect();
+    let list = runs.iter().copied().collect::<Vec<_>>().join(", ");
+    match item.traverse.as_deref() {
+        None if runs.len() > 1 => {
+            let message = format!("is missing; these groups are driven by {list}");
+            Err(entry.refuse(ParameterError::new("traverse", message)).into())
+        }
+        Some(run) if !runs.contains(run) => {
+            let message = format!("\"{run}\" drives none of these groups, or is swept; there are: {list}");
+            Err(entry.refuse(ParameterError::new("traverse", message)).into())
+        }
+        _ => Ok(()),
+    }
 }

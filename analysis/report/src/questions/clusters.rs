@@ -63,11 +63,6 @@ impl<'a> Pairing<'a> {
         Self { blocks: if paired(groups) { missions.map(entry).collect() } else { BTreeMap::new() } }
     }
 
-    /// Every terrain by itself.
-    pub fn of_terrains() -> Self {
-        Self { blocks: BTreeMap::new() }
-    }
-
     /// True when groups share pairs.
     pub fn is_common(&self) -> bool {
         !self.blocks.is_empty()

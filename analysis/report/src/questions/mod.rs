@@ -14,6 +14,7 @@ pub mod releases;
 mod relief;
 pub mod scoreboard;
 pub mod sensitivity;
+mod sql;
 pub mod terrain;
 pub mod texture;
 

@@ -137,7 +137,7 @@ fn numbers(path: &str, grid: &Grid, (low, high): (f64, f64)) -> Numbers {
         ("low_m", "m"),
         ("high_m", "m"),
     ];
-    let mut numbers = Numbers::new(path, &columns);
+    let mut numbers = Numbers::of_file(path, &columns);
     let int = |n: usize| Cell::I64(n as i64);
     numbers.row([
         text(path),

@@ -2,7 +2,7 @@
 
 use super::number;
 use super::svg::escape;
-use crate::content::{Block, Figure, Heading, Numbers, Section, TableBlock};
+use crate::content::{Block, Figure, Gives, Heading, Numbers, Section, TableBlock};
 use sastrugi_schemas::Cell;
 
 /// Style of the page.
@@ -108,11 +108,21 @@ fn figure(figure: &Figure) -> String {
     };
     format!(
         "<figure id=\"fig-{id}\">\n{svg}<figcaption><b>{}</b> {}<div class=\"links\"><a href=\"figures/{id}.svg\">SVG</a> \
-         <a href=\"data/{id}.json\">JSON</a> <span>from <code>{}</code></span>{numbers}</div></figcaption>\n</figure>\n",
+         <a href=\"data/{id}.json\">JSON</a>{}{numbers}</div></figcaption>\n</figure>\n",
         escape(&figure.title),
         escape(&figure.caption),
-        escape(&figure.numbers.query),
+        source(&figure.numbers, &figure.id),
     )
+}
+
+/// Where numbers come from: the name of a file, a query one click away.
+fn source(numbers: &Numbers, id: &str) -> String {
+    let query = format!("<code>{}</code>", escape(&numbers.query));
+    match numbers.gives {
+        Gives::File => format!(" <span>from {query}</span>"),
+        Gives::Rows => folded("Query", id, &query),
+        Gives::Input => folded("Query of what it is computed from", id, &query),
+    }
 }
 
 /// Folded content; on paper its words name the file that holds it.
@@ -124,9 +134,9 @@ fn folded(summary: &str, id: &str, content: &str) -> String {
 fn table_block(block: &TableBlock) -> String {
     let id = escape(&block.id);
     format!(
-        "{}<p class=\"links\"><a href=\"data/{id}.json\">JSON</a> <span>from <code>{}</code></span></p>\n",
+        "{}<div class=\"links\"><a href=\"data/{id}.json\">JSON</a>{}</div>\n",
         table(&block.numbers, &block.caption),
-        escape(&block.numbers.query)
+        source(&block.numbers, &block.id)
     )
 }
 

@@ -1,6 +1,7 @@
 use super::*;
+use crate::permutation;
 use proptest::prelude::*;
-use sastrugi_numeric::Streams;
+use sastrugi_numeric::{Stream, Streams};
 
 const A: [f64; 6] = [62.0, 71.5, 55.0, 80.0, 66.5, 71.5];
 const B: [f64; 5] = [58.0, 49.0, 71.5, 40.5, 55.0];
@@ -23,10 +24,13 @@ fn val_degenerate_samples() {
     assert!(shift(&[], &[1.0]).is_nan() && delta(&[1.0], &[]).is_nan());
     assert!(paired_shift(&[]).is_nan() && paired_delta(&[]).is_nan());
     assert_eq!((shift(&[1.0], &[-2.0]), paired_shift(&[-2.0])), (-3.0, -2.0));
-    let mut s = stream("degenerate");
-    assert_eq!(Effect::between(&[1.0], &[1.0, 2.0], 9, 0.95, &mut s), None);
-    assert_eq!(Effect::between(&[], &[], 9, 0.95, &mut s), None);
-    assert_eq!(Effect::of_pairs(&[1.0], 9, 0.95, &mut s), None);
+    assert_eq!(Effect::between(&[], &[1.0], 0.95), None);
+    assert_eq!(Effect::of_pairs(&[], 0.95), None);
+    // So few values reject no shift.
+    for few in [Effect::between(&[1.0], &[1.0, 2.0], 0.95).unwrap(), Effect::of_pairs(&[1.0; 5], 0.95).unwrap()] {
+        assert_eq!((few.shift.low, few.shift.high), (f64::NEG_INFINITY, f64::INFINITY));
+        assert!(few.delta.low < few.delta.high);
+    }
 }
 
 /// The slow way: all pairs, sorted.
@@ -60,23 +64,44 @@ proptest! {
     }
 }
 
-/// Null: intervals of 95 % hold the truth. 400 sets of 20 terrains a group, values normal, true shift 1; its delta is
-/// P(y > x) - P(y < x) = erf(1/2) = 0.5205. 400 redraws. The percentile bootstrap over 20 terrains covers 93 to 95 %:
-/// fewer than 347 hits of 400 (86.8 %) has a false-alarm probability of 3e-6 (binomial, p = 0.93). For pairs the truth
-/// is 1 / sqrt 2 in units of the scatter of differences, so delta is erf(1/2) as well.
+/// The shifts that the rank tests do not reject at 5 %, on either side of the ends: those of all arrangements.
+#[test]
+fn val_intervals_invert_the_tests() {
+    let mut s = stream("invert");
+    let (a, b) = ([0.1, 2.3, 1.7, 5.2, 3.9], [4.4, 1.1, 6.5, 7.2, 2.8, 9.3]);
+    let by = |shift: f64| b.map(|y| y - shift);
+    let d = [0.4, -0.7, 1.9, 2.6, 3.3, 0.9, 1.2, 4.8];
+    let apart = Effect::between(&a, &b, 0.95).unwrap().shift;
+    let pairs = Effect::of_pairs(&d, 0.95).unwrap().shift;
+    for (end, inwards) in [(apart.low, 1e-9), (apart.high, -1e-9)] {
+        let p = |shift: f64, s: &mut Stream| permutation::rank_sum(&a, &by(shift), 9999, s).unwrap().p;
+        assert!(p(end + inwards, &mut s) > 0.05 && p(end - inwards, &mut s) <= 0.05, "{apart:?}");
+    }
+    for (end, inwards) in [(pairs.low, 1e-9), (pairs.high, -1e-9)] {
+        let p = |shift: f64, s: &mut Stream| permutation::signed_rank(&d.map(|d| d - shift), 9999, s).unwrap().p;
+        assert!(p(end + inwards, &mut s) > 0.05 && p(end - inwards, &mut s) <= 0.05, "{pairs:?}");
+    }
+}
+
+/// Null: intervals of 95 % hold the truth, for 4, 6 and 20 terrains a group (6 is the fewest pairs with a finite interval of the shift).
+/// Values normal, true shift 1; its delta is P(y > x) - P(y < x) = erf(1/2) = 0.5205. For pairs the truth is 1 / sqrt 2 in units
+/// of the scatter of differences, so delta is erf(1/2) as well. 1000 sets each: fewer than 905 hits has a false-alarm probability of
+/// 1e-8 (binomial, p = 0.95).
 #[test]
 fn stat_coverage() {
     let mut s = stream("coverage");
     let truth = libm::erf(0.5);
-    let mut hits = [0; 4];
-    for _ in 0..400 {
-        let mut group = |shift: f64| (0..20).map(|_| shift + s.normal()).collect::<Vec<_>>();
-        let (a, b) = (group(0.0), group(1.0));
-        let d: Vec<f64> = a.iter().zip(&b).map(|(a, b)| b - a).collect();
-        let apart = Effect::between(&a, &b, 400, 0.95, &mut s).unwrap();
-        let pairs = Effect::of_pairs(&d, 400, 0.95, &mut s).unwrap();
-        let held = [apart.shift.holds(1.0), apart.delta.holds(truth), pairs.shift.holds(1.0), pairs.delta.holds(truth)];
-        hits.iter_mut().zip(held).for_each(|(n, h)| *n += usize::from(h));
+    for n in [4, 6, 20] {
+        let mut hits = [0; 4];
+        for _ in 0..1000 {
+            let mut group = |shift: f64| (0..n).map(|_| shift + s.normal()).collect::<Vec<_>>();
+            let (a, b) = (group(0.0), group(1.0));
+            let d: Vec<f64> = a.iter().zip(&b).map(|(a, b)| b - a).collect();
+            let (apart, pairs) = (Effect::between(&a, &b, 0.95).unwrap(), Effect::of_pairs(&d, 0.95).unwrap());
+            let held =
+                [apart.shift.holds(1.0), apart.delta.holds(truth), pairs.shift.holds(1.0), pairs.delta.holds(truth)];
+            hits.iter_mut().zip(held).for_each(|(n, h)| *n += usize::from(h));
+        }
+        assert!(hits.iter().all(|h| *h >= 905), "{hits:?} of 1000 with {n}");
     }
-    assert!(hits.iter().all(|n| (347..=399).contains(n)), "{hits:?} of 400");
 }

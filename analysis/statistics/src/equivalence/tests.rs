@@ -27,8 +27,12 @@ fn prop_inclusion_is_the_two_tests() {
     let difference = MeanDifference::between(&A, &B).unwrap();
     for k in 1..80 {
         let margin = 0.5 * f64::from(k);
-        assert_eq!(difference.equivalence_p(margin) < 0.05, within(&difference.interval(0.9), margin), "{margin}");
-        assert_eq!(within(&difference.interval(0.9), margin), margin > difference.smallest_margin(0.05), "{margin}");
+        let i = difference.interval(0.9);
+        let within = -margin < i.low && i.high < margin;
+        assert_eq!(difference.equivalence_p(margin) < 0.05, within, "{margin}");
+        assert_eq!(within, margin > difference.smallest_margin(0.05), "{margin}");
+        let beyond = i.low > margin || i.high < -margin;
+        assert_eq!(difference.beyond_p(margin) < 0.1, beyond, "{margin}");
     }
 }
 
@@ -36,9 +40,13 @@ fn prop_inclusion_is_the_two_tests() {
 fn val_degenerate_samples() {
     assert_eq!(MeanDifference::between(&[1.0], &[1.0, 2.0]), None);
     assert_eq!(MeanDifference::between(&[], &[]), None);
-    assert_eq!(MeanDifference::between(&[2.0; 3], &[1.0; 3]), None);
     assert_eq!(MeanDifference::of_pairs(&[1.0]), None);
-    assert_eq!(MeanDifference::of_pairs(&[1.0, 1.0]), None);
+    // Nothing varies: an estimate, and nothing that tells how good it is.
+    for sure in [MeanDifference::between(&[2.0; 3], &[1.0; 3]), MeanDifference::of_pairs(&[-1.0, -1.0 - 1e-13])] {
+        let sure = sure.unwrap();
+        assert!((sure.estimate + 1.0).abs() < 1e-12 && !sure.scatters() && sure.equivalence_p(5.0).is_nan());
+        assert!(sure.interval(0.9).low.is_nan() && sure.smallest_margin(0.05).is_nan() && sure.beyond_p(0.1).is_nan());
+    }
     assert_eq!(MeanDifference::of_pairs(&[1.0, f64::NAN]), None);
     assert!(MeanDifference::between(&[1.0, 2.0], &[3.0, 3.0]).is_some());
 }

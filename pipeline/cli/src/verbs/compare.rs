@@ -66,7 +66,8 @@ fn text_of_releases(comparison: &releases::Comparison) -> String {
         text.push_str(&format!("{name}: {} ({}, version {})\n", side.folder, side.name, side.version));
     }
     comparison.files.iter().for_each(|files| text.push_str(&text_of_files(files)));
-    let head = ["group", "figure", "terrains", "A", "B", "difference", "interval", "same within", "p (Holm)", "answer"];
+    let interval = format!("its {} % interval", 100.0 - 200.0 * comparison.parameters.alpha);
+    let head = ["group", "figure", "terrains", "A", "B", "difference", &interval, "same within", "p (Holm)", "answer"];
     let mut rows = vec![head.map(str::to_owned).to_vec()];
     rows.extend(comparison.quantities.iter().map(row_of_releases));
     text.push_str(&format!("\n{}\n\n", columns(&rows)));

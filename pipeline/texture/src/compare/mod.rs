@@ -48,31 +48,9 @@ pub use params::{CompareParameters, CompareSettings};
 pub use surfaces::surfaces;
 
 use crate::fit::FitError;
+pub use sastrugi_schemas::Answer;
 use sastrugi_schemas::ParameterError;
 use serde::Serialize;
-
-/// An answer about one quantity, or about all of them.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Answer {
-    /// Equivalent within the bounds.
-    Same,
-    /// Not equal, and not shown to be equivalent.
-    Different,
-    /// The data rules out neither.
-    CannotTell,
-}
-
-impl Answer {
-    /// In words.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Same => "same",
-            Self::Different => "different",
-            Self::CannotTell => "cannot tell",
-        }
-    }
-}
 
 /// How a difference is measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]

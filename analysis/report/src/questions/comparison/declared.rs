@@ -1,14 +1,15 @@
 //! Hypotheses that the study declares: each with its estimate, its test, and what came of the claim.
 
 use super::values::{self, Figure, Values};
-use super::verdicts::{self, Measure, Verdict};
+use super::verdicts::{self, Level, Measure, Verdict};
 use crate::content::{Block, Numbers, TableBlock, number, text};
 use crate::data::{Data, Group};
 use crate::questions::clusters::Pairing;
+use crate::questions::sql;
 use crate::render::number as set;
 use sastrugi_schemas::study::{Direction, HypothesisItem, HypothesisTest};
 use sastrugi_schemas::tables::MissionRow;
-use sastrugi_statistics::{Interval, holm};
+use sastrugi_statistics::{Difference, Interval, MeanDifference, holm};
 use std::collections::BTreeSet;
 
 /// A hypothesis after its test.
@@ -19,11 +20,19 @@ struct Tested<'a> {
     /// What the estimate is.
     what: &'static str,
     estimate: Option<Interval>,
+    /// Which way it goes, by its sign.
+    way: f64,
     p: f64,
     /// Over the family.
     adjusted: f64,
-    /// True when no data of this many terrains could have supported the claim.
-    hopeless: bool,
+    /// The least p that any data of this many terrains could have.
+    least_p: f64,
+    /// The same over the family.
+    least_adjusted: f64,
+    /// Of equivalence: p against a difference of at most the margin.
+    beyond_p: f64,
+    /// Claims in the family.
+    family: usize,
 }
 
 /// The table of the hypotheses; nothing when the study declares none.
@@ -31,12 +40,14 @@ pub fn blocks<'a>(data: &'a Data, groups: &'a [Group<'a, MissionRow>], pairing: 
     if data.study.hypotheses.is_empty() {
         return Vec::new();
     }
-    let mut tested: Vec<Tested> = data.study.hypotheses.iter().map(|h| test(data, h, groups, pairing)).collect();
+    let claims = &data.study.hypotheses;
+    let family = |of: &HypothesisItem| claims.iter().filter(|h| h.family == of.family).count();
+    let mut tested: Vec<Tested> = claims.iter().map(|h| test(data, h, family(h), groups, pairing)).collect();
     adjust(&mut tested);
     vec![
         Block::Heading("Declared before the run: confirmatory".into()),
         Block::Text(in_words(&tested)),
-        Block::Table(table(&tested)),
+        Block::Table(table(data, &tested)),
         Block::Text(introduction(data)),
     ]
 }
@@ -44,42 +55,52 @@ pub fn blocks<'a>(data: &'a Data, groups: &'a [Group<'a, MissionRow>], pairing: 
 fn test<'a>(
     data: &Data,
     claim: &'a HypothesisItem,
+    family: usize,
     groups: &'a [Group<'a, MissionRow>],
     pairing: &Pairing<'a>,
 ) -> Tested<'a> {
     let figure = values::figure(claim.statistic, groups, pairing);
-    let words = claim_in_words(claim, &figure);
     let untested = Tested {
         claim,
-        words,
+        words: claim_in_words(claim, &figure),
         of: String::new(),
         what: "",
         estimate: None,
+        way: f64::NAN,
         p: f64::NAN,
         adjusted: f64::NAN,
-        hopeless: true,
+        least_p: 1.0,
+        least_adjusted: 1.0,
+        beyond_p: f64::NAN,
+        family,
     };
-    let named = |name: &String| figure.groups.iter().find(|g| g.name == name.as_str() && !g.means.is_empty());
+    let of_run = |g: &&Values| claim.traverse.is_none() || g.run == claim.traverse.as_deref();
+    let named =
+        |name: &String| figure.groups.iter().filter(of_run).find(|g| g.label == name.as_str() && !g.means.is_empty());
     let Some(members) = claim.groups.iter().map(named).collect::<Option<Vec<&Values>>>() else { return untested };
+    let level = Level { alpha: claim.alpha, tests: family };
     let Verdict { of, test, size, .. } = match members[..] {
-        [from, to] => verdicts::pair(data, &figure, [from, to], claim.alpha),
-        _ => verdicts::over_groups(data, &figure, &members, claim.alpha),
+        [from, to] => verdicts::pair(data, &figure, [from, to], level),
+        _ => verdicts::over_groups(data, &figure, &members, level),
     };
-    let by_test = test.map_or(f64::NAN, |t| t.p);
-    // Of two arrangements, one the mirror of the other, both are as extreme.
-    let hopeless = test.is_none_or(|t| t.exact && 2.0 / t.arrangements as f64 > claim.alpha);
+    let p = test.map_or(f64::NAN, |t| t.p);
+    let least_p = test.map_or(1.0, |t| t.least_p());
+    let tested = Tested { of, p, least_p, ..untested };
     match (size, claim.margin) {
-        (Measure::Trend { interval, .. }, _) => {
-            Tested { of, what: "rank correlation", estimate: interval, p: by_test, hopeless, ..untested }
+        (Measure::Trend(estimate), _) => {
+            let way = estimate.map_or(f64::NAN, |i| i.estimate);
+            Tested { what: "rank correlation", estimate, way, ..tested }
         }
-        (Measure::Pair { effect, .. }, None) => {
-            Tested { of, what: "shift", estimate: effect.map(|e| e.shift), p: by_test, hopeless, ..untested }
+        (Measure::Pair(difference), None) => {
+            let estimate = difference.effect.map(|e| e.shift);
+            Tested { what: "shift", estimate, way: difference.way(), ..tested }
         }
-        (Measure::Pair { difference, .. }, Some(margin)) => {
-            let p = difference.map_or(f64::NAN, |d| d.equivalence_p(margin));
-            let estimate = difference.map(|d| d.interval(1.0 - 2.0 * claim.alpha));
-            let hopeless = members.iter().any(|g| g.means.len() < 2);
-            Tested { of, what: "difference of means", estimate, p, hopeless, ..untested }
+        (Measure::Pair(Difference { means, .. }), Some(margin)) => {
+            let of = |p: fn(&MeanDifference, f64) -> f64| means.map_or(f64::NAN, |d| p(&d, margin));
+            let estimate = means.map(|d| d.interval(1.0 - 2.0 * claim.alpha));
+            let (p, beyond_p) = (of(MeanDifference::equivalence_p), of(MeanDifference::beyond_p));
+            let least_p = if means.is_some() { 0.0 } else { 1.0 };
+            Tested { what: "difference of means", estimate, p, beyond_p, least_p, ..tested }
         }
     }
 }
@@ -89,8 +110,12 @@ fn adjust(tested: &mut [Tested]) {
     let families: BTreeSet<&str> = tested.iter().map(|t| t.claim.family.as_str()).collect();
     for family in families {
         let members: Vec<usize> = (0..tested.len()).filter(|&k| tested[k].claim.family == family).collect();
-        let p: Vec<f64> = members.iter().map(|&k| tested[k].p).collect();
-        members.iter().zip(holm(&p)).for_each(|(&k, adjusted)| tested[k].adjusted = adjusted);
+        let over = |p: fn(&Tested) -> f64| holm(&members.iter().map(|&k| p(&tested[k])).collect::<Vec<_>>());
+        // Holm's adjusted p rises with every p of the family, so that of the least ones is the least.
+        let (adjusted, least) = (over(|t| t.p), over(|t| t.least_p));
+        for ((k, adjusted), least) in members.into_iter().zip(adjusted).zip(least) {
+            (tested[k].adjusted, tested[k].least_adjusted) = (adjusted, least);
+        }
     }
 }
 
@@ -101,17 +126,17 @@ fn claim_in_words(claim: &HypothesisItem, figure: &Figure) -> String {
         None if claim.test == HypothesisTest::Trend => "rises or falls",
         None => "differs",
     };
-    match (claim.test, claim.margin) {
+    let words = match (claim.test, claim.margin) {
         (HypothesisTest::Trend, _) => format!("{} {way} over {}", figure.name, claim.groups.join(", ")),
         (_, Some(margin)) => {
             let unit = if figure.unit == "%" { "points" } else { figure.unit };
             let ends = claim.groups.join(" and ");
-            format!("{}: {ends} differ by less than {} {unit}", figure.name, set::plain(margin, 4))
-                .trim_end()
-                .to_owned()
+            let words = format!("{}: {ends} differ by less than {} {unit}", figure.name, set::plain(margin, 4));
+            words.trim_end().to_owned()
         }
         _ => format!("{} {way} from {}", figure.name, claim.groups.join(" to ")),
-    }
+    };
+    claim.traverse.as_ref().map_or_else(|| words.clone(), |run| format!("{words} ({run})"))
 }
 
 /// What came of a claim.
@@ -123,6 +148,7 @@ enum Outcome {
     Opposite,
     Apart,
     CannotTell,
+    NoScatter,
     TooFew,
 }
 
@@ -135,6 +161,7 @@ impl Outcome {
             Self::Opposite => "not supported: it goes the other way",
             Self::Apart => "not supported: they differ by more than the margin",
             Self::CannotTell => "cannot tell",
+            Self::NoScatter => "cannot tell: no terrain differs from another",
             Self::TooFew => "cannot tell: too few terrains",
         }
     }
@@ -144,7 +171,7 @@ impl Outcome {
     }
 
     const fn is_open(self) -> bool {
-        matches!(self, Self::CannotTell | Self::TooFew)
+        matches!(self, Self::CannotTell | Self::NoScatter | Self::TooFew)
     }
 }
 
@@ -154,8 +181,10 @@ impl Tested<'_> {
         match self.claim.margin {
             Some(_) if found => Outcome::Equivalent,
             _ if found => self.direction(),
-            _ if self.hopeless => Outcome::TooFew,
-            Some(margin) if self.estimate.is_some_and(|i| i.low >= margin || i.high <= -margin) => Outcome::Apart,
+            _ if self.least_adjusted > self.claim.alpha => Outcome::TooFew,
+            // Bonferroni's adjustment over the family.
+            Some(_) if self.beyond_p * self.family as f64 <= self.claim.alpha => Outcome::Apart,
+            Some(_) if self.p.is_nan() => Outcome::NoScatter,
             Some(_) => Outcome::CannotTell,
             None => Outcome::NotSupported,
         }
@@ -163,11 +192,10 @@ impl Tested<'_> {
 
     /// Whether a difference that was found goes where the claim says.
     fn direction(&self) -> Outcome {
-        let estimate = self.estimate.map_or(f64::NAN, |i| i.estimate);
         let right = match self.claim.direction {
             None => true,
-            Some(Direction::Rises) => estimate > 0.0,
-            Some(Direction::Falls) => estimate < 0.0,
+            Some(Direction::Rises) => self.way > 0.0,
+            Some(Direction::Falls) => self.way < 0.0,
         };
         if right { Outcome::Supported } else { Outcome::Opposite }
     }
@@ -178,14 +206,18 @@ fn in_words(tested: &[Tested]) -> String {
     let (holds, open) = (of(Outcome::holds), of(Outcome::is_open));
     let claims = if tested.len() == 1 { "claim".into() } else { format!("{} claims", set::count(tested.len())) };
     format!(
-        "Of the {claims} that the study declares, {} hold{}, {} not supported, and {} cannot be told.",
+        "Of the {claims} that the study declares, {} hold{}, {} not supported{}.",
         set::count(holds),
         if holds == 1 { "s" } else { "" },
         match tested.len() - holds - open {
             1 => "1 is".into(),
             n => format!("{} are", set::count(n)),
         },
-        set::count(open),
+        match open {
+            0 => String::new(),
+            1 => ", of one the data cannot tell".into(),
+            n => format!(", of {} the data cannot tell", set::count(n)),
+        },
     )
 }
 
@@ -195,12 +227,13 @@ fn introduction(data: &Data) -> String {
          manifest and every table carry, would be another. Tests and units are those of the exploratory part: every terrain (or \
          block of paired terrains) counts once. Holm's adjustment is over the hypotheses of a family; a claim holds when its \
          adjusted p is at or below its level and, where it says which way, the estimate goes that way. p is two-sided. Intervals \
-         have the coverage that goes with the level: 1 − α, for equivalence (two one-sided t tests) 1 − 2 α.",
+         have the coverage that goes with the level, not adjusted: 1 − α, for equivalence (two one-sided t tests) 1 − 2 α. Too few \
+         terrains: no data of so many could have supported the claim after the adjustment.",
         data.study_sha256
     )
 }
 
-fn table(tested: &[Tested]) -> TableBlock {
+fn table(data: &Data, tested: &[Tested]) -> TableBlock {
     let columns = [
         ("claim", ""),
         ("verdict", ""),
@@ -215,8 +248,7 @@ fn table(tested: &[Tested]) -> TableBlock {
         ("compared", ""),
         ("id", ""),
     ];
-    let query = "study.toml [[hypothesis]]; tables/missions, plain run: mean by terrain (or block)";
-    let mut numbers = Numbers::new(query, &columns).with_mixed_units();
+    let mut numbers = Numbers::computed(sql::compared(data), &columns).with_mixed_units();
     for t in tested {
         let ends = t.estimate.map_or([f64::NAN; 3], |i| [i.estimate, i.low, i.high]).map(number);
         let head = [text(&t.words), text(t.outcome().words())];

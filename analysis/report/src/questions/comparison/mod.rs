@@ -7,7 +7,7 @@ pub(super) mod values;
 pub(super) mod verdicts;
 
 use super::Question;
-use super::clusters::{LEVEL, Pairing, REPLICATES};
+use super::clusters::{LEVEL, Pairing};
 use crate::ReportError;
 use crate::content::Block;
 use crate::data::{Data, Group};
@@ -23,13 +23,8 @@ pub const QUESTION: Question =
 
 /// Level of the tests.
 pub const ALPHA: f64 = 0.05;
-/// Random arrangements of a test; where there are no more than these, all are looked at.
-const DRAWS: usize = 9999;
-/// Fewest of them: with very many terrains an arrangement takes long, and this many still tell 0.001.
-const DRAWS_MIN: usize = 999;
-/// Values that the arrangements of a test lay anew in all, beyond which there are fewer of them.
-const LAID_MAX: usize = 3_000_000;
-
+/// Terrains in a group below which a reader is warned.
+const FEW: usize = 10;
 fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     let groups = data.mission_groups();
     let pairing = Pairing::among(&groups);
@@ -56,54 +51,67 @@ fn exploratory(data: &Data, groups: &[Group<MissionRow>], pairing: &Pairing) -> 
     }
     blocks.extend([
         Block::Text(verdicts::in_words(&verdicts)),
-        Block::Text(introduction(data, pairing)),
-        Block::Text(refusal(groups, &figures)),
-        Block::Figures(verdicts::drawing(&figures, &verdicts).into_iter().collect()),
-        Block::Table(verdicts::table_of_pairs(&verdicts)),
-        Block::Table(verdicts::table_of_trends(&verdicts)),
+        Block::Text(introduction(data, groups, pairing)),
+        Block::Text(refusal(groups, &figures, pairing)),
+        Block::Figures(verdicts::drawing(data, &figures, &verdicts).into_iter().collect()),
+        Block::Table(verdicts::table_of_pairs(data, &verdicts)),
+        Block::Table(verdicts::table_of_trends(data, &verdicts)),
     ]);
-    blocks.extend(model::blocks(groups, pairing));
+    blocks.extend(model::blocks(data, groups, pairing));
     blocks.extend(planning::blocks(data, &figures, pairing));
     blocks
 }
 
-/// Random arrangements of a test of so many values.
-fn draws(values: usize) -> usize {
-    (LAID_MAX / values.max(1)).clamp(DRAWS_MIN, DRAWS)
-}
-
-fn introduction(data: &Data, pairing: &Pairing) -> String {
+fn introduction(data: &Data, groups: &[Group<MissionRow>], pairing: &Pairing) -> String {
     let registered = match data.study.hypotheses.len() {
         0 => "Exploratory: no hypothesis was registered before the run.",
         _ => "Exploratory: nothing below was declared before the run, and its p values count as hints.",
     };
     let tests = if pairing.is_common() {
         "Groups share their random draws, so terrains are compared within blocks: signed-rank tests of pairs, shifts and deltas \
-         of differences within blocks, and Page's trend; signs or labels are laid anew within blocks."
+         of differences within blocks (over the missions of pairs that have the figure in both groups), and Page's trend (in all \
+         groups); signs or labels are laid anew within blocks."
     } else {
         "Rank-sum tests of pairs, and the rank correlation with the order of the groups as trend; labels are laid anew over the \
          terrains."
     };
+    let few = match few_terrains(groups) {
+        Some(fewest) => format!(
+            " The smallest group has {}: with fewer than about {FEW} most differences stay unfound, and intervals are wide or without \
+             an end.",
+            set::counted(fewest, "terrain")
+        ),
+        None => String::new(),
+    };
     format!(
         "{registered} Every terrain counts once, by the mean of its missions \
-         (success: of all; other figures: of the successful ones). {tests} p is the share of up to {} random arrangements, \
-         or of all where they are fewer, that are as extreme. The shift is Hodges and Lehmann's, delta is Cliff's; \
-         {} % intervals draw terrains or blocks anew ({REPLICATES} samples, percentiles). Groups are equivalent, at {} %, \
-         within any margin above the one in the last column (two one-sided t tests of means); a margin is a claim only when it was set before.",
-        set::count(DRAWS + 1),
+         (success: of all; other figures: of the successful ones). {tests} p is the share of all arrangements, or where they are \
+         more than about ten thousand of as many random ones, that are as extreme; for more than 300 values that of the normal \
+         distribution with the variance of all arrangements. The shift is Hodges and Lehmann's, its {} % interval the shifts \
+         that the test does not reject; delta is Cliff's, with Newcombe's interval, of pairs Clopper and Pearson's. Groups are \
+         equivalent, at {} %, within any margin above the one in the last column (two one-sided t tests of means); a margin is \
+         a claim only when it was set before.{few}",
         set::fixed(100.0 * LEVEL, 0),
         set::fixed(100.0 * ALPHA, 0),
     )
 }
 
+/// The fewest terrains of a group, where they are few.
+fn few_terrains(groups: &[Group<MissionRow>]) -> Option<usize> {
+    let terrains = |g: &Group<MissionRow>| g.rows.iter().map(|m| &m.terrain_id).collect::<BTreeSet<_>>().len();
+    groups.iter().map(terrains).min().filter(|n| *n < FEW)
+}
+
 /// Why missions are not tested, with what that would do here.
-fn refusal(groups: &[Group<MissionRow>], figures: &[Figure]) -> String {
+fn refusal(groups: &[Group<MissionRow>], figures: &[Figure], pairing: &Pairing) -> String {
     let missions: usize = groups.iter().map(|g| g.rows.len()).sum();
     let terrains: usize =
         groups.iter().map(|g| g.rows.iter().map(|m| &m.terrain_id).collect::<BTreeSet<_>>().len()).sum();
     let per_terrain = missions as f64 / terrains as f64;
     let words = "Tests that take missions for independent are not given: missions on one terrain resemble each other.";
-    let Some((between, within)) = planning::scatter(&figures[0]).filter(|s| s.0 > 0.0) else { return words.into() };
+    // Of pairs the terrain's part cancels out of differences, as far as both groups share it.
+    let scatter = planning::scatter(&figures[0]).filter(|s| s.0 > 0.0 && !pairing.is_common());
+    let Some((between, within)) = scatter else { return words.into() };
     let share = between / (between + within);
     let inflation = 1.0 + (per_terrain - 1.0) * share;
     let level = 2.0 * normal::cdf(normal::quantile(0.5 * ALPHA) / inflation.sqrt());

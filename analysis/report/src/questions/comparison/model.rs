@@ -1,9 +1,11 @@
 //! The logistic model of success with an intercept of the terrain.
 
+use super::few_terrains;
 use crate::content::{Block, Numbers, TableBlock, count, number, text};
-use crate::data::Group;
+use crate::data::{Data, Group};
 use crate::questions::clusters::{LEVEL, Pairing};
 use crate::questions::outcome::successful;
+use crate::questions::sql;
 use sastrugi_schemas::Cell;
 use sastrugi_schemas::tables::MissionRow;
 use sastrugi_statistics::mixed_logistic::{Fit, Missions};
@@ -12,23 +14,30 @@ use std::collections::BTreeMap;
 
 const WORDS: &str = "The odds of success, mission by mission, with an intercept of the terrain that is normal on the logarithmic \
 scale: missions on one terrain share it. Odds ratios compare missions on terrains that are alike otherwise; intervals are Wald's, \
-tests compare likelihoods with those of a model without the term.";
+tests compare likelihoods with those of a model without the term, and are not among those that Holm's adjustment is over.";
+const FEW_TERRAINS: &str = "With fewer than about ten terrains in a group intervals are too short and p too small: the tests of terrains \
+above hold for any number.";
 const OF_BLOCKS: &str = "Terrains of one block are taken as independent, which makes intervals wider than need be.";
 
 /// The table and what it is; a sentence where there is no estimate.
-pub fn blocks(groups: &[Group<MissionRow>], pairing: &Pairing) -> Vec<Block> {
-    let words = if pairing.is_common() { format!("{WORDS} {OF_BLOCKS}") } else { WORDS.into() };
+pub fn blocks(data: &Data, groups: &[Group<MissionRow>], pairing: &Pairing) -> Vec<Block> {
+    let notes = [(pairing.is_common(), OF_BLOCKS), (few_terrains(groups).is_some(), FEW_TERRAINS)];
+    let words = notes.iter().filter(|n| n.0).fold(WORDS.to_owned(), |words, (_, note)| format!("{words} {note}"));
     let mut blocks = vec![Block::Heading("Odds of success".into()), Block::Text(words)];
-    match table(groups) {
-        Some(table) => blocks.push(Block::Table(table)),
-        None => blocks.push(Block::Text(
-            "The model has no finite estimate here: in a group every mission succeeded, or none did.".into(),
-        )),
-    }
+    blocks.push(table(data, groups).map_or_else(|| Block::Text(without_estimate(groups).into()), Block::Table));
     blocks
 }
 
-fn table(groups: &[Group<MissionRow>]) -> Option<TableBlock> {
+fn without_estimate(groups: &[Group<MissionRow>]) -> &'static str {
+    let one_outcome = |g: &Group<MissionRow>| g.rows.iter().all(|m| successful(m) == successful(g.rows[0]));
+    if groups.iter().any(one_outcome) {
+        "The model has no finite estimate here: in a group every mission succeeded, or none did."
+    } else {
+        "The model has no finite estimate here: missions do not tell the scatter between terrains from that of the missions."
+    }
+}
+
+fn table(data: &Data, groups: &[Group<MissionRow>]) -> Option<TableBlock> {
     let null = fit(groups, |_| vec![1.0])?;
     let full = fit(groups, |g| std::iter::once(1.0).chain((1..groups.len()).map(|k| unit(k == g))).collect())?;
     let columns = [
@@ -42,8 +51,9 @@ fn table(groups: &[Group<MissionRow>]) -> Option<TableBlock> {
         ("degrees of freedom", ""),
         ("p", ""),
     ];
-    let query = "tables/missions, plain run: outcome = 'success' by group and terrain";
-    let mut numbers = Numbers::new(query, &columns).with_mixed_units();
+    let counts = "terrain_id, count(*) filter (where outcome = 'success') as successes, count(*) as missions";
+    let query = format!("{} group by all", sql::missions(data, counts, None));
+    let mut numbers = Numbers::computed(query, &columns).with_mixed_units();
     for (g, group) in groups.iter().enumerate().skip(1) {
         let weights: Vec<f64> = (0..groups.len()).map(|k| unit(k == g)).collect();
         let term = format!("{} against {}", group.name, groups[0].name);

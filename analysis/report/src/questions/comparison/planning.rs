@@ -1,10 +1,11 @@
 //! What the next study needs: power of the tests by numbers of terrains and missions, from the scatter of this one.
 
 use super::ALPHA;
-use super::values::{Figure, Values, common_blocks};
+use super::values::{Figure, Values, common_missions};
 use crate::content::{Block, Numbers, TableBlock, count, number, text};
 use crate::data::Data;
 use crate::questions::clusters::{Pairing, stream};
+use crate::questions::sql;
 use crate::render::number as set;
 use sastrugi_numeric::sums;
 use sastrugi_statistics::power::Target;
@@ -26,14 +27,14 @@ pub fn blocks(data: &Data, figures: &[Figure], pairing: &Pairing) -> Vec<Block> 
     }
     let units = if pairing.is_common() { "blocks of paired terrains" } else { "terrains in each of two groups" };
     let [of_blocks, of_both] = match pairing.is_common() {
-        true => [" (of a block's differences from group to group)", " (of two groups together)"],
+        true => [" (of a block's differences from group to group)", " (of a pair's difference)"],
         false => [""; 2],
     };
     let words = format!(
         "How often a study of so many {units} would find a difference of {} points of success, or of a tenth of another \
          figure's mean, at {} % and without adjustment, if terrains and missions scatter as they do here. By simulation of the \
          test above on normal means of terrains, so good to about 3 points. Scatter is a standard deviation: between \
-         terrains{of_blocks}, and between missions on one terrain{of_both}, which count as drawn apart. More missions on the \
+         terrains{of_blocks}, and between missions on one terrain{of_both}. More missions on the \
          same terrains help only as far as missions are what scatters.",
         set::fixed(POINTS, 0),
         set::fixed(100.0 * ALPHA, 0)
@@ -47,11 +48,9 @@ fn table(data: &Data, figures: &[Figure], pairing: &Pairing) -> TableBlock {
     let fixed = [("figure", ""), ("unit", ""), ("difference", ""), ("scatter between", ""), ("scatter within", "")];
     let columns: Vec<(&str, &str)> =
         fixed.into_iter().chain([(units, "")]).chain(heads.iter().map(|h| (h.as_str(), "%"))).collect();
-    let query =
-        "tables/missions, plain run: variance between terrains (of blocks: of their differences) and between missions";
-    let mut numbers = Numbers::new(query, &columns).with_mixed_units();
+    let mut numbers = Numbers::computed(sql::compared(data), &columns).with_mixed_units();
     for figure in figures {
-        let Some(target) = target(figure) else { continue };
+        let Some(target) = target(figure, pairing) else { continue };
         let mut stream = stream(data, "power", figure.column);
         for terrains in TERRAINS {
             let power = MISSIONS.map(|missions| {
@@ -79,46 +78,31 @@ fn table(data: &Data, figures: &[Figure], pairing: &Pairing) -> TableBlock {
 }
 
 /// What is looked for and its scatter: of paired groups from the differences of neighbours, of others within groups.
-fn target(figure: &Figure) -> Option<Target> {
+fn target(figure: &Figure, pairing: &Pairing) -> Option<Target> {
     let all: Vec<f64> = figure.groups.iter().flat_map(Values::numbers).collect();
     let difference = if figure.column == "success" { POINTS } else { SHARE * sums::mean(&all).abs() };
-    let (between, within) = paired_scatter(figure).or_else(|| scatter(figure))?;
+    let (between, within) = paired_scatter(figure, pairing).or_else(|| scatter(figure))?;
     (difference > 0.0).then_some(Target { difference, between, within })
 }
 
 /// Variance between terrains of a group and between missions of a terrain.
 pub fn scatter(figure: &Figure) -> Option<(f64, f64)> {
     let of_group = |g: &Values| components::Group::of(&g.terrains.values().cloned().collect::<Vec<_>>());
-    let split = Components::of(&figure.groups.iter().map(of_group).collect::<Vec<_>>())?;
-    Some((split.member, split.repeat))
+    Components::within_groups(&figure.groups.iter().map(of_group).collect::<Vec<_>>())
 }
 
-/// Variance between blocks of the differences of neighbouring groups, less what the missions add, and that of both groups'
-/// missions; means over the neighbours. `None` where no neighbours share blocks.
-fn paired_scatter(figure: &Figure) -> Option<(f64, f64)> {
+/// Variance between blocks of the differences of neighbouring groups, and between the missions of a block; means over the
+/// neighbours. Missions are paired too where groups share pairs: their difference is then what scatters. `None` where no neighbours
+/// share blocks.
+fn paired_scatter(figure: &Figure, pairing: &Pairing) -> Option<(f64, f64)> {
     let of_neighbours = |pair: &[Values]| {
-        let d: Vec<f64> = common_blocks(&[&pair[0], &pair[1]]).iter().map(|b| b[1] - b[0]).collect();
-        if d.len() < 2 {
-            return None;
-        }
-        let within = [within(&pair[0])?, within(&pair[1])?];
-        let noise: f64 = pair.iter().zip(within).map(|(g, w)| w / missions_per_terrain(g)).sum();
-        let unbiased = sums::variance(&d) * d.len() as f64 / (d.len() as f64 - 1.0);
-        Some((unbiased - noise, within[0] + within[1]))
+        // Without pairs the missions of two groups have no order in common.
+        let blocks = if pairing.is_common() { common_missions(&[&pair[0], &pair[1]]) } else { Vec::new() };
+        let differences: Vec<Vec<f64>> =
+            blocks.iter().map(|b| b[0].iter().zip(&b[1]).map(|(a, b)| b - a).collect()).collect();
+        Components::within_groups(&[components::Group::of(&differences)])
     };
     let known: Vec<(f64, f64)> = figure.groups.windows(2).filter_map(of_neighbours).collect();
     let mean = |part: fn(&(f64, f64)) -> f64| sums::mean(&known.iter().map(part).collect::<Vec<_>>());
     (!known.is_empty()).then(|| (mean(|k| k.0), mean(|k| k.1)))
-}
-
-/// Variance between the missions of a terrain, over all terrains of a group.
-fn within(group: &Values) -> Option<f64> {
-    let squares: f64 = group.terrains.values().map(|t| sums::variance(t) * t.len() as f64).sum();
-    let freedom: usize = group.terrains.values().map(|t| t.len() - 1).sum();
-    (freedom > 0).then(|| squares / freedom as f64)
-}
-
-/// Harmonic mean of the missions on a terrain.
-fn missions_per_terrain(group: &Values) -> f64 {
-    group.terrains.len() as f64 / group.terrains.values().map(|t| 1.0 / t.len() as f64).sum::<f64>()
 }

@@ -2,12 +2,10 @@
 
 use crate::data::Group;
 use crate::questions::clusters::Pairing;
-use crate::questions::missions::{METRICS, Metric};
-use crate::questions::outcome::successful;
 use sastrugi_numeric::sums;
 use sastrugi_schemas::study::Statistic;
 use sastrugi_schemas::tables::MissionRow;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// A figure that is compared.
 pub struct Figure<'a> {
@@ -25,57 +23,63 @@ pub struct Figure<'a> {
 pub struct Values<'a> {
     /// Label of the group.
     pub name: &'a str,
+    /// Label alone.
+    pub label: &'a str,
+    /// Id of the run.
+    pub run: Option<&'a str>,
     /// Values of the missions on each terrain.
     pub terrains: BTreeMap<&'a str, Vec<f64>>,
-    /// Mean of each cluster's missions: of a terrain, or of a block where groups share draws.
+    /// Values in each cluster, with the pair of each: of a terrain, or of a block where groups share draws.
+    clusters: BTreeMap<&'a str, Vec<(&'a str, f64)>>,
+    /// Mean of each cluster's missions.
     pub means: BTreeMap<&'a str, f64>,
 }
 
-impl Values<'_> {
+impl<'a> Values<'a> {
+    /// Pairs with a value in a cluster.
+    fn pairs(&self, cluster: &str) -> BTreeSet<&'a str> {
+        self.clusters.get(cluster).into_iter().flatten().map(|v| v.0).collect()
+    }
+
     /// Means alone, in the order of the clusters.
     pub fn numbers(&self) -> Vec<f64> {
         self.means.values().copied().collect()
     }
 }
 
-/// Figures that hypotheses may be about, beside those that every report compares.
-const EFFICIENCY: Metric =
-    Metric { column: "efficiency", name: "straight distance over path length", unit: "", of: |m| m.efficiency };
-const MAX_PITCH: Metric =
-    Metric { column: "max_pitch_deg", name: "largest pitch", unit: "°", of: |m| m.max_pitch_deg };
-const MAX_ROLL: Metric = Metric { column: "max_roll_deg", name: "largest roll", unit: "°", of: |m| m.max_roll_deg };
+/// What every report compares.
+const FIGURES: [Statistic; 5] = [
+    Statistic::Success,
+    Statistic::RmsVerticalAccelerationMS2,
+    Statistic::RmsPitchRateDegS,
+    Statistic::RmsRollRateDegS,
+    Statistic::TimeS,
+];
 
 /// Success, then every figure of the successful missions.
 pub fn figures<'a>(groups: &'a [Group<'a, MissionRow>], pairing: &Pairing<'a>) -> Vec<Figure<'a>> {
-    let metrics = METRICS.iter().map(|metric| of_successful(metric, groups, pairing));
-    std::iter::once(success(groups, pairing)).chain(metrics).collect()
+    FIGURES.into_iter().map(|statistic| figure(statistic, groups, pairing)).collect()
 }
 
-/// The figure that a hypothesis is about.
+/// One figure of all groups.
 pub fn figure<'a>(statistic: Statistic, groups: &'a [Group<'a, MissionRow>], pairing: &Pairing<'a>) -> Figure<'a> {
-    let [acceleration, pitch_rate, roll_rate, time] = &METRICS;
-    let metric = match statistic {
-        Statistic::Success => return success(groups, pairing),
-        Statistic::Efficiency => &EFFICIENCY,
-        Statistic::TimeS => time,
-        Statistic::RmsVerticalAccelerationMS2 => acceleration,
-        Statistic::RmsPitchRateDegS => pitch_rate,
-        Statistic::RmsRollRateDegS => roll_rate,
-        Statistic::MaxPitchDeg => &MAX_PITCH,
-        Statistic::MaxRollDeg => &MAX_ROLL,
-    };
-    of_successful(metric, groups, pairing)
+    let (name, unit) = words(statistic);
+    let groups = groups.iter().map(|g| values(g, pairing, |m| statistic.of(m))).collect();
+    Figure { name, unit, column: statistic.column(), groups }
 }
 
-fn success<'a>(groups: &'a [Group<'a, MissionRow>], pairing: &Pairing<'a>) -> Figure<'a> {
-    let groups = groups.iter().map(|g| values(g, pairing, |m| if successful(m) { 100.0 } else { 0.0 })).collect();
-    Figure { name: "success on a terrain", unit: "%", column: "success", groups }
-}
-
-fn of_successful<'a>(metric: &Metric, groups: &'a [Group<'a, MissionRow>], pairing: &Pairing<'a>) -> Figure<'a> {
-    let value = |m: &MissionRow| if successful(m) { (metric.of)(m) } else { f64::NAN };
-    let groups = groups.iter().map(|g| values(g, pairing, value)).collect();
-    Figure { name: metric.name, unit: metric.unit, column: metric.column, groups }
+/// Name of a figure, and its unit as it is set in text.
+pub const fn words(statistic: Statistic) -> (&'static str, &'static str) {
+    match statistic {
+        Statistic::Success => ("success on a terrain", "%"),
+        Statistic::Efficiency => ("straight distance over path length", ""),
+        Statistic::TimeS => ("time to the goal", "s"),
+        Statistic::RmsVerticalAccelerationMS2 => ("RMS vertical acceleration", "m/s²"),
+        Statistic::RmsPitchRateDegS => ("RMS pitch rate", "°/s"),
+        Statistic::RmsRollRateDegS => ("RMS roll rate", "°/s"),
+        Statistic::MaxPitchDeg => ("largest pitch", "°"),
+        Statistic::MaxRollDeg => ("largest roll", "°"),
+    }
 }
 
 fn values<'a>(
@@ -83,25 +87,47 @@ fn values<'a>(
     pairing: &Pairing<'a>,
     value: impl Fn(&MissionRow) -> f64,
 ) -> Values<'a> {
-    let (mut terrains, mut clusters) = (BTreeMap::<&str, Vec<f64>>::new(), BTreeMap::<&str, Vec<f64>>::new());
+    let (mut terrains, mut clusters) = (BTreeMap::<&str, Vec<f64>>::new(), BTreeMap::<&str, Vec<(&str, f64)>>::new());
     for mission in &group.rows {
         let value = value(mission);
         if value.is_finite() {
             let terrain = mission.terrain_id.as_str();
             terrains.entry(terrain).or_default().push(value);
-            clusters.entry(pairing.cluster(terrain)).or_default().push(value);
+            clusters.entry(pairing.cluster(terrain)).or_default().push((&mission.pair_id, value));
         }
     }
-    let means = clusters.into_iter().map(|(name, values)| (name, sums::mean(&values))).collect();
-    Values { name: &group.name, terrains, means }
+    let mean = |values: &[(&str, f64)]| sums::mean(&values.iter().map(|v| v.1).collect::<Vec<_>>());
+    let means = clusters.iter().map(|(name, values)| (*name, mean(values))).collect();
+    let (name, label, run) = (&group.name, &group.label, group.run.as_deref());
+    Values { name, label, run, terrains, clusters, means }
 }
 
-/// The blocks that all these groups have, each with its number in every group.
-pub fn common_blocks(groups: &[&Values]) -> Vec<Vec<f64>> {
+/// Missions of pairs in the clusters that all these groups have: for each such cluster its missions in every group. Where groups
+/// share pairs these are the pairs that have a value in all of them: means over the survivors of each group alone would compare other
+/// missions.
+pub fn common_missions(groups: &[&Values]) -> Vec<Vec<Vec<f64>>> {
     let Some((first, others)) = groups.split_first() else { return Vec::new() };
-    let block = |(name, value): (&&str, &f64)| {
-        let rest = others.iter().map(|g| g.means.get(*name).copied());
-        std::iter::once(Some(*value)).chain(rest).collect::<Option<Vec<f64>>>()
+    let names = first.clusters.keys().copied().filter(|name| others.iter().all(|g| g.clusters.contains_key(name)));
+    let names: Vec<&str> = names.collect();
+    let shared = |name: &str| {
+        others.iter().fold(first.pairs(name), |common, g| common.intersection(&g.pairs(name)).copied().collect())
     };
-    first.means.iter().filter_map(block).collect()
+    let by_pair: Vec<BTreeSet<&str>> = names.iter().map(|name| shared(name)).collect();
+    let paired = by_pair.iter().any(|pairs| !pairs.is_empty());
+    let of = |(name, pairs): (&&str, &BTreeSet<&str>)| {
+        let missions = |g: &&Values| {
+            let all = g.clusters.get(*name).into_iter().flatten();
+            let mut counted: Vec<(&str, f64)> = all.copied().filter(|v| !paired || pairs.contains(v.0)).collect();
+            counted.sort_by(|a, b| a.0.cmp(b.0));
+            counted.into_iter().map(|v| v.1).collect::<Vec<_>>()
+        };
+        let missions: Vec<Vec<f64>> = groups.iter().map(missions).collect();
+        missions.iter().all(|m| !m.is_empty()).then_some(missions)
+    };
+    names.iter().zip(&by_pair).filter_map(of).collect()
+}
+
+/// The blocks that all these groups have, each with the mean of its missions in every group.
+pub fn common_blocks(groups: &[&Values]) -> Vec<Vec<f64>> {
+    common_missions(groups).iter().map(|block| block.iter().map(|missions| sums::mean(missions)).collect()).collect()
 }

@@ -1,15 +1,16 @@
 //! Tests and sizes of the differences: every pair of groups, and the trend over ordered groups.
 
+use super::ALPHA;
 use super::values::{Figure, Values, common_blocks};
-use super::{ALPHA, draws};
-use crate::content::{Figure as Drawing, Numbers, TableBlock, count, number, text};
+use crate::content::{Figure as Drawing, Numbers, TableBlock, number, text};
 use crate::data::Data;
-use crate::questions::clusters::{REPLICATES, stream};
+use crate::questions::clusters::stream;
+use crate::questions::sql;
 use crate::render::axis::Axis;
 use crate::render::chart::{Entry, Mark, RowLabel, Rows};
 use crate::render::number as set;
 use crate::render::svg::{Paint, Stroke, Symbol};
-use sastrugi_statistics::{Effect, Interval, MeanDifference, Permutation, cluster_interval, holm, permutation, trend};
+use sastrugi_statistics::{Arrangements, Difference, Interval, Permutation, holm, permutation, trend};
 
 /// Groups of which every pair is compared; of more, each with the next.
 const ALL_PAIRS_MAX: usize = 6;
@@ -33,50 +34,30 @@ pub struct Verdict {
 
 /// What is measured beside a test.
 pub enum Measure {
-    /// A pair: the effect, and the difference of means.
-    Pair { effect: Option<Effect>, difference: Option<MeanDifference> },
+    /// A pair: all of it.
+    Pair(Difference),
     /// A trend: correlation of order and value.
-    Trend { correlation: f64, interval: Option<Interval> },
+    Trend(Option<Interval>),
 }
 
-/// Test of two samples of terrains, with sizes of their difference.
-pub struct Pair {
-    pub test: Option<Permutation>,
-    pub effect: Option<Effect>,
-    pub difference: Option<MeanDifference>,
-}
-
-impl Pair {
-    /// Of samples that were drawn apart. Streams are named by what is compared and the figure.
-    pub fn between(data: &Data, (item, column): (&str, &str), [from, to]: [&[f64]; 2], alpha: f64) -> Self {
-        let [mut labels, mut redraws] = ["test", "effect"].map(|of| stream(data, item, &format!("{of} {column}")));
-        Self {
-            test: permutation::rank_sum(from, to, draws(from.len() + to.len()), &mut labels),
-            effect: Effect::between(from, to, REPLICATES, 1.0 - alpha, &mut redraws),
-            difference: MeanDifference::between(from, to),
-        }
-    }
-
-    /// Of pairs, from their differences.
-    pub fn of_differences(data: &Data, (item, column): (&str, &str), differences: &[f64], alpha: f64) -> Self {
-        let [mut labels, mut redraws] = ["test", "effect"].map(|of| stream(data, item, &format!("{of} {column}")));
-        Self {
-            test: permutation::signed_rank(differences, draws(2 * differences.len()), &mut labels),
-            effect: Effect::of_pairs(differences, REPLICATES, 1.0 - alpha, &mut redraws),
-            difference: MeanDifference::of_pairs(differences),
-        }
-    }
+/// How a test is made: its level, which intervals go with, and how many are adjusted together.
+#[derive(Clone, Copy, Debug)]
+pub struct Level {
+    pub alpha: f64,
+    pub tests: usize,
 }
 
 /// All tests of the figures, adjusted as one family.
 pub fn verdicts(data: &Data, figures: &[Figure]) -> Vec<Verdict> {
+    let known = |figure: &'_ Figure| figure.groups.iter().filter(|g| !g.means.is_empty()).count();
+    let level = Level { alpha: ALPHA, tests: figures.iter().map(|f| pairs(known(f)).len() + 1).sum() };
     let mut verdicts = Vec::new();
     for figure in figures {
         let groups: Vec<&Values> = figure.groups.iter().filter(|g| !g.means.is_empty()).collect();
         verdicts
-            .extend(pairs(groups.len()).into_iter().map(|(a, b)| pair(data, figure, [groups[a], groups[b]], ALPHA)));
+            .extend(pairs(groups.len()).into_iter().map(|(a, b)| pair(data, figure, [groups[a], groups[b]], level)));
         if groups.len() > 2 && ordered(&groups) {
-            verdicts.push(over_groups(data, figure, &groups, ALPHA));
+            verdicts.push(over_groups(data, figure, &groups, level));
         }
     }
     let p: Vec<f64> = verdicts.iter().map(|v| v.test.map_or(f64::NAN, |t| t.p)).collect();
@@ -89,54 +70,46 @@ fn pairs(groups: usize) -> Vec<(usize, usize)> {
     (0..groups).flat_map(|a| (a + 1..groups.min(a + 1 + reach)).map(move |b| (a, b))).collect()
 }
 
-/// True where labels end in numbers: their order is then one of size, not of names.
+/// True where labels of one run end in numbers: their order is then one of size, not of names.
 fn ordered(groups: &[&Values]) -> bool {
-    let number = |g: &&Values| g.name.trim_start_matches(|c: char| !c.is_ascii_digit()).parse::<f64>().is_ok();
-    groups.iter().all(number)
+    let number = |g: &&Values| g.label.trim_start_matches(|c: char| !c.is_ascii_digit()).parse::<f64>().is_ok();
+    groups.iter().all(|g| number(g) && g.run == groups[0].run)
 }
 
 /// The test of a pair of groups at a level, and intervals of the coverage that goes with it.
-pub fn pair(data: &Data, figure: &Figure, [from, to]: [&Values; 2], alpha: f64) -> Verdict {
+pub fn pair(data: &Data, figure: &Figure, [from, to]: [&Values; 2], level: Level) -> Verdict {
     let groups = format!("{} to {}", from.name, to.name);
+    let mut stream = stream(data, &groups, &format!("test {}", figure.column));
+    let (coverage, draws) = (1.0 - level.alpha, permutation::draws(level.tests, level.alpha));
     let blocks = common_blocks(&[from, to]);
-    let (of, pair) = if blocks.is_empty() {
+    let (of, difference) = if blocks.is_empty() {
         let (a, b) = (from.numbers(), to.numbers());
-        (format!("{} + {} terrains", a.len(), b.len()), Pair::between(data, (&groups, figure.column), [&a, &b], alpha))
+        let of = format!("{} + {} terrains", a.len(), b.len());
+        (of, Difference::apart(&a, &b, coverage, draws, &mut stream))
     } else {
-        let d = permutation::differences(blocks.iter().map(|b| [b[0], b[1]]));
-        (set::counted(d.len(), "block"), Pair::of_differences(data, (&groups, figure.column), &d, alpha))
+        let pairs = blocks.iter().map(|b| [b[0], b[1]]);
+        (set::counted(blocks.len(), "block"), Difference::of_pairs(pairs, coverage, draws, &mut stream))
     };
-    let Pair { test, effect, difference } = pair;
-    let size = Measure::Pair { effect, difference };
+    let (test, size) = (difference.test, Measure::Pair(difference));
     Verdict { figure: figure.name, unit: figure.unit, groups, of, test, adjusted: f64::NAN, size }
 }
 
 /// The test of a trend at a level, and an interval of the coverage that goes with it.
-pub fn over_groups(data: &Data, figure: &Figure, groups: &[&Values], alpha: f64) -> Verdict {
-    let mut labels = stream(data, "trend", &format!("test {}", figure.column));
-    let mut redraws = stream(data, "trend", &format!("effect {}", figure.column));
+pub fn over_groups(data: &Data, figure: &Figure, groups: &[&Values], level: Level) -> Verdict {
+    let mut stream = stream(data, "trend", &format!("test {}", figure.column));
+    let (coverage, draws) = (1.0 - level.alpha, permutation::draws(level.tests, level.alpha));
     let blocks = common_blocks(groups);
-    let (of, test, correlation, interval) = if blocks.is_empty() {
+    let (of, test, correlation) = if blocks.is_empty() {
         let values: Vec<Vec<f64>> = groups.iter().map(|g| g.numbers()).collect();
-        let sizes: Vec<usize> = values.iter().map(Vec::len).collect();
-        let drawn = |drawn: &[Vec<usize>]| {
-            let taken = |(g, v): (&Vec<f64>, &Vec<usize>)| v.iter().map(|&k| g[k]).collect();
-            trend::correlation_of_groups(&values.iter().zip(drawn).map(taken).collect::<Vec<_>>())
-        };
-        let interval = cluster_interval(&sizes, REPLICATES, 1.0 - alpha, &mut redraws, drawn);
-        let counts = sizes.iter().map(usize::to_string).collect::<Vec<_>>().join(" + ");
-        let test = trend::of_groups(&values, draws(sizes.iter().sum()), &mut labels);
-        (format!("{counts} terrains"), test, trend::correlation_of_groups(&values), interval)
+        let counts = values.iter().map(|v| v.len().to_string()).collect::<Vec<_>>().join(" + ");
+        let test = trend::of_groups(&values, draws, &mut stream);
+        (format!("{counts} terrains"), test, trend::correlation_of_groups(&values, coverage))
     } else {
-        let drawn = |drawn: &[Vec<usize>]| {
-            trend::correlation_of_blocks(&drawn[0].iter().map(|&k| blocks[k].clone()).collect::<Vec<_>>())
-        };
-        let interval = cluster_interval(&[blocks.len()], REPLICATES, 1.0 - alpha, &mut redraws, drawn);
-        let test = trend::of_blocks(&blocks, draws(groups.len() * blocks.len()), &mut labels);
-        (set::counted(blocks.len(), "block"), test, trend::correlation_of_blocks(&blocks), interval)
+        let test = trend::of_blocks(&blocks, draws, &mut stream);
+        (set::counted(blocks.len(), "block"), test, trend::correlation_of_blocks(&blocks, coverage))
     };
     let groups = groups.iter().map(|g| g.name).collect::<Vec<_>>().join(", ");
-    let size = Measure::Trend { correlation, interval };
+    let size = Measure::Trend(correlation);
     Verdict { figure: figure.name, unit: figure.unit, groups, of, test, adjusted: f64::NAN, size }
 }
 
@@ -163,7 +136,7 @@ pub fn in_words(verdicts: &[Verdict]) -> String {
 }
 
 /// Every pair of groups: test, shift, delta, margin.
-pub fn table_of_pairs(verdicts: &[Verdict]) -> TableBlock {
+pub fn table_of_pairs(data: &Data, verdicts: &[Verdict]) -> TableBlock {
     let columns = [
         ("figure", ""),
         ("unit", ""),
@@ -179,11 +152,10 @@ pub fn table_of_pairs(verdicts: &[Verdict]) -> TableBlock {
         ("p, Holm", ""),
         ("equivalent within", ""),
     ];
-    let query = "tables/missions, plain run: mean by terrain (or block); success over all missions, others over successful ones";
-    let mut numbers = Numbers::new(query, &columns).with_mixed_units();
+    let mut numbers = Numbers::computed(sql::compared(data), &columns).with_mixed_units();
     for v in verdicts {
-        let Measure::Pair { effect, difference } = &v.size else { continue };
-        let margin = difference.map_or(f64::NAN, |d| d.smallest_margin(ALPHA));
+        let Measure::Pair(Difference { effect, means, .. }) = &v.size else { continue };
+        let margin = means.map_or(f64::NAN, |d| d.smallest_margin(ALPHA));
         let ends = |i: Option<Interval>| i.map_or([f64::NAN; 3], |i| [i.estimate, i.low, i.high]).map(number);
         let head = [text(v.figure), text(v.unit), text(&v.groups), text(&v.of)];
         let tail = [number(v.test.map_or(f64::NAN, |t| t.p)), number(v.adjusted), number(margin)];
@@ -194,7 +166,7 @@ pub fn table_of_pairs(verdicts: &[Verdict]) -> TableBlock {
 }
 
 /// The trend of every figure.
-pub fn table_of_trends(verdicts: &[Verdict]) -> TableBlock {
+pub fn table_of_trends(data: &Data, verdicts: &[Verdict]) -> TableBlock {
     let columns = [
         ("figure", ""),
         ("groups", ""),
@@ -206,29 +178,37 @@ pub fn table_of_trends(verdicts: &[Verdict]) -> TableBlock {
         ("p, Holm", ""),
         ("arrangements", ""),
     ];
-    let query = "tables/missions, plain run: mean by terrain (or block) of every group";
-    let mut numbers = Numbers::new(query, &columns).with_mixed_units();
+    let mut numbers = Numbers::computed(sql::compared(data), &columns).with_mixed_units();
     for v in verdicts {
-        let Measure::Trend { correlation, interval } = &v.size else { continue };
+        let Measure::Trend(correlation) = &v.size else { continue };
+        let ends = correlation.map_or([f64::NAN; 3], |i| [i.estimate, i.low, i.high]);
         numbers.row([
             text(v.figure),
             text(&v.groups),
             text(&v.of),
-            number(*correlation),
-            number(interval.map_or(f64::NAN, |i| i.low)),
-            number(interval.map_or(f64::NAN, |i| i.high)),
+            number(ends[0]),
+            number(ends[1]),
+            number(ends[2]),
             number(v.test.map_or(f64::NAN, |t| t.p)),
             number(v.adjusted),
-            v.test.map_or(sastrugi_schemas::Cell::Null, |t| count(t.arrangements)),
+            v.test.map_or(sastrugi_schemas::Cell::Null, |t| text(arrangements(t))),
         ]);
     }
     TableBlock { id: "comparison-trend".into(), caption: "Trend over the groups (exploratory)".into(), numbers }
 }
 
+fn arrangements(test: Permutation) -> String {
+    match test.arrangements {
+        Arrangements::All(n) => format!("all {}", set::count(n)),
+        Arrangements::Drawn(n) => format!("{} drawn", set::count(n)),
+        Arrangements::Normal => "normal".into(),
+    }
+}
+
 /// Cliff's delta of every figure and pair with its interval; `None` where no pair has one.
-pub fn drawing(figures: &[Figure], verdicts: &[Verdict]) -> Option<Drawing> {
+pub fn drawing(data: &Data, figures: &[Figure], verdicts: &[Verdict]) -> Option<Drawing> {
     let known = |v: &Verdict| match &v.size {
-        Measure::Pair { effect: Some(effect), .. } => Some((v.figure, v.groups.clone(), effect.delta)),
+        Measure::Pair(Difference { effect: Some(effect), .. }) => Some((v.figure, v.groups.clone(), effect.delta)),
         _ => None,
     };
     let deltas: Vec<(&str, String, Interval)> = verdicts.iter().filter_map(known).collect();
@@ -261,8 +241,8 @@ pub fn drawing(figures: &[Figure], verdicts: &[Verdict]) -> Option<Drawing> {
             rows.svg.symbol(mark(k).0, (x, y), 3.6, mark(k).1);
         }
     }
-    let mut numbers = Numbers::new(
-        "tables/missions, plain run: mean by terrain (or block), by pair of groups",
+    let mut numbers = Numbers::computed(
+        sql::compared(data),
         &[("figure", ""), ("groups", ""), ("delta", "1"), ("low", "1"), ("high", "1")],
     );
     for (figure, pair, delta) in &deltas {

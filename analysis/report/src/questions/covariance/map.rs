@@ -22,7 +22,7 @@ pub fn figure(data: &Data, fit: &FitRow) -> Result<Option<Figure>, ReportError> 
     let key = Key::Ramp { colours: &colours, range: (-variance_m2, variance_m2), title: "covariance, m²", absent };
     let columns =
         [("file", ""), ("rows", "1"), ("cols", "1"), ("cell_x_m", "m"), ("cell_y_m", "m"), ("variance_m2", "m2")];
-    let mut numbers = Numbers::new(path.clone(), &columns);
+    let mut numbers = Numbers::of_file(path.clone(), &columns);
     let int = |n: usize| Cell::I64(n as i64);
     let [cell_x, cell_y] = grid.geometry.cell;
     let row = [int(grid.rows()), int(grid.cols()), number(cell_x), number(cell_y), number(variance_m2)];

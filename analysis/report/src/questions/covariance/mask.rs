@@ -33,7 +33,7 @@ pub fn figure(data: &Data, fit: &FitRow) -> Result<Option<Figure>, ReportError> 
     let colours: Vec<(u8, Rgb)> = present.iter().map(|(code, colour, _)| (*code, *colour)).collect();
     let picture = picture::codes(&codes, &colours, 400)?;
     let map = Map::new(&picture, MAP_WIDTH, &Key::Entries(&legend));
-    let mut numbers = Numbers::new(path.clone(), &[("code", ""), ("cells", ""), ("meaning", "")]);
+    let mut numbers = Numbers::of_file(path.clone(), &[("code", ""), ("cells", ""), ("meaning", "")]);
     present
         .iter()
         .for_each(|(code, _, words)| numbers.row([count(usize::from(*code)), count(cells(*code)), text(*words)]));

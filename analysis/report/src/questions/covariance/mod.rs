@@ -9,6 +9,7 @@ mod verdict;
 use super::Question;
 use super::curves::HEIGHT;
 use super::relief::{Style, Words, deviations, exaggeration, exaggeration_words, limit_m, relief};
+use super::sql::quoted;
 use crate::ReportError;
 use crate::content::{Block, Figure, Numbers, TableBlock, number, slug, text};
 use crate::data::Data;
@@ -18,6 +19,11 @@ use crate::render::number as set;
 use crate::render::svg::{Paint, Stroke, Symbol};
 use sastrugi_schemas::tables::{CovarianceRow, FitRow};
 use std::collections::BTreeSet;
+
+/// The fits of a DEM.
+fn of_dem(dem: &str) -> String {
+    format!("select * from 'tables/fits/*.parquet' where dem_id = {}", quoted(dem))
+}
 
 /// Registry entry.
 pub const QUESTION: Question =
@@ -182,8 +188,8 @@ fn figure(id: String, fit: &FitRow, bins: &[&CovarianceRow], plot: Plot, banded:
         "model_m2",
         "surface_model_m2",
     ];
-    let query = format!("tables/covariance where fit_id = '{}' and azimuth_deg is null", fit.fit_id);
-    let numbers = Numbers::select(query, bins.iter().copied(), &names);
+    let query = format!("fit_id = {} and azimuth_deg is null", quoted(&fit.fit_id));
+    let numbers = Numbers::select(&query, bins.iter().copied(), &names);
     let title = format!("{}, {} mode.", fit.fit_id, fit.mode);
     Figure { id, title, caption, description, svg: plot.svg, numbers }
 }
@@ -212,7 +218,7 @@ fn parameters(dem: &str, fits: &[&FitRow]) -> TableBlock {
     let headings: Vec<String> = fits.iter().map(|f| format!("{} ({})", f.fit_id, f.mode)).collect();
     let columns: Vec<(&str, &str)> =
         [("parameter", ""), ("unit", "")].into_iter().chain(headings.iter().map(|h| (h.as_str(), ""))).collect();
-    let mut numbers = Numbers::new(format!("tables/fits where dem_id = '{dem}'"), &columns);
+    let mut numbers = Numbers::computed(of_dem(dem), &columns);
     for (name, unit, figure) in PARAMETERS {
         let values = fits.iter().map(|f| number(figure(f)));
         numbers.row([text(name), text(set::unit(unit))].into_iter().chain(values));
@@ -280,7 +286,7 @@ fn all(data: &Data) -> TableBlock {
         "used_share",
         "misfit_m2",
     ];
-    let numbers = Numbers::select("tables/fits", &data.fits, &names);
+    let numbers = Numbers::select("", &data.fits, &names);
     TableBlock { id: "fits".into(), caption: "All fits".into(), numbers }
 }
 

@@ -1,9 +1,11 @@
 //! The models that a fit tried, how its likelihood falls away, and the covariance by direction.
 
 use super::super::curves::HEIGHT;
+use super::of_dem;
 use super::verdict;
 use crate::content::{Figure, Numbers, TableBlock, slug, text};
 use crate::data::Data;
+use crate::questions::sql::quoted;
 use crate::render::axis::Axis;
 use crate::render::chart::{Entry, Mark, Plot, WIDTH};
 use crate::render::number as set;
@@ -64,7 +66,7 @@ fn candidates(data: &Data, fit: &FitRow) -> Option<Figure> {
     }
     plot.svg.close();
     let names = ["rank", "bin", "lag_m", "model_m2"];
-    let query = format!("tables/candidate_curves where fit_id = '{}'", fit.fit_id);
+    let query = format!("fit_id = {} and isfinite(model_m2)", quoted(&fit.fit_id));
     let rows = drawn.iter().flat_map(|(_, curve)| curve.iter().copied());
     Some(Figure {
         id,
@@ -72,7 +74,7 @@ fn candidates(data: &Data, fit: &FitRow) -> Option<Figure> {
         caption: "Each candidate after the same detrending and trimming as the data, the best by AICc first.".into(),
         description: format!("Covariance against lag with {} candidate models.", drawn.len()),
         svg: plot.svg,
-        numbers: Numbers::select(query, rows, &names),
+        numbers: Numbers::select(&query, rows, &names),
     })
 }
 
@@ -116,7 +118,7 @@ fn profile(data: &Data, fit: &FitRow) -> Option<Figure> {
         false => String::new(),
     };
     let cut = if highest > top { format!(" The axis ends at {}.", set::significant(top, 2)) } else { String::new() };
-    let query = format!("tables/likelihood_profile where fit_id = '{}'", fit.fit_id);
+    let query = format!("fit_id = {} and range_m > 0 and isfinite(chi2_rise)", quoted(&fit.fit_id));
     Some(Figure {
         id,
         title: format!("How sharply {} knows b.", fit.fit_id),
@@ -126,7 +128,7 @@ fn profile(data: &Data, fit: &FitRow) -> Option<Figure> {
         ),
         description: format!("Profile likelihood over ranges from {}.", span(ends)),
         svg: plot.svg,
-        numbers: Numbers::select(query, points, &["point", "range_m", "chi2_rise"]),
+        numbers: Numbers::select(&query, points, &["point", "range_m", "chi2_rise"]),
     })
 }
 
@@ -167,7 +169,7 @@ fn directions(data: &Data, fit: &FitRow) -> Option<Figure> {
     plot.svg.close();
     let verdict = verdict::direction(fit).unwrap_or_default();
     let names = ["azimuth_deg", "lag_m", "covariance_m2", "pairs", "model_m2"];
-    let query = format!("tables/covariance where fit_id = '{}' and azimuth_deg is not null", fit.fit_id);
+    let query = format!("fit_id = {} and azimuth_deg is not null", quoted(&fit.fit_id));
     let rows: Vec<&CovarianceRow> = all().copied().collect();
     Some(Figure {
         id,
@@ -175,7 +177,7 @@ fn directions(data: &Data, fit: &FitRow) -> Option<Figure> {
         caption: format!("Sectors about azimuths clockwise from north, opposite directions together. {verdict}"),
         description: format!("Covariance against lag in {} directions. {verdict}", sectors.len()),
         svg: plot.svg,
-        numbers: Numbers::select(query, rows, &names),
+        numbers: Numbers::select(&query, rows, &names),
     })
 }
 
@@ -199,7 +201,10 @@ pub fn table(data: &Data, dem: &str, fits: &[&FitRow]) -> TableBlock {
         vec![("fit", ""), ("rank", ""), ("model", ""), ("AICc above best", "1"), ("χ²", "1"), ("free", "")];
     let units: Vec<(String, &str)> = names.iter().map(|n| (n.clone(), unit_of(n))).collect();
     columns.extend(units.iter().map(|(n, u)| (n.as_str(), *u)));
-    let mut numbers = Numbers::new(format!("tables/candidates of the fits of '{dem}'"), &columns);
+    let mut numbers = Numbers::computed(
+        format!("select * from 'tables/candidates/*.parquet' where fit_id in (select fit_id from ({}))", of_dem(dem)),
+        &columns,
+    );
     for c in &rows {
         let own = parameters(&c.parameters);
         let optional = |v: Option<f64>| v.map_or(Cell::Null, crate::content::number);

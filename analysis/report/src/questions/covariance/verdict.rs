@@ -1,5 +1,6 @@
 //! What of a fit can be believed: its parameters with their intervals, and what the data says against it, in sentences.
 
+use super::of_dem;
 use crate::content::{Numbers, TableBlock, number, slug, text};
 use crate::render::number as set;
 use sastrugi_schemas::tables::FitRow;
@@ -208,7 +209,7 @@ pub fn intervals(dem: &str, fits: &[&FitRow]) -> TableBlock {
         ("high, blocks", "m"),
         ("uncorrected", "m"),
     ];
-    let mut numbers = Numbers::new(format!("tables/fits where dem_id = '{dem}'"), &columns);
+    let mut numbers = Numbers::computed(of_dem(dem), &columns);
     let with_intervals: Vec<&&FitRow> = fits.iter().filter(|f| f.replicates > 0 || f.block_replicates > 0).collect();
     for fit in &with_intervals {
         let naive = [fit.naive_sigma_m, fit.naive_range_m, fit.naive_sigma_m * fit.naive_sigma_m / fit.naive_range_m];

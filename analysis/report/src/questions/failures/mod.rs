@@ -14,7 +14,7 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
         return Ok(Vec::new());
     }
     let mut numbers =
-        Numbers::new("manifest.json, failed", &[("stage", ""), ("item", ""), ("error", ""), ("parameters", "")]);
+        Numbers::of_file("manifest.json, failed", &[("stage", ""), ("item", ""), ("error", ""), ("parameters", "")]);
     for item in &data.failed {
         numbers.row([text(&item.stage), text(&item.item), text(&item.error), text(item.parameters.to_string())]);
     }

@@ -1,10 +1,11 @@
 //! Whether missions are like logs of real drives: where each log's figures fall among those of the missions.
 
 use super::Question;
-use super::clusters::{Clusters, LEVEL, REPLICATES, stream};
-use super::outcome::successful;
+use super::clusters::LEVEL;
+use super::comparison::ALPHA;
+use super::outcome::{self, successful};
 use crate::ReportError;
-use crate::content::{Block, Figure, Numbers, TableBlock, count, number, text};
+use crate::content::{Block, Figure, Gives, Numbers, TableBlock, count, number, text};
 use crate::data::{Data, Group};
 use crate::render::axis::Axis;
 use crate::render::chart::{Entry, Mark, RowLabel, Rows};
@@ -12,13 +13,17 @@ use crate::render::number as set;
 use crate::render::svg::{Paint, Stroke, Symbol};
 use sastrugi_numeric::sums;
 use sastrugi_schemas::tables::{LogRow, MissionRow};
-use sastrugi_statistics::Interval;
+use sastrugi_statistics::{Interval, Place};
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Registry entry.
 pub const QUESTION: Question = Question { id: "logs", name: "Logs", title: "Do the missions match the logs?", answer };
 
 /// What counts as the middle of the missions, %.
 const MIDDLE: [f64; 2] = [2.5, 97.5];
+const BELOW: &str = "below the missions";
+const ABOVE: &str = "above the missions";
+const TOO_FEW: &str = "cannot tell: at the edge, and too few terrains";
 /// Logs that are drawn; all are in the table.
 const DRAWN_MAX: usize = 6;
 /// Groups that a chart tells apart.
@@ -109,8 +114,9 @@ struct Placed<'a> {
     missions: usize,
     /// 5th, 50th and 95th percentile of the missions.
     spread: [f64; 3],
-    /// Share of the missions below the log, %.
-    place: Option<Interval>,
+    place: Option<Place>,
+    /// Why the log is no drive to its goal.
+    unfinished: Option<String>,
 }
 
 fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
@@ -122,44 +128,70 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     if groups.is_empty() {
         return Ok(vec![Block::Warning("The release has no missions to put beside the logs.".into())]);
     }
-    let placed = placed(data, logs, &groups);
+    let logs = &named(logs);
+    let placed = placed(logs, &groups);
     let mut blocks = vec![Block::Text(in_words(&placed)), Block::Text(introduction())];
     blocks.extend(rates(data, logs).map(Block::Warning));
+    blocks.extend(too_few(&placed).map(Block::Warning));
     blocks.push(Block::Figures(drawings(&placed)));
     blocks.push(Block::Table(table(&placed)));
     blocks.push(Block::FoldedTable(all(logs)));
     Ok(blocks)
 }
 
+/// Every log once, named by as many parts of its path from the end as tell it from the others: a page says nothing of the machine
+/// that it was made on.
+fn named(logs: &[LogRow]) -> Vec<LogRow> {
+    // Unknown figures are NaN, which is equal to nothing: rows are told apart by their words.
+    let mut seen = BTreeSet::new();
+    let all: Vec<LogRow> = logs.iter().filter(|log| seen.insert(format!("{log:?}"))).cloned().collect();
+    let tail = |id: &str, parts: usize| {
+        let all: Vec<&str> = id.split(['/', '\\']).filter(|part| !part.is_empty()).collect();
+        all[all.len().saturating_sub(parts)..].join("/")
+    };
+    let ids: Vec<String> = all.iter().map(|log| log.log_id.clone()).collect();
+    let unique = |id: &String| {
+        let others = || ids.iter().filter(|other| *other != id);
+        let parts = (1..64).find(|&n| others().all(|other| tail(other, n) != tail(id, n)));
+        tail(id, parts.unwrap_or(64))
+    };
+    // The same log analysed twice, in two ways.
+    let again = |k: usize| match ids[..k].iter().filter(|id| **id == ids[k]).count() {
+        0 => String::new(),
+        n => format!(" ({})", n + 1),
+    };
+    let names: Vec<String> = (0..ids.len()).map(|k| format!("{}{}", unique(&ids[k]), again(k))).collect();
+    all.into_iter().zip(names).map(|(log, log_id)| LogRow { log_id, ..log }).collect()
+}
+
 /// Every figure of every log beside the group that the log names, or beside every group.
-fn placed<'a>(data: &Data, logs: &'a [LogRow], groups: &'a [Group<'a, MissionRow>]) -> Vec<Placed<'a>> {
+fn placed<'a>(logs: &'a [LogRow], groups: &'a [Group<'a, MissionRow>]) -> Vec<Placed<'a>> {
     let mut placed = Vec::new();
     for (log, row) in logs.iter().enumerate() {
-        let own = groups.iter().find(|g| row.group.as_deref() == Some(g.name.as_str()));
+        let own = |g: &&Group<MissionRow>| row.group.as_deref().is_none_or(|label| label == g.label || label == g.name);
+        let beside: Vec<&Group<MissionRow>> = match groups.iter().any(|g| own(&g)) {
+            true => groups.iter().filter(own).collect(),
+            false => groups.iter().collect(),
+        };
         for shared in &SHARED {
-            let beside = own.map_or(groups, std::slice::from_ref);
-            placed.extend(beside.iter().map(|group| place(data, (log, row), group, shared)));
+            placed.extend(beside.iter().map(|group| place((log, row), group, shared)));
         }
     }
     placed
 }
 
-fn place<'a>(
-    data: &Data,
-    (log, row): (usize, &'a LogRow),
-    group: &'a Group<'a, MissionRow>,
-    shared: &'static Shared,
-) -> Placed<'a> {
-    let of = |m: &&MissionRow| (m.terrain_id.clone(), (shared.of_mission)(m));
-    let known: Vec<(String, f64)> =
-        group.rows.iter().copied().filter(|m| successful(m)).map(|m| of(&m)).filter(|v| v.1.is_finite()).collect();
-    let borrowed: Vec<(&str, f64)> = known.iter().map(|(t, v)| (t.as_str(), *v)).collect();
-    let mut sorted: Vec<f64> = borrowed.iter().map(|v| v.1).collect();
+fn place<'a>((log, row): (usize, &'a LogRow), group: &'a Group<'a, MissionRow>, shared: &'static Shared) -> Placed<'a> {
+    let mut terrains: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
+    for mission in group.rows.iter().filter(|m| successful(m)) {
+        let value = (shared.of_mission)(mission);
+        if value.is_finite() {
+            terrains.entry(&mission.terrain_id).or_default().push(value);
+        }
+    }
+    let terrains: Vec<Vec<f64>> = terrains.into_values().collect();
+    let mut sorted = terrains.concat();
     sorted.sort_by(f64::total_cmp);
     let (value, floor, tells) = (shared.of_log)(row);
-    let share = |drawn: &[Vec<f64>]| 100.0 * share_below(&drawn[0], value);
-    let item = format!("{} beside {}", row.log_id, group.name);
-    let interval = || Clusters::new(&[borrowed]).interval(&mut stream(data, &item, shared.column), LEVEL, share);
     Placed {
         log,
         log_id: &row.log_id,
@@ -171,54 +203,55 @@ fn place<'a>(
         tells,
         missions: sorted.len(),
         spread: [0.05, 0.5, 0.95].map(|q| sums::quantile_sorted(&sorted, q)),
-        place: if value.is_finite() { interval() } else { None },
+        place: Place::of(value, &terrains, LEVEL),
+        unfinished: unfinished(row),
     }
 }
 
-/// Share of the values below one, equal ones counted half; NaN for no values.
-fn share_below(values: &[f64], value: f64) -> f64 {
-    let sum: f64 = values
-        .iter()
-        .map(|v| {
-            if *v < value {
-                1.0
-            } else if *v == value {
-                0.5
-            } else {
-                0.0
-            }
-        })
-        .sum();
-    sum / values.len() as f64
+/// Figures of a drive that broke off or failed are not those of drives to the goal, which the missions are.
+fn unfinished(log: &LogRow) -> Option<String> {
+    let failed = log.outcome.as_deref().filter(|outcome| *outcome != outcome::ALL[0].word);
+    let words =
+        |outcome: &str| outcome::ALL.iter().find(|o| o.word == outcome).map_or(outcome.to_owned(), |o| o.name.into());
+    match (&log.broken, failed) {
+        (Some(_), _) => Some("not judged: the log broke off".into()),
+        (None, Some(outcome)) => Some(format!("not judged: it ended as {}", words(outcome))),
+        (None, None) => None,
+    }
 }
 
 impl Placed<'_> {
-    fn verdict(&self) -> &'static str {
-        let Some(place) = self.place else { return "no value" };
-        let inside = |v: f64| (MIDDLE[0]..=MIDDLE[1]).contains(&v);
-        match (inside(place.low), inside(place.high)) {
-            _ if !self.tells => "cannot tell: below three noise floors",
-            (true, true) => "like the missions",
-            (false, false) if place.high < MIDDLE[0] => "below them",
-            (false, false) if place.low > MIDDLE[1] => "above them",
-            _ => "cannot tell: at their edge",
+    fn verdict(&self) -> &str {
+        let Some(place) = &self.place else { return "no value" };
+        let inside = (MIDDLE[0]..=MIDDLE[1]).contains(&(100.0 * place.share_below.estimate));
+        match &self.unfinished {
+            Some(why) => why,
+            None if !self.tells => "cannot tell: below three noise floors",
+            None if place.p() <= ALPHA && place.p_above < place.p_below => ABOVE,
+            None if place.p() <= ALPHA => BELOW,
+            None if inside => "within the middle 95 %",
+            None => TOO_FEW,
         }
     }
 }
 
 fn in_words(placed: &[Placed]) -> String {
-    let words = ["like the missions", "below them", "above them", "cannot tell", "no value"];
+    let words = ["within the middle 95 %", BELOW, ABOVE, "cannot tell", "not judged", "no value"];
     let part = |word: &&str| {
         let n = placed.iter().filter(|p| p.verdict().starts_with(word)).count();
-        (n > 0).then(|| format!("{word}: {}", set::count(n)))
+        (n > 0).then(|| format!("{} {word}", set::count(n)))
     };
     let logs = placed.iter().map(|p| p.log).max().map_or(0, |last| last + 1);
     let parts: Vec<String> = words.iter().filter_map(part).collect();
+    let judged = placed.iter().filter(|p| p.verdict().ends_with("the missions") || p.verdict().starts_with("within"));
     format!(
-        "{} of {}, each beside a group of missions: {}.",
+        "{} of {}, each beside a group of missions: {}. Of figures of drives like the missions about {} in {} would be below or above them by \
+         chance.",
         set::counted(placed.len(), "figure"),
         set::counted(logs, "log"),
-        parts.join("; ")
+        parts.join(", "),
+        set::plain(ALPHA * judged.clone().count() as f64, 2),
+        set::count(judged.count()),
     )
 }
 
@@ -226,13 +259,26 @@ fn introduction() -> String {
     format!(
         "Columns of the same name mean the same in the tables missions and logs (sastrugi analyze). Beside each figure of a log stand the missions that \
          reached their goal: their 5th, 50th and 95th percentile, and the place of the log among them, which is the share of missions below it \
-         (equal ones count half) with a {} % interval that draws whole terrains anew ({REPLICATES} redraws, fewer beyond 10 000 missions; percentiles). A log \
-         is like the missions where the interval lies within {} to {} %. One log is one drive: it may be an odd one. Below three \
-         noise floors the log itself cannot tell. A log that names a group stands beside that group only. Exploratory.",
+         (every terrain weighs the same, equal ones count half), with a {} % interval over terrains (Clopper and Pearson's). p says how often one \
+         more drive, on one more terrain of the kind, would lie so far out (a rank among terrains, Lee, Barber and Willett; two-sided, not \
+         adjusted). A log is below or above the missions where p is at most {}, and elsewhere within their middle 95 % where its place is; p is never under 2 / (terrains + 1), so that it takes {} terrains to say \
+         so. One log is one drive: it may be an odd one. Below three noise floors the log itself cannot tell, and a log that broke off or \
+         failed is not judged. A log that names a group stands beside that group only. Exploratory.",
         set::fixed(100.0 * LEVEL, 0),
-        set::fixed(MIDDLE[0], 1),
-        set::fixed(MIDDLE[1], 1),
+        set::plain(ALPHA, 2),
+        set::fixed((2.0 / ALPHA - 1.0).ceil(), 0),
     )
+}
+
+/// Groups with fewer terrains than any p could show.
+fn too_few(placed: &[Placed]) -> Option<String> {
+    let few = |p: &&Placed| p.place.is_some_and(|place| place.least_p() > ALPHA);
+    let groups: BTreeMap<&str, usize> =
+        placed.iter().filter(few).map(|p| (p.group, p.place.map_or(0, |place| place.terrains))).collect();
+    let list: Vec<String> =
+        groups.iter().map(|(group, n)| format!("{group} ({})", set::counted(*n, "terrain"))).collect();
+    (!list.is_empty())
+        .then(|| format!("Too few terrains to say of a drive that it is unlike the missions: {}.", list.join(", ")))
 }
 
 /// Root mean squares of derivatives grow with the rate of the samples.
@@ -284,8 +330,8 @@ fn drawing(placed: &[&Placed]) -> Figure {
         let row = figures.iter().position(|f| f.column == p.shared.column).unwrap_or(0);
         let k = groups.iter().position(|g| g.0 == p.group_index).unwrap_or(0);
         let y = rows.centre(row) + step * (k as f64 - 0.5 * (groups.len() - 1) as f64);
-        let Some(place) = p.place else { continue };
-        let paint = if p.tells { Paint::Series(p.group_index) } else { Paint::Muted };
+        let Some(place) = p.place.map(|place| in_percent(place.share_below)) else { continue };
+        let paint = if p.tells && p.unfinished.is_none() { Paint::Series(p.group_index) } else { Paint::Muted };
         if let (Some(from), Some(to)) = (rows.x.clamped(place.low), rows.x.clamped(place.high)) {
             rows.svg.segment((from, y), (to, y), Stroke::new(paint, 1.8));
         }
@@ -295,7 +341,7 @@ fn drawing(placed: &[&Placed]) -> Figure {
     }
     let log_id = placed[0].log_id;
     let words = |p: &&&Placed| {
-        let at = p.place.map_or(f64::NAN, |i| i.estimate);
+        let at = p.place.map_or(f64::NAN, |place| 100.0 * place.share_below.estimate);
         format!("{}, {}: {} %", p.shared.name, p.group, set::fixed(at, 0))
     };
     let parts: Vec<String> = placed.iter().take(8).map(|p| words(&p)).collect();
@@ -303,12 +349,17 @@ fn drawing(placed: &[&Placed]) -> Figure {
         id: format!("log-{log_id}"),
         title: format!("Where {log_id} falls among the missions."),
         caption: "Marks are the share of missions below the log, lines 95 % intervals over terrains; between the two upright lines lie \
-                  the middle 95 % of the missions. Grey: the log cannot tell."
+                  the middle 95 % of the missions. Grey: the log cannot tell, or is not judged."
             .into(),
         description: format!("Share of missions below the figures of the log. {}.", parts.join("; ")),
         svg: rows.svg,
         numbers: numbers(placed.iter().copied()),
     }
+}
+
+fn in_percent(share: Interval) -> Interval {
+    let Interval { estimate, low, high, level } = share;
+    Interval { estimate: 100.0 * estimate, low: 100.0 * low, high: 100.0 * high, level }
 }
 
 fn numbers<'a>(placed: impl Iterator<Item = &'a Placed<'a>>) -> Numbers {
@@ -326,15 +377,21 @@ fn numbers<'a>(placed: impl Iterator<Item = &'a Placed<'a>>) -> Numbers {
         ("missions below, %", ""),
         ("low, %", ""),
         ("high, %", ""),
+        ("p", ""),
         ("missions", ""),
+        ("terrains", ""),
     ];
-    let query = "logs of `analyze` beside tables/missions, plain run, outcome = 'success'";
-    let mut numbers = Numbers::new(query, &columns).with_mixed_units();
+    let query = "LOGS.parquet of --logs, beside tables/missions";
+    let mut numbers = Numbers::of_file(query, &columns).with_mixed_units();
     for p in placed {
         let head = [text(p.log_id), text(p.shared.name), text(p.group), text(p.verdict()), text(p.shared.unit)];
-        let place = p.place.map_or([f64::NAN; 3], |i| [i.estimate, i.low, i.high]);
+        let place = p.place.map_or([f64::NAN; 4], |place| {
+            let share = in_percent(place.share_below);
+            [share.estimate, share.low, share.high, place.p()]
+        });
         let values = [p.value, p.floor].into_iter().chain(p.spread).chain(place).map(number);
-        numbers.row(head.into_iter().chain(values).chain([count(p.missions)]));
+        let terrains = p.place.map_or(0, |place| place.terrains);
+        numbers.row(head.into_iter().chain(values).chain([count(p.missions), count(terrains)]));
     }
     numbers
 }
@@ -361,7 +418,8 @@ fn all(logs: &[LogRow]) -> TableBlock {
         "band_vertical_acceleration_floor_m_s2",
         "broken",
     ];
-    let numbers = Numbers::select("tables of `sastrugi analyze`", logs, &names);
+    let table = Numbers::select("", logs, &names);
+    let numbers = Numbers { query: "LOGS.parquet of --logs".into(), gives: Gives::File, ..table };
     TableBlock { id: "logs".into(), caption: "The logs".into(), numbers }
 }
 
@@ -369,11 +427,12 @@ fn all(logs: &[LogRow]) -> TableBlock {
 mod tests {
     use super::*;
 
-    /// By hand.
     #[test]
-    fn val_share_below() {
-        assert_eq!(share_below(&[1.0, 2.0, 2.0, 3.0], 2.0), 0.5);
-        assert_eq!(share_below(&[1.0, 2.0], 9.0), 1.0);
-        assert!(share_below(&[], 1.0).is_nan());
+    fn val_logs_are_named_by_what_tells_them_apart() {
+        let log =
+            |log_id: &str, samples: i64| LogRow { log_id: log_id.into(), samples, ..crate::tests::made_up::log() };
+        let logs = [("/data/a/run.mcap", 1), ("/data/b/run.mcap", 1), ("c.mcap", 1), ("c.mcap", 2), ("c.mcap", 1)];
+        let names: Vec<String> = named(&logs.map(|(id, n)| log(id, n))).into_iter().map(|l| l.log_id).collect();
+        assert_eq!(names, ["a/run.mcap", "b/run.mcap", "c.mcap", "c.mcap (2)"]);
     }
 }

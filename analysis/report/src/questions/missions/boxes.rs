@@ -1,11 +1,12 @@
 //! Box plots by group, with sampling bands of the medians and the paper's figures where there are any.
 
-use super::{METRICS, Metric, from_missions};
+use super::{METRICS, Metric};
 use crate::content::{Figure, Numbers, TableBlock, count, number, slug, text};
 use crate::data::{Data, Group};
 use crate::papers;
 use crate::questions::clusters::band;
 use crate::questions::outcome;
+use crate::questions::sql;
 use crate::render::axis::Axis;
 use crate::render::chart::{Beside, Entry, Mark, RowLabel, Rows};
 use crate::render::number as set;
@@ -53,8 +54,8 @@ pub fn compared<'a>(data: &Data, groups: &[Group<'a, MissionRow>]) -> Vec<Compar
         figure: "success",
         n_is: "terrains",
         query: format!(
-            "select \"group\", terrain_id, 100 * avg(if(outcome = 'success', 1, 0)) {} group by all",
-            from_missions(data, None)
+            "{} group by all",
+            sql::missions(data, "terrain_id, 100 * avg(if(outcome = 'success', 1, 0))", None)
         ),
         samples: samples(data, groups, "success", success_shares),
     };
@@ -63,14 +64,14 @@ pub fn compared<'a>(data: &Data, groups: &[Group<'a, MissionRow>]) -> Vec<Compar
         unit: m.unit,
         figure: m.column,
         n_is: "successful missions",
-        query: format!("select \"group\", terrain_id, {} {}", m.column, from_missions(data, Some("success"))),
+        query: sql::missions(data, &format!("terrain_id, {}", m.column), Some("success")),
         samples: samples(data, groups, m.column, |g| successful(g, m)),
     };
     std::iter::once(success).chain(METRICS.iter().map(metric)).collect()
 }
 
 /// Medians, quartiles and sampling bands of every figure and group.
-pub fn medians(compared: &[Compared]) -> TableBlock {
+pub fn medians(data: &Data, compared: &[Compared]) -> TableBlock {
     let columns = [
         ("figure", ""),
         ("unit", ""),
@@ -84,8 +85,7 @@ pub fn medians(compared: &[Compared]) -> TableBlock {
         ("band, 95 %", ""),
         ("outliers", ""),
     ];
-    let query = "tables/missions where outcome = 'success', by group";
-    let mut numbers = Numbers::new(query, &columns).with_mixed_units();
+    let mut numbers = Numbers::computed(sql::compared(data), &columns).with_mixed_units();
     for figure in compared {
         for s in &figure.samples {
             let end = |f: fn(&Interval) -> f64| s.band.as_ref().map_or(f64::NAN, f);

@@ -4,6 +4,7 @@ use crate::content::{Block, Figure, Numbers, count, number, slug, text};
 use crate::data::{Data, Group};
 use crate::questions::clusters::{LEVEL, REPLICATES, numbered, stream};
 use crate::questions::outcome;
+use crate::questions::sql;
 use crate::render::axis::Axis;
 use crate::render::chart::{Entry, Mark, Plot, WIDTH};
 use crate::render::number as set;
@@ -44,7 +45,7 @@ pub fn blocks(data: &Data, groups: &[Group<MissionRow>]) -> Vec<Block> {
          Bands are {} % at each distance, from {REPLICATES} redraws of whole terrains.",
         set::fixed(100.0 * LEVEL, 0)
     );
-    let figures = all.iter().map(|c| figure(c, length, top)).collect();
+    let figures = all.iter().map(|c| figure(data, c, length, top)).collect();
     vec![Block::Heading("How far they came".into()), Block::Text(words), Block::Figures(figures)]
 }
 
@@ -93,7 +94,7 @@ fn tops(curves: &Curves) -> Vec<f64> {
     ends.chain(curve).collect()
 }
 
-fn figure(curves: &Curves, length: f64, top: f64) -> Figure {
+fn figure(data: &Data, curves: &Curves, length: f64, top: f64) -> Figure {
     let id = slug(&format!("incidence-{}", curves.group.name));
     let occurs = |k: &usize| curves.incidence.shares[*k].last().is_some_and(|s| *s > 0.0);
     let causes: Vec<usize> = (0..CAUSES.len()).filter(occurs).collect();
@@ -112,7 +113,7 @@ fn figure(curves: &Curves, length: f64, top: f64) -> Figure {
         caption: format!("Missions that failed, by distance; {} in all.", set::count(rows)),
         description: describe(curves, &causes, length),
         svg: plot.svg,
-        numbers: numbers(curves, length),
+        numbers: numbers(data, curves, length),
     }
 }
 
@@ -155,7 +156,7 @@ fn describe(curves: &Curves, causes: &[usize], length: f64) -> String {
     format!("Cumulative incidence of failures over the distance, group {}: {parts}.", curves.group.name)
 }
 
-fn numbers(curves: &Curves, length: f64) -> Numbers {
+fn numbers(data: &Data, curves: &Curves, length: f64) -> Numbers {
     let columns = [
         ("group", ""),
         ("failure", ""),
@@ -165,7 +166,7 @@ fn numbers(curves: &Curves, length: f64) -> Numbers {
         ("high", "1"),
         ("missions", "1"),
     ];
-    let mut numbers = Numbers::new("tables/missions: outcome over progress_m", &columns);
+    let mut numbers = Numbers::computed(sql::compared(data), &columns);
     for (k, bands) in curves.bands.iter().enumerate() {
         for (at, band) in distances(length).zip(bands) {
             numbers.row([

@@ -5,6 +5,7 @@ use crate::content::{Figure, Numbers, slug};
 use crate::data::{Data, Group};
 use crate::questions::outcome;
 use crate::questions::relief::{MAP_WIDTH, exaggeration, extent};
+use crate::questions::sql;
 use crate::render::chart::{Entry, Mark};
 use crate::render::map::{Key, Map};
 use crate::render::svg::{Paint, Stroke, Symbol};
@@ -84,7 +85,8 @@ fn figure(data: &Data, drawn: &Drawn) -> Result<Option<Figure>, ReportError> {
     let occurred = outcome::ALL.iter().zip(counts).filter(|(_, n)| *n > 0);
     let outcomes: Vec<String> = occurred.map(|(o, n)| format!("{} {n}", o.name)).collect();
     let columns = ["mission_id", "outcome", "start_x_m", "start_y_m", "goal_x_m", "goal_y_m", "time_s", "path"];
-    let query = format!("tables/missions where terrain_id = '{}'", terrain.terrain_id);
+    let plain = if missions.iter().all(|m| m.variant.is_none()) { " and variant is null" } else { "" };
+    let query = format!("terrain_id = {}{plain}", sql::quoted(&terrain.terrain_id));
     Ok(Some(Figure {
         id,
         title: format!("Missions, group {group}."),
@@ -96,7 +98,7 @@ fn figure(data: &Data, drawn: &Drawn) -> Result<Option<Figure>, ReportError> {
         ),
         description: format!("Map of missions, {}; missions by outcome: {}.", extent(&codes), outcomes.join(", ")),
         svg: map.svg,
-        numbers: Numbers::select(query, missions.iter().copied(), &columns),
+        numbers: Numbers::select(&query, missions.iter().copied(), &columns),
     }))
 }
 

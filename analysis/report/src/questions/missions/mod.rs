@@ -57,7 +57,7 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     let mut blocks = vec![
         Block::Text(introduction(data, &groups, &pairing)),
         Block::Figures(figures),
-        Block::Table(boxes::medians(&compared)),
+        Block::Table(boxes::medians(data, &compared)),
     ];
     blocks.extend(incidence::blocks(data, &groups));
     blocks.extend(survivors::blocks(data, &groups));
@@ -67,14 +67,6 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     blocks.extend(parameters(data).map(Block::FoldedTable));
     blocks.push(Block::FoldedTable(all(data)));
     Ok(blocks)
-}
-
-/// The end of a query of duckdb, in the folder of the release: missions of the plain run, of one outcome or of all.
-fn from_missions(data: &Data, outcome: Option<&str>) -> String {
-    let plain = data.missions.iter().any(|m| m.variant.is_none()).then(|| "variant is null".to_owned());
-    let rules: Vec<String> = plain.into_iter().chain(outcome.map(|word| format!("outcome = '{word}'"))).collect();
-    let rules = if rules.is_empty() { String::new() } else { format!(" where {}", rules.join(" and ")) };
-    format!("from 'tables/missions/*.parquet'{rules}")
 }
 
 const MAPS: &str = "One terrain of each group: the one whose share of successful missions is in the middle (the lower middle of \
@@ -114,7 +106,9 @@ fn parameters(data: &Data) -> Option<TableBlock> {
     let plain: BTreeSet<&str> =
         data.missions.iter().filter(|m| m.variant.is_none()).map(|m| m.traverse_id.as_str()).collect();
     let columns = [("run", ""), ("parameter", ""), ("value", ""), ("source", "")];
-    let mut numbers = Numbers::new("tables/parameters of the plain runs", &columns);
+    let query = "select traverse_id, parameter, value, coalesce(source, 'setting of the study') from 'tables/parameters/*.parquet' where \
+                 traverse_id in (select traverse_id from 'tables/missions/*.parquet' where variant is null)";
+    let mut numbers = Numbers::new(query, &columns);
     for row in data.parameters.iter().filter(|row| plain.contains(row.traverse_id.as_str())) {
         let source = row.source.as_deref().unwrap_or("setting of the study");
         numbers.row([text(&row.traverse_id), text(&row.parameter), text(&row.value), text(source)]);
@@ -142,6 +136,6 @@ fn all(data: &Data) -> TableBlock {
         "max_roll_deg",
         "path",
     ];
-    let numbers = Numbers::select("tables/missions", &data.missions, &names);
+    let numbers = Numbers::select("", &data.missions, &names);
     TableBlock { id: "missions".into(), caption: "All missions".into(), numbers }
 }

@@ -1,9 +1,9 @@
 //! Outcomes by group: stacked bars with their counts.
 
-use super::from_missions;
 use crate::content::{Figure, Numbers, count, text};
 use crate::data::{Data, Group};
 use crate::questions::outcome::{self, ALL};
+use crate::questions::sql;
 use crate::render::axis::Axis;
 use crate::render::chart::{Entry, Mark, RowLabel, Rows};
 use crate::render::number as set;
@@ -58,7 +58,7 @@ fn describe(groups: &[Group<MissionRow>], counts: &[[usize; ALL.len()]]) -> Stri
 fn numbers(data: &Data, groups: &[Group<MissionRow>], counts: &[[usize; ALL.len()]], kinds: &[usize]) -> Numbers {
     let names = kinds.iter().map(|&i| (ALL[i].name, "1"));
     let columns: Vec<(&str, &str)> = [("group", ""), ("missions", "1")].into_iter().chain(names).collect();
-    let query = format!("select \"group\", outcome, count(*) {} group by all", from_missions(data, None));
+    let query = format!("{} group by all", sql::missions(data, "outcome, count(*)", None));
     let mut numbers = Numbers::new(query, &columns);
     for (group, counts) in groups.iter().zip(counts) {
         let cells = kinds.iter().map(|&i| count(counts[i]));

@@ -2,9 +2,10 @@
 
 use super::maps::{Drawn, of_mission};
 use crate::ReportError;
-use crate::content::{Figure, Heading, Numbers, number, slug};
+use crate::content::{Figure, Gives, Heading, Numbers, number, slug};
 use crate::data::{Data, Group};
 use crate::questions::outcome::{self, ALL};
+use crate::questions::sql::quoted;
 use crate::render::axis::Axis;
 use crate::render::chart::{Entry, Mark, Plot, WIDTH, axis_room};
 use crate::render::svg::{Anchor, Paint, Stroke, Svg};
@@ -171,9 +172,9 @@ fn finish(id: String, mission: &MissionRow, samples: &[SampleRow], heaves: &[f64
         set::with_unit(largest, 3, "m/s²"),
     );
     let query =
-        format!("tables/samples where terrain_id = '{}' and mission_id = '{}'", mission.terrain_id, mission.mission_id);
+        format!("terrain_id = {} and mission_id = {}", quoted(&mission.terrain_id), quoted(&mission.mission_id));
     let columns = ["sample", "time_s", "pitch_deg", "roll_deg", "z_m", "class"];
-    let mut numbers = Numbers::select(query, samples, &columns);
+    let mut numbers = Numbers { gives: Gives::Input, ..Numbers::select(&query, samples, &columns) };
     numbers.columns.push(Heading { name: "vertical_acceleration_m_s2".into(), unit: "m/s2".into() });
     numbers.rows.iter_mut().zip(heaves).for_each(|(row, a)| row.push(number(*a)));
     Figure { id, title: format!("A mission with outcome: {outcome}."), caption, description, svg, numbers }

@@ -5,6 +5,7 @@ use crate::content::{Block, Numbers, TableBlock, count, number, text};
 use crate::data::{Data, Group};
 use crate::questions::clusters::{Clusters, LEVEL, block, paired, stream};
 use crate::questions::outcome::successful;
+use crate::questions::sql;
 use crate::render::number as set;
 use sastrugi_numeric::sums;
 use sastrugi_schemas::tables::MissionRow;
@@ -59,8 +60,7 @@ fn table(data: &Data, groups: &[Group<MissionRow>], pairs: &[(&str, Vec<&Mission
         ("low", ""),
         ("high", ""),
     ];
-    let query = "tables/missions where outcome = 'success'; pair_id with success in every group";
-    let mut numbers = Numbers::new(query, &columns).with_mixed_units();
+    let mut numbers = Numbers::computed(sql::compared(data), &columns).with_mixed_units();
     for metric in &METRICS {
         for (g, group) in groups.iter().enumerate() {
             let all: Vec<f64> = group.rows.iter().filter(|m| successful(m)).map(|m| (metric.of)(m)).collect();

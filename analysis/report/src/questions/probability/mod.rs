@@ -14,6 +14,9 @@ use sastrugi_schemas::tables::MissionRow;
 use sastrugi_statistics::{Components, Interval, bootstrap, components};
 use std::collections::{BTreeMap, BTreeSet};
 
+/// What everything here is computed from.
+const REPLICATES_QUERY: &str = "select * from 'tables/replicates/*.parquet'";
+
 /// Registry entry.
 pub const QUESTION: Question =
     Question { id: "probability", name: "Probability", title: "How certain are the outcomes?", answer };
@@ -158,7 +161,7 @@ fn histogram(group: &Split) -> Figure {
             plot.svg.rect(*from, (to.0 - from.0, to.1 - from.1), Paint::Series(0), 1.0);
         }
     }
-    let mut numbers = Numbers::new("tables/replicates, share of outcome = 'success' by mission", &HISTOGRAM);
+    let mut numbers = Numbers::computed(REPLICATES_QUERY, &HISTOGRAM);
     for (i, n) in counts.iter().enumerate() {
         numbers.row([text(&group.name), number(i as f64 / boxes as f64), count(*n)]);
     }
@@ -239,7 +242,7 @@ fn components_of<'a>(groups: impl IntoIterator<Item = &'a Split<'a>>) -> Numbers
         ("high", "%"),
         ("note", ""),
     ];
-    let mut numbers = Numbers::new("tables/replicates, outcome = 'success' by terrain and mission", &columns);
+    let mut numbers = Numbers::computed(REPLICATES_QUERY, &columns);
     for group in groups {
         let starts: usize = group.missions.iter().map(|m| m.outcomes.len()).sum();
         let goals: f64 = group.missions.iter().flat_map(|m| &m.outcomes).sum();

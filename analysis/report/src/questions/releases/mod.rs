@@ -1,140 +1,73 @@
-//! Whether a release differs from another one, group by group: by tests whose unit is the terrain.
+//! Whether a release differs from another one, figure by figure.
 
 use super::Question;
-use super::clusters::{LEVEL, Pairing, REPLICATES};
+use super::clusters::LEVEL;
 use super::comparison::ALPHA;
-use super::comparison::values::{self, Figure, Values};
-use super::comparison::verdicts::Pair;
+use super::comparison::values::words;
+use super::sql;
 use crate::ReportError;
 use crate::content::{Block, Numbers, TableBlock, number, text};
-use crate::data::{Against, Data, Group};
+use crate::data::{Against, Data};
+use crate::releases::{self, Figures, MARGIN, Quantity, Settings};
 use crate::render::number as set;
-use sastrugi_numeric::sums;
-use sastrugi_schemas::tables::MissionRow;
-use sastrugi_statistics::{holm, permutation};
-use std::collections::{BTreeMap, BTreeSet};
+use sastrugi_numeric::Streams;
+use sastrugi_schemas::study::Statistic;
 
 /// Registry entry.
 pub const QUESTION: Question =
     Question { id: "releases", name: "Other release", title: "Does this release differ from the other?", answer };
 
-/// Margin of equivalence of success, percentage points.
-const MARGIN_POINTS: f64 = 5.0;
-/// Margin of equivalence of other figures, as a share of the other release's mean.
-const MARGIN_SHARE: f64 = 0.05;
-
-/// A figure of a group in both releases.
-struct Compared {
-    group: String,
-    figure: &'static str,
-    unit: &'static str,
-    of: String,
-    /// Means over terrains: of the other release, of this one.
-    means: [f64; 2],
-    margin: f64,
-    pair: Pair,
-    /// True where every terrain has the same value in both.
-    equal: bool,
-    adjusted: f64,
-}
-
 fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     let Some(other) = &data.against else { return Ok(Vec::new()) };
-    let (here, there) = (data.mission_groups(), other.data.mission_groups());
-    let names = |groups: &[Group<MissionRow>]| groups.iter().map(|g| g.name.clone()).collect::<BTreeSet<_>>();
-    let common: BTreeSet<String> = names(&here).intersection(&names(&there)).cloned().collect();
-    let only: Vec<String> = names(&here).symmetric_difference(&names(&there)).cloned().collect();
+    let streams = Streams::for_item(data.study.seed, "report", "other release");
+    let settings = Settings { margin: MARGIN, alpha: ALPHA };
+    let (quantities, alone) = releases::compare(&figures(&other.data), &figures(data), settings, &streams);
     let mut blocks = vec![Block::Text(introduction(other))];
+    let only: Vec<String> = alone.concat();
     if !only.is_empty() {
-        blocks.push(Block::Warning(format!("Groups in one release alone are not compared: {}.", only.join(", "))));
+        blocks.push(Block::Warning(format!("Groups in one release alone are not compared: {}.", only.join("; "))));
     }
-    if common.is_empty() {
-        blocks.push(Block::Warning("The releases have no group of missions in common.".into()));
+    if quantities.is_empty() {
+        blocks.push(Block::Warning("The releases have no group in common.".into()));
         return Ok(blocks);
     }
-    let mut compared = Vec::new();
-    for name in &common {
-        let member = |groups: &[Group<'_, MissionRow>]| groups.iter().position(|g| g.name == *name);
-        let (Some(a), Some(b)) = (member(&there), member(&here)) else { continue };
-        compared.extend(of_group(data, other, &there[a..=a], &here[b..=b]));
-    }
-    let p: Vec<f64> = compared.iter().map(|c| c.pair.test.map_or(f64::NAN, |t| t.p)).collect();
-    compared.iter_mut().zip(holm(&p)).for_each(|(c, p)| c.adjusted = p);
-    blocks.splice(0..0, [Block::Text(in_words(&compared, &other.name))]);
-    blocks.push(Block::Table(table(&compared)));
+    blocks.splice(0..0, [Block::Text(in_words(&quantities, &other.name))]);
+    blocks.push(Block::Table(table(&quantities)));
     Ok(blocks)
 }
 
-/// Every figure of a group. Terrains are paired where both releases have the same ones.
-fn of_group(data: &Data, other: &Against, there: &[Group<MissionRow>], here: &[Group<MissionRow>]) -> Vec<Compared> {
-    let alone = Pairing::of_terrains();
-    let same = heights(&other.data, there).is_some_and(|theirs| heights(data, here).is_some_and(|ours| ours == theirs));
-    let (theirs, ours) = (values::figures(there, &alone), values::figures(here, &alone));
-    theirs.iter().zip(&ours).filter_map(|(a, b)| compare(data, a, b, same)).collect()
-}
-
-fn compare(data: &Data, there: &Figure, here: &Figure, same_terrains: bool) -> Option<Compared> {
-    let [from, to]: [&Values; 2] = [there.groups.first()?, here.groups.first()?];
-    let (a, b) = (from.numbers(), to.numbers());
-    if a.is_empty() || b.is_empty() {
-        return None;
+fn figures(data: &Data) -> Figures {
+    let mut figures = Figures::default();
+    for row in &data.terrains {
+        figures.add_terrain(row, data.contents.get(&row.path).map(String::as_str));
     }
-    let means = [sums::mean(&a), sums::mean(&b)];
-    let margin = if here.column == "success" { MARGIN_POINTS } else { MARGIN_SHARE * means[0].abs() };
-    let item = format!("{} against other release", to.name);
-    let pairs = || from.means.iter().filter_map(|(name, v)| Some([*v, *to.means.get(name)?]));
-    let (of, pair, equal) = if same_terrains {
-        let d = permutation::differences(pairs());
-        let equal = d.iter().all(|d| *d == 0.0) && a.len() == b.len();
-        (
-            format!("{}, paired", set::counted(d.len(), "terrain")),
-            Pair::of_differences(data, (&item, here.column), &d, ALPHA),
-            equal,
-        )
-    } else {
-        let pair = Pair::between(data, (&item, here.column), [&a, &b], ALPHA);
-        (format!("{} + {} terrains", a.len(), b.len()), pair, false)
-    };
-    let (group, figure, unit) = (to.name.to_owned(), here.name, here.unit);
-    Some(Compared { group, figure, unit, of, means, margin, pair, equal, adjusted: f64::NAN })
+    data.missions.iter().for_each(|row| figures.add_mission(row));
+    figures
 }
 
-/// Content of the heights that a group drives on, by terrain; `None` where the release does not state it.
-fn heights<'a>(data: &'a Data, groups: &'a [Group<MissionRow>]) -> Option<BTreeMap<&'a str, &'a str>> {
-    let ids: BTreeSet<&str> = groups.iter().flat_map(|g| &g.rows).map(|m| m.terrain_id.as_str()).collect();
-    ids.into_iter().map(|id| Some((id, data.contents.get(&data.terrain(id)?.path)?.as_str()))).collect()
-}
+/// All verdicts, from same to different.
+const VERDICTS: [&str; 5] =
+    ["the same values", "equivalent within the margin", "differs, by less than the margin", "differs", "cannot tell"];
 
-impl Compared {
-    fn equivalence_p(&self) -> f64 {
-        self.pair.difference.map_or(f64::NAN, |d| d.equivalence_p(self.margin))
-    }
-
-    fn verdict(&self) -> &'static str {
-        match (self.adjusted <= ALPHA, self.equivalence_p() <= ALPHA) {
-            _ if self.equal => "the same values",
-            (true, true) => "differs, by less than the margin",
-            (true, false) => "differs",
-            (false, true) => "equivalent within the margin",
-            (false, false) => "cannot tell",
-        }
+fn verdict(q: &Quantity) -> &'static str {
+    let below = |p: Option<f64>| p.is_some_and(|p| p <= ALPHA);
+    let [same, equivalent, within, differs, open] = VERDICTS;
+    match (below(q.p_adjusted), below(q.p_equivalence)) {
+        _ if q.equal => same,
+        (true, true) => within,
+        (true, false) => differs,
+        (false, true) => equivalent,
+        (false, false) => open,
     }
 }
 
-fn in_words(compared: &[Compared], other: &str) -> String {
-    let words = [
-        "the same values",
-        "equivalent within the margin",
-        "differs, by less than the margin",
-        "differs",
-        "cannot tell",
-    ];
+fn in_words(quantities: &[Quantity], other: &str) -> String {
     let part = |word: &&str| {
-        let n = compared.iter().filter(|c| c.verdict() == *word).count();
-        (n > 0).then(|| format!("{word}: {}", set::count(n)))
+        let n = quantities.iter().filter(|q| verdict(q) == *word).count();
+        (n > 0).then(|| format!("{} {word}", set::count(n)))
     };
-    let parts: Vec<String> = words.iter().filter_map(part).collect();
-    format!("{} of groups beside those of {other}: {}.", set::counted(compared.len(), "figure"), parts.join("; "))
+    let parts: Vec<String> = VERDICTS.iter().filter_map(part).collect();
+    format!("{} of groups beside those of {other}: {}.", set::counted(quantities.len(), "figure"), parts.join(", "))
 }
 
 fn introduction(other: &Against) -> String {
@@ -142,23 +75,30 @@ fn introduction(other: &Against) -> String {
     format!(
         "The other release is {} (study {}, {}, hash of the study {}). Differences are this release less the other. Every terrain counts \
          once, by the mean of its missions (success: of all; other figures: of the successful ones). Terrains are paired where both \
-         releases drive on the same heights under the same ids (by the hash of their content): signed-rank tests; elsewhere \
-         they are independent: rank-sum tests. The shift is Hodges and Lehmann's with {} % intervals over terrains \
-         ({REPLICATES} redraws). p by permutation, Holm over all tests of this section. Equivalent means: within a margin of {} points of success, \
-         {} % of the other's mean for other figures, at {} % (two one-sided t tests of means, not adjusted). Exploratory, unless both were set \
+         releases have the same heights (by the hash of their content) or the same random draws under the same id, and then \
+         those alone are compared: signed-rank tests; elsewhere they are independent: rank-sum tests. The shift is Hodges and Lehmann's; its {} % \
+         interval holds the shifts that the test does not reject. p by permutation, Holm over all tests of this section. \
+         Equivalent means: within a margin of {} points of success and of the shares of classes, {} % of the other's mean for other \
+         figures, at {} % (two one-sided t tests of means, not adjusted). sastrugi compare says the same. Exploratory, unless both were set \
          before the runs.",
         other.name,
         theirs.study.name,
         theirs.version,
         theirs.study_sha256,
         set::fixed(100.0 * LEVEL, 0),
-        set::fixed(MARGIN_POINTS, 0),
-        set::fixed(100.0 * MARGIN_SHARE, 0),
+        set::fixed(100.0 * MARGIN, 0),
+        set::fixed(100.0 * MARGIN, 0),
         set::fixed(100.0 * ALPHA, 0),
     )
 }
 
-fn table(compared: &[Compared]) -> TableBlock {
+/// Words of a figure: those of the page for missions, the column for terrains.
+fn name(q: &Quantity) -> (&'static str, &'static str) {
+    let of_missions = Statistic::ALL.into_iter().find(|s| q.table == "missions" && s.column() == q.figure);
+    of_missions.map_or((q.figure, if q.unit == "1" { "" } else { q.unit }), words)
+}
+
+fn table(quantities: &[Quantity]) -> TableBlock {
     let columns = [
         ("figure", ""),
         ("group", ""),
@@ -175,15 +115,19 @@ fn table(compared: &[Compared]) -> TableBlock {
         ("p, equivalence", ""),
         ("compared", ""),
     ];
-    let query = "tables/missions of both releases, plain run: mean by terrain and group";
-    let mut numbers = Numbers::new(query, &columns).with_mixed_units();
-    for c in compared {
-        let shift = c.pair.effect.map_or([f64::NAN; 3], |e| [e.shift.estimate, e.shift.low, e.shift.high]);
-        let head = [text(c.figure), text(&c.group), text(c.verdict()), text(c.unit)];
-        let p = c.pair.test.map_or(f64::NAN, |t| t.p);
-        let tail = [p, c.adjusted, c.margin, c.equivalence_p()].map(number);
-        numbers
-            .row(head.into_iter().chain(c.means.map(number)).chain(shift.map(number)).chain(tail).chain([text(&c.of)]));
+    // In either release.
+    let mut numbers = Numbers::computed(sql::variants(), &columns).with_mixed_units();
+    let or_nan = |v: Option<f64>| v.unwrap_or(f64::NAN);
+    for q in quantities {
+        let (name, unit) = name(q);
+        let head = [text(name), text(&q.group), text(verdict(q)), text(unit)];
+        let values = [q.a, q.b].into_iter().chain(q.shift.unwrap_or([f64::NAN; 3]));
+        let tail = [q.p, q.p_adjusted, q.margin, q.p_equivalence].map(or_nan);
+        let of = match q.paired {
+            true => format!("{}, paired", set::counted(q.terrains[0], "terrain")),
+            false => format!("{} + {} terrains", q.terrains[0], q.terrains[1]),
+        };
+        numbers.row(head.into_iter().chain(values.chain(tail).map(number)).chain([text(of)]));
     }
     TableBlock { id: "releases".into(), caption: "This release against the other".into(), numbers }
 }

@@ -2,6 +2,7 @@
 
 use super::Question;
 use super::curves::HEIGHT;
+use super::sql::quoted;
 use crate::ReportError;
 use crate::content::{Block, Figure, Numbers, TableBlock, slug};
 use crate::data::Data;
@@ -74,7 +75,7 @@ fn figure(texture: &str, score: &ScoreRow, curve: &[&ScoreCovarianceRow], x: Axi
     plot.svg.close();
     plot.note(0, &format!("largest error {} %", set::significant(100.0 * score.covariance_error_max, 2)));
     let names = ["bin", "lag_m", "wanted_m2", "achieved_m2", "measured_m2"];
-    let query = format!("tables/scoreboard_covariance where texture_id = '{texture}' and method = '{}'", score.method);
+    let query = format!("texture_id = {} and method = {}", quoted(texture), quoted(&score.method));
     Figure {
         id,
         title: format!("{}.", score.method),
@@ -86,7 +87,7 @@ fn figure(texture: &str, score: &ScoreRow, curve: &[&ScoreCovarianceRow], x: Axi
             set::significant(score.covariance_error_max, 2)
         ),
         svg: plot.svg,
-        numbers: Numbers::select(query, curve.iter().copied(), &names),
+        numbers: Numbers::select(&query, curve.iter().copied(), &names),
     }
 }
 
@@ -103,13 +104,13 @@ fn table(texture: &str, scores: &[&ScoreRow]) -> TableBlock {
         "operations",
         "memory_bytes",
     ];
-    let query = format!("tables/scoreboard where texture_id = '{texture}'");
+    let query = format!("texture_id = {}", quoted(texture));
     TableBlock {
         id: slug(&format!("scoreboard-{texture}")),
         caption: format!(
             "Methods of texture {texture}. Errors, variances and their spread are shares of the variance asked for; a seam jump of 1 is \
              no seam; operations and bytes are predicted."
         ),
-        numbers: Numbers::select(query, scores.iter().copied(), &names),
+        numbers: Numbers::select(&query, scores.iter().copied(), &names),
     }
 }

@@ -4,6 +4,7 @@ use super::Question;
 use super::clusters::{Clusters, LEVEL, block, stream};
 use super::missions::METRICS;
 use super::outcome::successful;
+use super::sql;
 use crate::ReportError;
 use crate::content::{Block, Figure, Numbers, TableBlock, count, number, text};
 use crate::data::{Data, Group};
@@ -228,7 +229,7 @@ fn describe(effects: &[Effect]) -> String {
 
 fn numbers(effects: &[Effect]) -> Numbers {
     let columns = [("variant", ""), ("group", ""), ("change", "points"), ("low", "points"), ("high", "points")];
-    let mut numbers = Numbers::new("tables/missions by variant and group", &columns);
+    let mut numbers = Numbers::computed(sql::variants(), &columns);
     for e in effects {
         numbers.row([
             text(&e.variant),
@@ -258,7 +259,7 @@ fn table(data: &Data, effects: &[Effect]) -> TableBlock {
         ("roll rate", "deg/s"),
         ("its change", "%"),
     ];
-    let mut numbers = Numbers::new("tables/missions by variant and group; medians where outcome = 'success'", &columns);
+    let mut numbers = Numbers::computed(sql::variants(), &columns);
     for e in effects {
         let head = [
             text(&e.variant),

@@ -163,7 +163,7 @@ fn share_numbers(groups: &[&Group<TerrainRow>], bars: &[Bar]) -> Numbers {
         ("band, 95 %", "%"),
         ("paper", "%"),
     ];
-    let mut numbers = Numbers::new("tables/terrains where stage = 'terrain'", &columns);
+    let mut numbers = Numbers::computed(super::TERRAINS, &columns);
     for bar in bars {
         numbers.row([
             text(&groups[bar.row].name),
@@ -193,7 +193,7 @@ fn map(data: &Data, group: &Group<TerrainRow>) -> Result<Option<Figure>, ReportE
     let class = |c| (Mark::Fill(Paint::Fixed(picture::class_colour(c))), RoughnessClass::name(c).to_owned());
     let map = Map::new(&picture, MAP_WIDTH, &Key::Entries(&RoughnessClass::ALL.map(class)));
     let columns = [("file", ""), ("rows", "1"), ("cols", "1"), ("cell_x_m", "m")];
-    let mut numbers = Numbers::new(path.as_str(), &columns);
+    let mut numbers = Numbers::of_file(path.as_str(), &columns);
     numbers.row([text(path), Cell::I64(terrain.rows), Cell::I64(terrain.cols), number(terrain.cell_x_m)]);
     Ok(Some(Figure {
         id: slug(&format!("classes-{}", terrain.terrain_id)),

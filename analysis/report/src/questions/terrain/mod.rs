@@ -12,6 +12,9 @@ use crate::render::number as set;
 use sastrugi_numeric::sums;
 use sastrugi_schemas::tables::TerrainRow;
 
+/// What figures of groups are computed from.
+const TERRAINS: &str = "select * from 'tables/terrains/*.parquet' where stage = 'terrain'";
+
 /// Registry entry.
 pub const QUESTION: Question = Question { id: "terrain", name: "Terrain", title: "What is the terrain like?", answer };
 
@@ -112,7 +115,7 @@ fn median(rows: &[&TerrainRow], figure: impl Fn(&TerrainRow) -> f64) -> f64 {
 fn medians(groups: &[Group<TerrainRow>]) -> TableBlock {
     let columns: Vec<(&str, &str)> =
         [("group", ""), ("terrains", "")].into_iter().chain(MEDIANS.map(|(name, unit, _)| (name, unit))).collect();
-    let mut numbers = Numbers::new("tables/terrains where stage = 'terrain', medians by group", &columns);
+    let mut numbers = Numbers::computed(TERRAINS, &columns);
     for group in groups {
         let figures = MEDIANS.iter().map(|(_, _, figure)| number(median(&group.rows, figure)));
         numbers.row([text(&group.name), count(group.rows.len())].into_iter().chain(figures));
@@ -142,7 +145,7 @@ fn surfaces(data: &Data) -> TableBlock {
         "hurst_lag_min_m",
         "hurst_lag_max_m",
     ];
-    let numbers = Numbers::select("tables/surfaces", &data.surfaces, &names);
+    let numbers = Numbers::select("", &data.surfaces, &names);
     TableBlock { id: "surfaces".into(), caption: "All surfaces (ISO 25178)".into(), numbers }
 }
 
@@ -167,6 +170,6 @@ fn all(data: &Data) -> TableBlock {
         "kurtosis",
         "path",
     ];
-    let numbers = Numbers::select("tables/terrains where stage = 'terrain'", data.of_stage("terrain"), &names);
+    let numbers = Numbers::select("stage = 'terrain'", data.of_stage("terrain"), &names);
     TableBlock { id: "terrains".into(), caption: "All terrains".into(), numbers }
 }

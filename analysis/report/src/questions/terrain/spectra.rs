@@ -4,6 +4,7 @@ use super::median;
 use crate::content::{Figure, Numbers, slug};
 use crate::data::{Data, Group};
 use crate::questions::curves::{self, Curve};
+use crate::questions::sql;
 use crate::render::chart::Plot;
 use crate::render::number as set;
 use crate::render::svg::{Paint, Stroke};
@@ -44,7 +45,11 @@ pub fn spectra(data: &Data, groups: &[Group<TerrainRow>]) -> Vec<Figure> {
         );
         let rows: Vec<&PsdRow> = group.rows.iter().flat_map(|t| data.spectrum(&t.terrain_id)).collect();
         let names = ["terrain_id", "bin", "frequency_cycles_m", "psd_m4", "modes"];
-        let numbers = Numbers::select(query("psd", group), rows, &names);
+        let numbers = Numbers::select(
+            &format!("{} and frequency_cycles_m > 0 and psd_m4 > 0", sql::of_group(group)),
+            rows,
+            &names,
+        );
         finish(id, format!("Spectra, group {}.", group.name), caption, description, plot, numbers)
     };
     drawn.iter().map(figure).collect()
@@ -66,7 +71,7 @@ pub fn distributions(data: &Data, groups: &[Group<TerrainRow>]) -> Vec<Figure> {
         );
         let rows: Vec<&HeightDistributionRow> = group.rows.iter().flat_map(|t| data.histogram(&t.terrain_id)).collect();
         let names = ["terrain_id", "bin", "low_m", "high_m", "cells", "density_per_m"];
-        let numbers = Numbers::select(query("height_distribution", group), rows, &names);
+        let numbers = Numbers::select(&format!("{} and isfinite(density_per_m)", sql::of_group(group)), rows, &names);
         finish(id, format!("Heights, group {}.", group.name), &description.clone(), description, plot, numbers)
     };
     drawn.iter().map(figure).collect()
@@ -74,10 +79,6 @@ pub fn distributions(data: &Data, groups: &[Group<TerrainRow>]) -> Vec<Figure> {
 
 fn file_id(what: &str, group: &Group<TerrainRow>) -> String {
     slug(&format!("{what}-{}", group.name))
-}
-
-fn query(table: &str, group: &Group<TerrainRow>) -> String {
-    format!("tables/{table} where terrain_id is in group '{}'", group.name)
 }
 
 fn finish(id: String, title: String, caption: &str, description: String, plot: Plot, numbers: Numbers) -> Figure {

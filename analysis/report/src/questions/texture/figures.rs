@@ -2,6 +2,7 @@
 
 use crate::content::{Numbers, TableBlock, number, slug, text};
 use crate::data::Data;
+use crate::questions::sql::quoted;
 use crate::render::number as set;
 use sastrugi_schemas::Cell;
 use sastrugi_schemas::tables::{SurfaceRow, TerrainRow};
@@ -43,8 +44,11 @@ pub fn table(data: &Data, texture: &TerrainRow, fit: &str) -> TableBlock {
     let present: Vec<(&str, &SurfaceRow)> = sides.into_iter().filter_map(|(name, s)| Some((name, s?))).collect();
     let columns: Vec<(&str, &str)> =
         [("figure", "")].into_iter().chain(present.iter().map(|(name, _)| (*name, ""))).collect();
-    let query = format!("tables/surfaces where surface_id in ('{fit}', '{alike}', '{}')", texture.terrain_id);
-    let mut numbers = Numbers::new(query, &columns);
+    let query = format!(
+        "select * from 'tables/surfaces/*.parquet' where surface_id in ({})",
+        [fit, &alike, &texture.terrain_id].map(quoted).join(", ")
+    );
+    let mut numbers = Numbers::computed(query, &columns);
     for (name, unit, figure) in ROWS.iter().filter(|_| !present.is_empty()) {
         let unit = set::unit(unit);
         let label = if unit.is_empty() { (*name).to_owned() } else { format!("{name}, {unit}") };

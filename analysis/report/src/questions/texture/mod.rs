@@ -11,6 +11,7 @@ use super::curves::{self, Curve};
 use super::relief::{
     Style, Words, deviations, exaggeration, exaggeration_words, limit_m, middle_range, relief, relief_of,
 };
+use super::sql::quoted;
 use crate::ReportError;
 use crate::content::{Block, Figure, Numbers, TableBlock, slug};
 use crate::data::{self, Data};
@@ -153,7 +154,7 @@ fn together(fit: &str, texture: &TerrainRow, points: impl Fn(&str) -> Vec<(f64, 
 
 /// The ids of a frame as a list for a query.
 fn ids(fit: &str, texture: &TerrainRow) -> String {
-    sides(fit, texture).map(|(_, id, _)| format!("'{id}'")).join(", ")
+    sides(fit, texture).map(|(_, id, _)| quoted(&id)).join(", ")
 }
 
 /// The chart of one kind of curve.
@@ -183,7 +184,7 @@ fn spectra(data: &Data, texture: &TerrainRow, fit: &str) -> Option<Figure> {
     let plot = (!curves.is_empty()).then(|| curves::spectra(&id, &curves, curves::ranges(&curves), None))?;
     let rows = sides(fit, texture).into_iter().flat_map(|(_, id, _)| data.spectrum(&id));
     let names = ["terrain_id", "bin", "frequency_cycles_m", "psd_m4", "modes"];
-    let query = format!("tables/psd where terrain_id in ({})", ids(fit, texture));
+    let query = format!("terrain_id in ({}) and frequency_cycles_m > 0 and psd_m4 > 0", ids(fit, texture));
     let chart = Chart {
         what: "psd",
         title: "Spectra.",
@@ -191,7 +192,7 @@ fn spectra(data: &Data, texture: &TerrainRow, fit: &str) -> Option<Figure> {
         measured: "The moving average has taken the lowest frequencies out of the measured residual, and out of the texture \
                    where it was treated alike.",
     };
-    Some(chart.figure(texture, &curves, plot, Numbers::select(query, rows, &names)))
+    Some(chart.figure(texture, &curves, plot, Numbers::select(&query, rows, &names)))
 }
 
 fn distributions(data: &Data, texture: &TerrainRow, fit: &str) -> Option<Figure> {
@@ -200,14 +201,14 @@ fn distributions(data: &Data, texture: &TerrainRow, fit: &str) -> Option<Figure>
     let plot = (!curves.is_empty()).then(|| curves::distributions(&id, &curves, curves::ranges(&curves)))?;
     let rows = sides(fit, texture).into_iter().flat_map(|(_, id, _)| data.histogram(&id));
     let names = ["terrain_id", "bin", "low_m", "high_m", "cells", "density_per_m"];
-    let query = format!("tables/height_distribution where terrain_id in ({})", ids(fit, texture));
+    let query = format!("terrain_id in ({}) and isfinite(density_per_m)", ids(fit, texture));
     let chart = Chart {
         what: "heights",
         title: "Heights.",
         caption: "Height distributions.",
         measured: "The measured one ends where it was trimmed.",
     };
-    Some(chart.figure(texture, &curves, plot, Numbers::select(query, rows, &names)))
+    Some(chart.figure(texture, &curves, plot, Numbers::select(&query, rows, &names)))
 }
 
 fn structures(data: &Data, texture: &TerrainRow, fit: &str) -> Option<Figure> {
@@ -217,14 +218,14 @@ fn structures(data: &Data, texture: &TerrainRow, fit: &str) -> Option<Figure> {
     let plot = (!curves.is_empty()).then(|| curves::log_log(&id, &curves, "lag, m", "mean squared increment, m²"))?;
     let rows = sides(fit, texture).into_iter().flat_map(|(_, id, _)| data.structure_of(&id, "all"));
     let names = ["surface_id", "direction", "bin", "lag_m", "value_m2", "pairs"];
-    let query = format!("tables/structure where direction = 'all' and surface_id in ({})", ids(fit, texture));
+    let query = format!("direction = 'all' and lag_m > 0 and value_m2 > 0 and surface_id in ({})", ids(fit, texture));
     let chart = Chart {
         what: "structure",
         title: "Structure functions.",
         caption: "Mean squared difference of heights against their distance, all directions together.",
         measured: "The moving average makes it level off at its window.",
     };
-    Some(chart.figure(texture, &curves, plot, Numbers::select(query, rows, &names)))
+    Some(chart.figure(texture, &curves, plot, Numbers::select(&query, rows, &names)))
 }
 
 /// Profile spectra along both axes, of the two surfaces that were treated alike.
@@ -247,14 +248,15 @@ fn profiles(data: &Data, texture: &TerrainRow, fit: &str) -> Option<Figure> {
     let plot = (!curves.is_empty()).then(|| curves::log_log(&id, &curves, titles.0, titles.1))?;
     let rows = surfaces.into_iter().flat_map(|(_, id, _)| axes.map(|(axis, _, _)| data.profile_spectrum(id, axis)));
     let names = ["surface_id", "direction", "bin", "frequency_cycles_m", "psd_m3", "modes"];
-    let query = format!("tables/profile_psd where surface_id in ('{fit}', '{alike}')");
+    let query =
+        format!("surface_id in ({}, {}) and frequency_cycles_m > 0 and psd_m3 > 0", quoted(fit), quoted(&alike));
     let chart = Chart {
         what: "profiles",
         title: "Spectra of profiles.",
         caption: "One-dimensional power spectral density, mean of all rows and of all columns.",
         measured: "",
     };
-    Some(chart.figure(texture, &curves, plot, Numbers::select(query, rows.flatten(), &names)))
+    Some(chart.figure(texture, &curves, plot, Numbers::select(&query, rows.flatten(), &names)))
 }
 
 /// The texture laid three by three, where it repeats.
@@ -301,6 +303,6 @@ fn all(data: &Data) -> TableBlock {
         "kurtosis",
         "path",
     ];
-    let numbers = Numbers::select("tables/terrains where stage = 'texture'", data.of_stage("texture"), &names);
+    let numbers = Numbers::select("stage = 'texture'", data.of_stage("texture"), &names);
     TableBlock { id: "textures".into(), caption: "All textures".into(), numbers }
 }

@@ -1,0 +1,43 @@
+//! Queries of duckdb, run in the folder of the release, behind figures and tables: they give the numbers themselves, or the rows
+//! that these are computed from.
+
+use crate::data::{Data, Group};
+use sastrugi_schemas::tables::TerrainRow;
+
+/// Columns of the table `missions` that groups are compared by.
+const COMPARED: &str = "terrain_id, mission_id, pair_id, outcome, progress_m, efficiency, time_s, rms_vertical_acceleration_m_s2, \
+rms_pitch_rate_deg_s, rms_roll_rate_deg_s, max_pitch_deg, max_roll_deg";
+
+/// Missions of the plain run, of one outcome or of all: the name of the group, then other columns.
+pub fn missions(data: &Data, columns: &str, outcome: Option<&str>) -> String {
+    let plain = data.missions.iter().any(|m| m.variant.is_none()).then(|| "variant is null".to_owned());
+    let rules: Vec<String> =
+        plain.into_iter().chain(outcome.map(|word| format!("outcome = {}", quoted(word)))).collect();
+    let rules = if rules.is_empty() { String::new() } else { format!(" where {}", rules.join(" and ")) };
+    let group = if data.has_several_runs() { "\"group\" || ', ' || traverse_id as \"group\"" } else { "\"group\"" };
+    format!("select {group}, {columns} from 'tables/missions/*.parquet'{rules}")
+}
+
+/// Everything that groups of missions are compared by.
+pub fn compared(data: &Data) -> String {
+    missions(data, COMPARED, None)
+}
+
+/// The same of every variant.
+pub fn variants() -> String {
+    format!("select variant, \"group\", traverse_id, {COMPARED} from 'tables/missions/*.parquet'")
+}
+
+/// The condition on the terrains of a group.
+pub fn of_group(group: &Group<TerrainRow>) -> String {
+    let plain = if group.rows.iter().all(|t| t.variant.is_none()) { " and variant is null" } else { "" };
+    let label = quoted(&group.label);
+    format!(
+        "terrain_id in (select terrain_id from 'tables/terrains/*.parquet' where stage = 'terrain' and coalesce(\"group\", kind) = {label}{plain})"
+    )
+}
+
+/// Text in single quotes.
+pub fn quoted(text: &str) -> String {
+    format!("'{}'", text.replace('\'', "''"))
+}
