@@ -197,7 +197,8 @@ pub fn resolved(path: &Path) -> PathBuf {
     })
 }
 
-fn located(graph: &Graph, cache: &Cache, execution: &Execution, position: usize) -> (ItemRef, Option<PathBuf>) {
+/// The item at a position with the folder of its result, where it has one.
+pub fn located(graph: &Graph, cache: &Cache, execution: &Execution, position: usize) -> (ItemRef, Option<PathBuf>) {
     let item = graph.node(position).item.clone();
     let done = execution.done.binary_search(&position).is_ok();
     let folder = done.then(|| cache.result_folder(&item, graph.key(position)));
