@@ -75,6 +75,46 @@ fn val_what_the_data_asks_for_goes_with_everything_made_from_it() {
     }
 }
 
+/// Files that were there before are read by the stages and made by none; people whose names are spelled alike stay two.
+#[test]
+fn val_the_crate_tells_what_was_given_from_what_was_made() {
+    let folder = area();
+    write(folder.path(), "plot.geojson", PLOT);
+    let masked = study("creators = [\"J. Doe\", \"J- Doe\"]\n", "").replacen(
+        "outer_scale_m = 4000.0\n",
+        "outer_scale_m = 4000.0\nmask = \"plot.geojson\"\n",
+        1,
+    );
+    write(folder.path(), "study.toml", &masked);
+    let call = sastrugi_in(folder.path(), &["run", "study.toml", "-o", "release", "--quiet"]);
+    assert_eq!(call.code, 0, "{}", call.stderr);
+    let text = read(&folder.path().join("release"), "ro-crate-metadata.json");
+    let graph = serde_json::from_str::<Value>(&text).unwrap()["@graph"].as_array().unwrap().clone();
+    let mut ids: Vec<&str> = graph.iter().map(|entity| entity["@id"].as_str().unwrap()).collect();
+    let count = ids.len();
+    ids.sort_unstable();
+    ids.dedup();
+    assert_eq!(ids.len(), count, "an id is there twice: {text}");
+    let people = graph.iter().filter(|entity| entity["@type"] == "Person");
+    assert_eq!(people.map(|person| &person["name"]).collect::<Vec<_>>(), ["J. Doe", "J- Doe"]);
+    let linked = |stage: &str, key: &str| -> Vec<&str> {
+        let action = graph.iter().find(|entity| entity["name"] == format!("stage {stage}"));
+        let linked = action.and_then(|action| action[key].as_array()).into_iter().flatten();
+        linked.filter_map(|entity| entity["@id"].as_str()).collect()
+    };
+    assert_eq!(linked("dem", "object"), ["dem/site.tif", "study.toml"]);
+    assert_eq!(linked("dem", "result"), ["dem/site.metric.tif"]);
+    assert_eq!(linked("fit", "object"), ["dem/site.metric.tif", "mask/fit.geojson", "study.toml"]);
+    assert_eq!(linked("terrain", "object"), ["study.toml"]);
+    for stage in ["original", "mask"] {
+        assert!(linked(stage, "result").is_empty(), "stage {stage} makes nothing: {text}");
+    }
+}
+
+/// West half of the fixture's window.
+const PLOT: &str = r#"{"type": "Polygon", "coordinates":
+    [[[-84.6, 36.4], [-84.2683, 36.4], [-84.2911, 36.7], [-84.6, 36.7], [-84.6, 36.4]]]}"#;
+
 /// A part for every terrain, in tables and shards alike; the same release from one run, from shards, and computed again.
 #[test]
 fn val_terrains_are_split_the_same_everywhere() {

@@ -7,6 +7,7 @@
 
 import fnmatch
 import hashlib
+import json
 import logging
 import re
 import warnings
@@ -19,6 +20,8 @@ from ruamel.yaml import YAML
 
 from common import expect, manifest, run
 
+# Stages that only take files into the release.
+COPIES = {"original", "mask"}
 PARTS = ["train", "validation", "test"]
 # Tables of more files are a set of files only; their hashes are in the manifest.
 DESCRIBED_FILES = 64
@@ -105,10 +108,38 @@ def check_crate(release):
             expect(linked, f"ro-crate-metadata.json: {action.id} has no {key}")
             unknown = [entity for entity in linked if isinstance(entity, str) or entity is None]
             expect(not unknown, f"ro-crate-metadata.json: {action.id}: {key} {unknown} is not described")
-    stages = {artifact["stage"] for artifact in manifest(release)["artifacts"]} - {""}
+    stages = {artifact["stage"] for artifact in manifest(release)["artifacts"]} - {"", *COPIES}
     named = {action["name"].removeprefix("stage ") for action in actions}
     expect(named == stages, f"ro-crate-metadata.json: actions {sorted(named)}, stages {sorted(stages)}")
+    check_provenance(release, actions)
     return {"entities": len(crate.get_entities()), "actions": sorted(named)}
+
+
+def check_provenance(release, actions):
+    """What each action read and made, against the parents in the manifest."""
+    artifacts = manifest(release)["artifacts"]
+    stage_of = {artifact["path"]: artifact["stage"] for artifact in artifacts}
+    ids = [entity["@id"] for entity in json.loads((release / "ro-crate-metadata.json").read_text())["@graph"]]
+    expect(len(ids) == len(set(ids)), "ro-crate-metadata.json: two entities have one id")
+
+    def linked(action, key):
+        entities = action[key]
+        return [entity.id for entity in (entities if isinstance(entities, list) else [entities])]
+
+    def stages_in(entity):
+        return {stage for path, stage in stage_of.items() if path == entity or (entity[-1] == "/" and path.startswith(entity))}
+
+    for action in actions:
+        stage = action["name"].removeprefix("stage ")
+        for entity in linked(action, "result"):
+            expect(stage in stages_in(entity), f"ro-crate-metadata.json: stage {stage} did not make {entity}")
+        if stage == "report":
+            continue
+        parts = set(stage.split("+"))
+        parents = {parent.split("/")[0] for a in artifacts if a["stage"] in parts for parent in a.get("parents", [])}
+        for entity in linked(action, "object"):
+            fits = entity == "study.toml" or (stages_in(entity) & parents and not entity.startswith("tables/"))
+            expect(fits, f"ro-crate-metadata.json: stage {stage} did not read {entity}")
 
 
 def check_citation(release):

@@ -1,7 +1,7 @@
 //! What a command does with a whole study: run, plan, merge. What it does with a release is in [`crate::verification`].
 
 use crate::error::{Error, of_build};
-use crate::jobs::{ItemRef, mask, original};
+use crate::jobs::{ItemRef, original};
 use crate::registry::{self, Plan};
 use crate::runner::assemble::{Contents, assemble};
 use crate::runner::cache::Cache;
@@ -153,7 +153,7 @@ pub fn run(loaded: &Loaded, request: &RunRequest<'_>, progress: &dyn Progress) -
 
 /// Files are only copied: with nothing else there is no release to make.
 fn is_worth_a_release(stage: &str, purpose: Option<&str>) -> bool {
-    purpose.map_or(![original::STAGE, mask::STAGE].contains(&stage), |purpose| purpose == stage)
+    purpose.map_or(!original::only_copies(stage), |purpose| purpose == stage)
 }
 
 /// A folder that is not ours is refused before any work is done.

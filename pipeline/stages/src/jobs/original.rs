@@ -14,6 +14,11 @@ use std::path::{Path, PathBuf};
 /// Name of the stage.
 pub const STAGE: &str = "original";
 
+/// True for stages that only take files into the release.
+pub fn only_copies(stage: &str) -> bool {
+    [STAGE, super::mask::STAGE].contains(&stage)
+}
+
 /// A measured file with what lies beside it.
 pub struct Original {
     files: Vec<Copied>,
