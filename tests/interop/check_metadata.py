@@ -11,7 +11,9 @@ import json
 import logging
 import re
 import warnings
+from pathlib import Path
 
+import cffconvert
 import mlcroissant
 import pyarrow.parquet as pq
 from cffconvert.cli.create_citation import create_citation
@@ -143,9 +145,26 @@ def check_provenance(release, actions):
 
 
 def check_citation(release):
+    """Valid; the licence where the format has it; the creators as Croissant names them, people as people."""
     citation = create_citation(str(release / "CITATION.cff"), None)
     citation.validate()
-    return citation.as_bibtex()
+    file = citation.cffobj
+    schema = json.loads((Path(cffconvert.__file__).parent / "schemas/1.2.0/schema.json").read_text())
+    known = schema["definitions"]["license-enum"]["enum"]
+    stated = manifest(release)["license"].split(" OR ")
+    named = file.get("license", [])
+    expected = stated if all(part in known for part in stated) else []
+    expect(([named] if isinstance(named, str) else named) == expected, f"CITATION.cff: license {named} for {stated}")
+    creators = json.loads((release / "croissant.json").read_text())["creator"]
+    for author, creator in zip(file["authors"], creators, strict=True):
+        person = creator["@type"] == "sc:Person"
+        given = [author[key] for key in ("family-names", "given-names") if key in author]
+        name = author.get("alias") or ", ".join(given) if person else author.get("name")
+        expect(name == creator["name"], f"CITATION.cff: {author} is not {creator}")
+    bibtex = citation.as_bibtex()
+    for author in file["authors"]:
+        expect(all(part in bibtex for part in author.values()), f"cffconvert does not name {author}: {bibtex}")
+    return {"bibtex": bibtex, "license": named, "license-url": file.get("license-url")}
 
 
 def check_card(release):

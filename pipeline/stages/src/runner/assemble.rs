@@ -56,6 +56,12 @@ pub fn assemble(mut contents: Contents<'_>, dest: &Path, progress: &dyn Progress
         progress.phase(&format!("{}/{}: {}", note.stage, note.item, note.note));
         builder.note(note.clone());
     }
+    let license = &contents.study.head.license;
+    if !documents::license::is_listed(license) {
+        progress.phase(&format!(
+            "[study] license \"{license}\" is not in the SPDX list; write its identifier, as CC-BY-4.0, if it has one"
+        ));
+    }
     progress.phase("writing tables");
     add_tables(&mut builder, &contents)?;
     add_documents(&mut builder, &contents, &sources)?;

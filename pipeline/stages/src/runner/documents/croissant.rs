@@ -1,7 +1,7 @@
 //! `croissant.json`: every table in Croissant 1.1 (MLCommons, "Croissant Format Specification", version 1.1), so that data
 //! loaders find its columns with type, unit and description, and its files with their hashes.
 
-use super::{Described, add_terms, address_of_license, citation_line, page};
+use super::{Described, add_terms, citation_line, license, page};
 use crate::splits::PARTS;
 use sastrugi_schemas::manifest::{Artifact, Source};
 use sastrugi_schemas::tables::{self, Column, ColumnType, Table};
@@ -35,7 +35,7 @@ pub fn croissant(described: &Described<'_>) -> Value {
         "conformsTo": "http://mlcommons.org/croissant/1.1",
         "name": head.title,
         "description": if head.description.is_empty() { &head.title } else { &head.description },
-        "license": address_of_license(&head.license),
+        "license": license::address(&head.license),
         "creator": described.creators().map(creator).collect::<Vec<_>>(),
         "datePublished": head.date,
         "citeAs": citation_line(head),

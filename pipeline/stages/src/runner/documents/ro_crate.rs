@@ -3,7 +3,7 @@
 //! made. Measured data and masks were there before, so that no action makes them. Folders stand for their files; `manifest.json`
 //! has the parents, stream and hash of each.
 
-use super::{Described, FOLDERS, add_terms, address_of_license, citation_line, is_spdx_identifier, page};
+use super::{Described, FOLDERS, add_terms, citation_line, license, page};
 use crate::jobs::{ItemRef, original};
 use sastrugi_schemas::manifest::{Artifact, PROGRAM as PROGRAM_NAME, Source};
 use sastrugi_schemas::tables;
@@ -34,7 +34,7 @@ pub fn ro_crate(described: &Described<'_>) -> Value {
     graph.extend(parts);
     graph.push(json!({ "@id": PROFILE, "@type": "CreativeWork", "name": "Process Run Crate", "version": "0.5" }));
     graph.push(program());
-    graph.extend(license(&described.head.license));
+    graph.extend(license_entity(&described.head.license));
     let creator = |(n, (name, kind))| json!({ "@id": creator_id(n), "@type": kind, "name": name });
     graph.extend(described.creators().enumerate().map(creator));
     graph.extend(described.sources.iter().map(work));
@@ -88,14 +88,14 @@ fn own_file((path, media, description): &(&str, &str, &str)) -> Value {
 
 /// A licence of the SPDX list by its page there, any other by the file that names it.
 fn license_id(license: &str) -> String {
-    if is_spdx_identifier(license) { address_of_license(license) } else { "LICENSE".to_owned() }
+    license::identifier(license).map_or_else(|| "LICENSE".to_owned(), |_| license::address(license))
 }
 
 /// The entity of a licence that is no file of the release.
-fn license(license: &str) -> Option<Value> {
-    let id = is_spdx_identifier(license).then(|| license_id(license))?;
-    let description = format!("The licence that the SPDX list calls {license}");
-    Some(json!({ "@id": id, "@type": "CreativeWork", "name": license, "description": description }))
+fn license_entity(license: &str) -> Option<Value> {
+    let name = license::identifier(license)?;
+    let description = format!("The licence that the SPDX list calls {name}");
+    Some(json!({ "@id": license_id(license), "@type": "CreativeWork", "name": name, "description": description }))
 }
 
 fn program() -> Value {
