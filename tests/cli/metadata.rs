@@ -153,6 +153,51 @@ fn val_terrains_are_split_the_same_everywhere() {
     assert!(plan.stdout.contains("0 to compute"), "{}", plan.stdout);
 }
 
+/// What a DEM's maker asks for, and how its heights are packed, decide no mission: the same release as from scratch, and only
+/// the packed file is made again.
+#[test]
+fn val_a_citation_drives_no_mission_again() {
+    let folder = area();
+    let path = folder.path();
+    let ok = |arguments: &[&str]| {
+        let call = sastrugi_in(path, &[arguments, &["--json", "--quiet"]].concat());
+        assert_eq!(call.code, 0, "{arguments:?}: {}{}", call.stdout, call.stderr);
+        serde_json::from_str::<Value>(&call.stdout).unwrap()
+    };
+    ok(&["terrain", "multifractal", "--set", "size_px=[320, 300]", "--seed", "7", "-o", "site.tif"]);
+    let study = "[study]\nname = \"cited\"\nseed = 7\ndate = \"2026-01-01\"\n\n\
+        [[dem]]\nid = \"site\"\nfile = \"site.tif\"\nlicense = \"CC0-1.0\"\nattribution = \"Agency\"\ncitation = \"Agency (2000)\"\n\n\
+        [[missions]]\nid = \"m\"\nterrains = [\"site\"]\ncount = 2\nlength_m = 5.0\nborder_m = 1.5\n\n\
+        [[traverse]]\nid = \"h\"\nmissions = \"m\"\n";
+    write(path, "study.toml", study);
+    let computed = |study: &str, output: &str| {
+        write(path, "study.toml", study);
+        ok(&["run", "study.toml", "-o", output])["computed"].as_u64().unwrap()
+    };
+    assert_eq!(computed(study, "release"), 5);
+    let cited = study.replace("CC0-1.0", "CC-BY-4.0").replace("Agency", "Survey").replace("(2000)", "(2001)");
+    assert_eq!(computed(&cited, "release"), 0);
+    let release = path.join("release");
+    let documents = [
+        "study.toml",
+        "README.md",
+        "CITATION.cff",
+        "LICENSE",
+        "croissant.json",
+        "ro-crate-metadata.json",
+        "manifest.json",
+    ];
+    for name in documents {
+        let text = read(&release, name);
+        assert!(text.contains("Survey (2001)") && !text.contains("Agency"), "{name}:\n{text}");
+    }
+    let packed = cited.replace("seed = 7\n", "seed = 7\ngeotiff = \"cog\"\n");
+    assert_eq!(computed(&packed, "release"), 1);
+    assert_eq!(computed(&packed, "fresh"), 5);
+    assert_eq!(sums(&release), sums(&path.join("fresh")));
+    assert_eq!(ok(&["verify", "release", "--recompute", "5"])["differences"], serde_json::json!([]));
+}
+
 fn text(value: &Value) -> String {
     value.as_str().unwrap().to_owned()
 }

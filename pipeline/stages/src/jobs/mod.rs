@@ -50,8 +50,12 @@ impl fmt::Display for ItemRef {
 
 /// What one item of a study does. A job is glue: it reads the artifacts of its parents, calls a kernel, and writes files.
 pub trait Job: Send + Sync {
-    /// Everything in the study that decides the result, defaults filled in.
+    /// Everything in the study that decides what the result holds, defaults filled in.
     fn recipe(&self) -> Value;
+    /// What decides only how the same heights are packed: items made from them stay as they are. Null for the usual way.
+    fn packing(&self) -> Value {
+        Value::Null
+    }
     /// Rooms whose code decides the result, besides the ones that every job stands on.
     fn rooms(&self) -> &'static [Room];
     /// Peak working memory, bytes.
@@ -68,6 +72,14 @@ pub trait Job: Send + Sync {
 /// How the heights of a release are written.
 fn raster_options(geotiff: GeoTiff) -> WriteOptions {
     WriteOptions { cloud_optimised: geotiff == GeoTiff::Cog, ..WriteOptions::default() }
+}
+
+/// What [`Job::packing`] says of rasters written with [`raster_options`].
+fn raster_packing(geotiff: GeoTiff) -> Value {
+    match geotiff {
+        GeoTiff::Plain => Value::Null,
+        GeoTiff::Cog => "cog".into(),
+    }
 }
 
 /// Rough cost of an item on one core.

@@ -1,7 +1,7 @@
 //! Stage `terrain`: one generated heightfield.
 
 use super::dem::HEIGHTS;
-use super::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work, raster_options};
+use super::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work, raster_options, raster_packing};
 use crate::registry::{BuildError, Builder, Heightfield};
 use crate::revision::Room;
 use crate::runner::graph::Node;
@@ -96,7 +96,11 @@ fn name_families(
 
 impl Job for TerrainJob {
     fn recipe(&self) -> Value {
-        json!({ "kind": self.generator.kind(), "params": self.generator.parameters(), "png16": self.png16, "geotiff": self.geotiff })
+        json!({ "kind": self.generator.kind(), "params": self.generator.parameters(), "png16": self.png16 })
+    }
+
+    fn packing(&self) -> Value {
+        raster_packing(self.geotiff)
     }
 
     fn rooms(&self) -> &'static [Room] {
