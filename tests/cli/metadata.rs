@@ -104,7 +104,7 @@ fn val_the_crate_tells_what_was_given_from_what_was_made() {
     };
     assert_eq!(linked("dem", "object"), ["dem/site.tif", "study.toml"]);
     assert_eq!(linked("dem", "result"), ["dem/site.metric.tif"]);
-    assert_eq!(linked("fit", "object"), ["dem/site.metric.tif", "mask/fit.geojson", "study.toml"]);
+    assert_eq!(linked("fit", "object"), ["dem/site.metric.tif", "mask/fit-1.geojson", "study.toml"]);
     assert_eq!(linked("terrain", "object"), ["study.toml"]);
     for stage in ["original", "mask"] {
         assert!(linked(stage, "result").is_empty(), "stage {stage} makes nothing: {text}");

@@ -96,11 +96,12 @@ fn name_families(
 
 impl Job for TerrainJob {
     fn recipe(&self) -> Value {
-        json!({ "kind": self.generator.kind(), "params": self.generator.parameters(), "png16": self.png16 })
+        json!({ "kind": self.generator.kind(), "params": self.generator.parameters() })
     }
 
     fn packing(&self) -> Value {
-        raster_packing(self.geotiff)
+        let raster = raster_packing(self.geotiff);
+        if self.png16 { json!({ "raster": raster, "png16": true }) } else { raster }
     }
 
     fn rooms(&self) -> &'static [Room] {
