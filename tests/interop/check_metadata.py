@@ -81,17 +81,43 @@ def check_croissant(release):
     if "splits" in sets:
         parts = [record["splits/name"] for record in dataset.records("splits")]
         expect(sorted(map(plain, parts)) == sorted(PARTS), f"croissant.json: splits {parts}")
-    files = {file.content_url: file.sha256 for file in dataset.metadata.file_objects}
-    for folder in sorted((release / "tables").iterdir()):
-        parts = sorted(folder.glob("*.parquet"))
-        if len(parts) > DESCRIBED_FILES:
-            continue
-        for part in parts:
-            path = str(part.relative_to(release))
-            sha256 = hashlib.sha256(part.read_bytes()).hexdigest()
-            expect(files.pop(path, None) == sha256, f"croissant.json: the hash of {path} is wrong or missing")
-    expect(not files, f"croissant.json names {sorted(files)}")
+        check_references(release, sets)
+    check_distribution(release, dataset.metadata)
     return {"records": counts, "warnings": sorted(issues.warnings)}
+
+
+def check_references(release, sets):
+    """Every column that names a part refers to the record set of the parts."""
+    described = json.loads((release / "croissant.json").read_text())["recordSet"]
+    fields = {field["@id"]: field for record_set in described for field in record_set["field"]}
+    expect("cr:Split" in fields["splits/url"]["dataType"], "croissant.json: the parts are no cr:Split")
+    columns = [f"{name}/split" for name in sorted(sets) if f"{name}/split" in fields]
+    expect(columns, "croissant.json: no column names a part")
+    for column in columns:
+        field = fields[column]
+        refers = field.get("references") == {"field": {"@id": "splits/name"}} and "cr:Split" in field["dataType"]
+        expect(refers, f"croissant.json: {column} does not refer to splits/name")
+
+
+def check_distribution(release, metadata):
+    """Every file of the release is a file object with its hash, or in a set; every set has a file."""
+    objects = {file.content_url: file.sha256 for file in metadata.file_objects}
+    patterns = {file_set.id: file_set.includes for file_set in metadata.file_sets}
+    found = set()
+    for path in sorted(path for path in release.rglob("*") if path.is_file()):
+        name = str(path.relative_to(release))
+        holders = {key for key, includes in patterns.items() if any(fnmatch.fnmatchcase(name, one) for one in includes)}
+        found |= holders
+        if name in objects:
+            sha256 = hashlib.sha256(path.read_bytes()).hexdigest()
+            expect(objects.pop(name) == sha256, f"croissant.json: the hash of {name} is wrong")
+        else:
+            expect(holders, f"croissant.json: {name} is in no file object and no file set")
+            table = name.split("/")[1] if name.startswith("tables/") else None
+            parts = len(list((release / "tables" / table).glob("*.parquet"))) if table else DESCRIBED_FILES + 1
+            expect(parts > DESCRIBED_FILES, f"croissant.json: the hash of {name} is missing")
+    expect(not objects, f"croissant.json names {sorted(objects)}")
+    expect(found == set(patterns), f"croissant.json: no file is in {sorted(set(patterns) - found)}")
 
 
 def check_crate(release):
