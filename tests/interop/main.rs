@@ -36,18 +36,26 @@ fn val_readers_agree_with_a_release() {
     assert_eq!(call.code, 0, "{}{}", call.stdout, call.stderr);
 }
 
-/// Bags of ROS 2 as rosbags and mcap-ros2-support read them, and `analyze`: the same missions as in the viewer flavour.
+/// Bags of ROS 2 as rosbags and mcap-ros2-support read them, and `analyze`: the same missions as in the viewer flavour. Grid maps
+/// with the terrain's own cells, and with larger ones.
 #[test]
 fn val_ros_reads_the_bags() {
     let Some(python) = python() else { return };
     let folder = area();
-    write(folder.path(), "study.toml", &small_study().replace("seed = 7\n", "seed = 7\nmcap = \"ros2\"\n"));
+    let small = "size_px = [120, 100]\ncell_m = 0.2";
+    let study =
+        small_study().replace("seed = 7\n", "seed = 7\nmcap = \"ros2\"\n").replace("size_px = [280, 300]", small);
+    write(folder.path(), "study.toml", &study);
     let call = sastrugi_in(folder.path(), &["run", "study.toml", "-o", "release", "--quiet"]);
     assert_eq!(call.code, 0, "{}", call.stderr);
-    for script in ["check_ros2.py", "check_rerun.py"] {
-        let call = check(&python, script, &[&folder.path().join("release")]);
-        assert_eq!(call.code, 0, "{script}: {}{}", call.stdout, call.stderr);
-    }
+    let release = folder.path().join("release");
+    let bags = check(&python, "check_ros2.py", &[&release]);
+    assert_eq!(bags.code, 0, "{}{}", bags.stdout, bags.stderr);
+    let bags: Value = serde_json::from_str(&bags.stdout).unwrap();
+    let cells = |terrain: &str| bags[format!("mcap/{terrain}/husky-0001/husky-0001.mcap")]["grid_map_cell"].as_f64();
+    assert_eq!((cells("smooth"), cells("rough-0001")), (Some(1.0), Some(3.0)));
+    let call = check(&python, "check_rerun.py", &[&release]);
+    assert_eq!(call.code, 0, "{}{}", call.stdout, call.stderr);
 }
 
 /// `--cog` and `geotiff = "cog"`: valid for rio-cogeo, and the heights of the plain file.
