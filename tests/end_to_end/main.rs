@@ -396,9 +396,37 @@ fn val_a_recording_is_judged_as_its_mission() {
         let call = sastrugi_in(folder.path(), &["run", "study.toml", "-o", "release", "--quiet"]);
         assert_eq!(call.code, 0, "{}", call.stderr);
         recordings_are_judged_as_missions(folder.path());
+        if flavour == "ros2" {
+            bags_are_judged_as_their_files(folder.path());
+        }
         let call = sastrugi_in(folder.path(), &["verify", "release", "--recompute", "all", "--quiet"]);
         assert_eq!(call.code, 0, "{}", call.stderr);
     }
+}
+
+/// A bag is named by its folder; other folders are refused with what would be right.
+fn bags_are_judged_as_their_files(folder: &Path) {
+    let bag = "release/mcap/smooth/husky-0001";
+    let json = |arguments: &[&str]| -> Value {
+        let call = sastrugi_in(folder, &[arguments, &["--json"]].concat());
+        assert_eq!(call.code, 0, "{arguments:?}: {}", call.stderr);
+        serde_json::from_str(&call.stdout).unwrap()
+    };
+    let file = format!("{bag}/husky-0001.mcap");
+    let (mut of_bag, of_file) = (json(&["analyze", bag]), json(&["analyze", &file]));
+    assert_eq!(of_bag[0]["log"]["log_id"], bag);
+    of_bag[0]["log"]["log_id"] = file.as_str().into();
+    assert_eq!(of_bag, of_file);
+    let described = json(&["info", bag]);
+    assert_eq!((&described["what"], &described["husky-0001.mcap"]), (&"ROS 2 bag".into(), &json(&["info", &file])));
+    let refused = |words: &str| {
+        let call = sastrugi_in(folder, &["analyze", "bag"]);
+        assert!(call.code == 65 && call.stderr.contains(words), "{} {}", call.code, call.stderr);
+    };
+    fs::create_dir(folder.join("bag")).unwrap();
+    refused("name an .mcap file");
+    write(&folder.join("bag"), "metadata.yaml", "rosbag2_bagfile_information:\n  relative_file_paths:\n    - a.db3\n");
+    refused("`ros2 bag convert`");
 }
 
 fn recordings_are_judged_as_missions(folder: &Path) {

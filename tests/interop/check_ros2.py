@@ -139,6 +139,7 @@ def read_mcap(path):
         expect(header.profile == "ros2", f"{path} has the profile {header.profile}")
         for schema, channel, message, decoded in reader.iter_decoded_messages(log_time_order=False):
             expect(schema.encoding == "ros2msg", f"{path}: {channel.topic} has the schema encoding {schema.encoding}")
+            expect(channel.metadata.get("description"), f"{path}: {channel.topic} is not described")
             expect(channel.message_encoding == "cdr", f"{path}: {channel.topic} is {channel.message_encoding}")
             content.text(channel.topic)
             content.u64(message.log_time)

@@ -281,7 +281,7 @@ fn find<'a>(answer: &'a Value, name: &str) -> Option<&'a Value> {
 
 /// Logs by the writers of mcap-ros2-support, rosbags and mcap-protobuf-support have the figures that numpy takes from the same
 /// motion (interpolation and differences alike; angles to the rounding of the interpolated quaternions' lengths), whichever
-/// messages carry it; bad ones are refused by name.
+/// messages carry it; bags are named by their folder, one file or several; bad ones are refused by name.
 #[test]
 fn val_logs_of_other_writers_are_judged_alike() {
     let Some(python) = python() else { return };

@@ -158,7 +158,7 @@ fn is_worth_a_release(stage: &str, purpose: Option<&str>) -> bool {
 
 /// A folder that is not ours is refused before any work is done.
 fn check_destination(request: &RunRequest<'_>) -> Result<(), Error> {
-    let ours = if request.part.is_some() { "shard.json" } else { release::MANIFEST };
+    let ours = if request.part.is_some() { release::SHARD } else { release::MANIFEST };
     match fs::read_dir(request.output).map(|mut entries| entries.next().is_some()) {
         Ok(true) if !request.output.join(ours).is_file() => {
             let what = if request.part.is_some() { "shard" } else { "release" };
