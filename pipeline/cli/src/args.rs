@@ -437,7 +437,7 @@ pub struct Report {
 /// `analyze`.
 #[derive(Debug, Args)]
 pub struct Analyze {
-    /// MCAP logs.
+    /// MCAP logs; folders of ROS 2 bags.
     #[arg(required = true, value_name = "MCAP")]
     pub logs: Vec<PathBuf>,
     /// Topic of the poses; the best one when absent.
