@@ -19,12 +19,13 @@ use sastrugi_schemas::tables::{
     ParameterRow, ProfilePsdRow, PsdRow, ReplicateRow, ScoreCovarianceRow, ScoreRow, StructureRow, SurfaceRow,
     TerrainRow,
 };
+use sastrugi_store::atomic::{Draft, DraftFile};
 use sastrugi_store::dem::WriteOptions;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fmt;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Name of an item: its stage and its id.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -94,7 +95,7 @@ pub struct Estimate {
 /// Where a job finds its inputs and leaves its outputs.
 pub struct Work<'a> {
     /// Folder for the outputs.
-    pub folder: &'a Path,
+    pub folder: Draft<'a>,
     /// Folders of the parents' artifacts.
     pub parents: &'a BTreeMap<ItemRef, PathBuf>,
 }
@@ -109,9 +110,9 @@ impl Work<'_> {
         Ok(folder.join(file))
     }
 
-    /// Path of an output.
-    pub fn output(&self, file: &str) -> PathBuf {
-        self.folder.join(file)
+    /// An output.
+    pub fn output(&self, file: &str) -> DraftFile {
+        self.folder.file(file)
     }
 }
 

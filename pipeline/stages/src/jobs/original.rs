@@ -139,7 +139,7 @@ impl Job for Original {
     }
 }
 
-fn copy(input: &InputFile, target: &Path) -> Result<(), JobError> {
+fn copy(input: &InputFile, target: &atomic::DraftFile) -> Result<(), JobError> {
     let unreadable = |e: std::io::Error| JobError::input(format!("{}: {e}", input.path.display()));
     let mut from = std::fs::File::open(&input.path).map_err(unreadable)?;
     let mut to = atomic::AtomicFile::create(target).map_err(JobError::new)?;

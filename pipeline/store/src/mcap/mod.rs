@@ -16,8 +16,9 @@ mod tests;
 
 pub use log::read_log;
 
+use crate::PROGRAM;
+use crate::atomic::{self, Target};
 use crate::digest::ContentHash;
-use crate::{PROGRAM, atomic};
 use foxglove::messages as fox;
 use mcap::records::{MessageHeader, Metadata};
 use mcap::{Compression, WriteOptions, Writer};
@@ -204,9 +205,10 @@ impl Timeline {
 ///
 /// # Errors
 /// See [`McapError`].
-pub fn write_mission(path: &Path, mission: &MissionMcap) -> Result<McapSummary, McapError> {
+pub fn write_mission<'a>(target: impl Into<Target<'a>>, mission: &MissionMcap<'_>) -> Result<McapSummary, McapError> {
+    let target = target.into();
     let (bytes, summary) = encode_mission(mission)?;
-    atomic::write(path, &bytes).map_err(|source| McapError::Io { path: path.to_owned(), source })?;
+    atomic::write(target, &bytes).map_err(|source| McapError::Io { path: target.path.to_owned(), source })?;
     Ok(summary)
 }
 
