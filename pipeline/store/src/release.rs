@@ -93,7 +93,9 @@ impl ReleaseError {
 
     fn not_a_release(path: &Path, reason: impl Into<String>) -> Self {
         let reason = match path.join(SHARD).is_file() {
-            true => "it is one shard of it; join the shards first: `sastrugi merge SHARD... -o RELEASE`".to_owned(),
+            true => {
+                "it is one shard of a release; join the shards first: `sastrugi merge SHARD... -o RELEASE`".to_owned()
+            }
             false => reason.into(),
         };
         Self::NotARelease { path: path.to_owned(), reason }
