@@ -96,7 +96,7 @@ pub struct Source {
 }
 
 /// A sentence about an item: a conversion, a rounded size, a warning of a fit.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ItemNote {
     /// Stage.

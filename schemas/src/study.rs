@@ -36,7 +36,7 @@ pub struct StudyHead {
     /// Licence of the release as an SPDX expression; it must be one that the licences of its DEMs permit.
     #[serde(default = "default_license")]
     pub license: String,
-    /// People or groups that made the study.
+    /// People or groups that made the study; people as `Family, Given` where citations shall tell the parts of their names apart.
     #[serde(default)]
     pub creators: Vec<String>,
     /// Those of the creators that are no people.

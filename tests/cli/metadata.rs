@@ -75,6 +75,46 @@ fn val_what_the_data_asks_for_goes_with_everything_made_from_it() {
     }
 }
 
+/// Files that were there before are read by the stages and made by none; people whose names are spelled alike stay two.
+#[test]
+fn val_the_crate_tells_what_was_given_from_what_was_made() {
+    let folder = area();
+    write(folder.path(), "plot.geojson", PLOT);
+    let masked = study("creators = [\"J. Doe\", \"J- Doe\"]\n", "").replacen(
+        "outer_scale_m = 4000.0\n",
+        "outer_scale_m = 4000.0\nmask = \"plot.geojson\"\n",
+        1,
+    );
+    write(folder.path(), "study.toml", &masked);
+    let call = sastrugi_in(folder.path(), &["run", "study.toml", "-o", "release", "--quiet"]);
+    assert_eq!(call.code, 0, "{}", call.stderr);
+    let text = read(&folder.path().join("release"), "ro-crate-metadata.json");
+    let graph = serde_json::from_str::<Value>(&text).unwrap()["@graph"].as_array().unwrap().clone();
+    let mut ids: Vec<&str> = graph.iter().map(|entity| entity["@id"].as_str().unwrap()).collect();
+    let count = ids.len();
+    ids.sort_unstable();
+    ids.dedup();
+    assert_eq!(ids.len(), count, "an id is there twice: {text}");
+    let people = graph.iter().filter(|entity| entity["@type"] == "Person");
+    assert_eq!(people.map(|person| &person["name"]).collect::<Vec<_>>(), ["J. Doe", "J- Doe"]);
+    let linked = |stage: &str, key: &str| -> Vec<&str> {
+        let action = graph.iter().find(|entity| entity["name"] == format!("stage {stage}"));
+        let linked = action.and_then(|action| action[key].as_array()).into_iter().flatten();
+        linked.filter_map(|entity| entity["@id"].as_str()).collect()
+    };
+    assert_eq!(linked("dem", "object"), ["dem/site.tif", "study.toml"]);
+    assert_eq!(linked("dem", "result"), ["dem/site.metric.tif"]);
+    assert_eq!(linked("fit", "object"), ["dem/site.metric.tif", "mask/fit-1.geojson", "study.toml"]);
+    assert_eq!(linked("terrain", "object"), ["study.toml"]);
+    for stage in ["original", "mask"] {
+        assert!(linked(stage, "result").is_empty(), "stage {stage} makes nothing: {text}");
+    }
+}
+
+/// West half of the fixture's window.
+const PLOT: &str = r#"{"type": "Polygon", "coordinates":
+    [[[-84.6, 36.4], [-84.2683, 36.4], [-84.2911, 36.7], [-84.6, 36.7], [-84.6, 36.4]]]}"#;
+
 /// A part for every terrain, in tables and shards alike; the same release from one run, from shards, and computed again.
 #[test]
 fn val_terrains_are_split_the_same_everywhere() {
@@ -111,6 +151,51 @@ fn val_terrains_are_split_the_same_everywhere() {
     write(path, "study.toml", &two.replace("[0.5, 0.25, 0.25]", "[0.25, 0.25, 0.5]"));
     let plan = sastrugi_in(path, &["plan", "study.toml", "-o", "release"]);
     assert!(plan.stdout.contains("0 to compute"), "{}", plan.stdout);
+}
+
+/// What a DEM's maker asks for, and how its heights are packed, decide no mission: the same release as from scratch, and only
+/// the packed file is made again.
+#[test]
+fn val_a_citation_drives_no_mission_again() {
+    let folder = area();
+    let path = folder.path();
+    let ok = |arguments: &[&str]| {
+        let call = sastrugi_in(path, &[arguments, &["--json", "--quiet"]].concat());
+        assert_eq!(call.code, 0, "{arguments:?}: {}{}", call.stdout, call.stderr);
+        serde_json::from_str::<Value>(&call.stdout).unwrap()
+    };
+    ok(&["terrain", "multifractal", "--set", "size_px=[320, 300]", "--seed", "7", "-o", "site.tif"]);
+    let study = "[study]\nname = \"cited\"\nseed = 7\ndate = \"2026-01-01\"\n\n\
+        [[dem]]\nid = \"site\"\nfile = \"site.tif\"\nlicense = \"CC0-1.0\"\nattribution = \"Agency\"\ncitation = \"Agency (2000)\"\n\n\
+        [[missions]]\nid = \"m\"\nterrains = [\"site\"]\ncount = 2\nlength_m = 5.0\nborder_m = 1.5\n\n\
+        [[traverse]]\nid = \"h\"\nmissions = \"m\"\n";
+    write(path, "study.toml", study);
+    let computed = |study: &str, output: &str| {
+        write(path, "study.toml", study);
+        ok(&["run", "study.toml", "-o", output])["computed"].as_u64().unwrap()
+    };
+    assert_eq!(computed(study, "release"), 5);
+    let cited = study.replace("CC0-1.0", "CC-BY-4.0").replace("Agency", "Survey").replace("(2000)", "(2001)");
+    assert_eq!(computed(&cited, "release"), 0);
+    let release = path.join("release");
+    let documents = [
+        "study.toml",
+        "README.md",
+        "CITATION.cff",
+        "LICENSE",
+        "croissant.json",
+        "ro-crate-metadata.json",
+        "manifest.json",
+    ];
+    for name in documents {
+        let text = read(&release, name);
+        assert!(text.contains("Survey (2001)") && !text.contains("Agency"), "{name}:\n{text}");
+    }
+    let packed = cited.replace("seed = 7\n", "seed = 7\ngeotiff = \"cog\"\n");
+    assert_eq!(computed(&packed, "release"), 1);
+    assert_eq!(computed(&packed, "fresh"), 5);
+    assert_eq!(sums(&release), sums(&path.join("fresh")));
+    assert_eq!(ok(&["verify", "release", "--recompute", "5"])["differences"], serde_json::json!([]));
 }
 
 fn text(value: &Value) -> String {

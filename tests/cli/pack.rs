@@ -93,6 +93,16 @@ fn val_only_whole_releases_are_packed() {
     refused(&["pack", "nowhere", "-o", "a.tar"], 65, "no release");
     fs::create_dir(path.join("empty")).unwrap();
     refused(&["pack", "empty", "-o", "a.tar"], 65, "no release");
+    let shard = sastrugi_in(path, &["run", "study.toml", "--shard", "1/2", "-o", "shard", "--quiet"]);
+    assert_eq!(shard.code, 0, "{}", shard.stderr);
+    for arguments in [
+        &["pack", "shard", "-o", "a.tar"][..],
+        &["compare", "shard", "release"],
+        &["info", "shard"],
+        &["verify", "shard"],
+    ] {
+        refused(arguments, 65, "join the shards first: `sastrugi merge");
+    }
     fs::write(path.join("release/README.md"), "changed").unwrap();
     refused(&["pack", "release", "-o", "a.tar"], 4, "README.md");
     assert!(!path.join("a.tar").exists());

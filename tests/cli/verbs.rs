@@ -212,13 +212,34 @@ fn val_plan_says_what_is_stale_and_why() {
     assert_eq!(plan["stale"].as_array().unwrap().len(), 6);
 }
 
-/// `schemas/published` holds what users rely on: the study's JSON Schema, the tables' columns. To refresh after a change of
+/// Every topic of both flavours with its message, and own messages with their fields; one topic by its name.
+#[test]
+fn val_schema_tells_of_topics() {
+    let folder = area();
+    let all = ok_json(folder.path(), &["schema", "topics"]);
+    assert_eq!((all["viewer"].as_array().unwrap().len(), all["ros2"].as_array().unwrap().len()), (11, 9));
+    let wheels = ok(folder.path(), &["schema", "/wheels"]);
+    assert!(
+        wheels.contains("sastrugi.Wheels") && wheels.contains("torque_n_m") && wheels.contains("in steps of"),
+        "{wheels}"
+    );
+    let both = ok_json(folder.path(), &["schema", "/imu"]);
+    assert_eq!((&both[0]["schema"], &both[1]["schema"]), (&"sastrugi.Imu".into(), &"sensor_msgs/msg/Imu".into()));
+    let call = sastrugi_in(folder.path(), &["schema", "/odometry"]);
+    assert!(call.code == 2 && call.stderr.contains("`sastrugi schema topics`"), "{} {}", call.code, call.stderr);
+}
+
+/// `schemas/published` holds what users rely on: the study's JSON Schema, the tables' columns, the topics. To refresh after a change of
 /// the contract: `SASTRUGI_REFRESH=1 cargo test --release -p sastrugi-tests --test cli published`.
 #[test]
 fn gold_published_schemas_are_current() {
     let folder = area();
     let published = sastrugi_fixtures::workspace_root().join("schemas/published");
-    for (file, arguments) in [("study.schema.json", ["schema", "study"]), ("tables.json", ["schema", "tables"])] {
+    for (file, arguments) in [
+        ("study.schema.json", ["schema", "study"]),
+        ("tables.json", ["schema", "tables"]),
+        ("topics.json", ["schema", "topics"]),
+    ] {
         let mut all = arguments.to_vec();
         all.push("--json");
         let now = ok(folder.path(), &all);

@@ -171,6 +171,58 @@ fn val_verify_recomputes_and_compares() {
     assert!(call.stdout.contains("tables/terrains"), "{}", call.stdout);
 }
 
+/// A manifest that was changed together with its sums: what it states of files, and of the release, is computed again.
+#[test]
+fn val_verify_names_what_a_changed_manifest_states() {
+    let folder = area();
+    release_in(folder.path());
+    let release = folder.path().join("release");
+    let recording = "mcap/rough-0001/husky-0001.mcap";
+    let of_files = [
+        ("classes/smooth.tif", "stage", "terrain".into()),
+        ("terrain/smooth.tif", "stream", "7/terrain/other".into()),
+        ("fit/fit.json", "parents", serde_json::json!(["dem/other"])),
+        ("fit/fit.json", "sources", serde_json::json!([])),
+        ("texture/tile.tif", "content_sha256", "00".into()),
+        (recording, "records", 1.into()),
+    ];
+    let of_release = [
+        ("name", "other".into()),
+        ("seed", 8.into()),
+        ("license", "CC0-1.0".into()),
+        ("study_sha256", "00".into()),
+        ("sources", serde_json::json!([])),
+        ("failed", serde_json::json!([{ "stage": "dem", "item": "site", "error": "bad", "parameters": null }])),
+        ("notes", serde_json::json!([{ "stage": "dem", "item": "site", "note": "good" }])),
+    ];
+    forge_manifest(&release, |manifest| {
+        for (path, key, value) in &of_files {
+            artifact_of(manifest, path)[*key] = value.clone();
+        }
+        for (key, value) in &of_release {
+            manifest[*key] = value.clone();
+        }
+        artifact_of(manifest, recording)["maker"] = "unknown".into();
+    });
+    assert_eq!(sastrugi_in(folder.path(), &["verify", "release", "--quiet"]).code, 0, "the forgery agrees with itself");
+    let verify = |count: &str| {
+        let call = sastrugi_in(folder.path(), &["verify", "release", "--recompute", count, "--quiet"]);
+        assert_eq!(call.code, 4, "{count}: {}{}", call.stdout, call.stderr);
+        call.stdout
+    };
+    let named = |said: &str, path: &str, key: &str| {
+        let sentence = format!("{path}: computed again, `{key}` differs");
+        assert!(said.contains(&sentence), "\"{sentence}\" is not said: {said}");
+    };
+    let (all, items) = (verify("all"), verify("19"));
+    // What no program of ours writes is seen when all is made again.
+    named(&all, recording, "maker");
+    for said in [all, items] {
+        of_files.iter().for_each(|(path, key, _)| named(&said, path, key));
+        of_release.iter().for_each(|(key, _)| named(&said, "manifest.json", key));
+    }
+}
+
 /// A release whose import failed holds the measured file, and can be made again from itself.
 #[test]
 fn val_a_failed_import_keeps_its_input() {
@@ -217,21 +269,31 @@ fn val_a_plan_only_looks() {
 
 /// Replaces a document and mends manifest and sums.
 fn forge(release: &Path, path: &str, text: &str) {
-    let old = sums(release)[path].clone();
-    let old_bytes = fs::metadata(release.join(path)).unwrap().len();
     fs::write(release.join(path), text).unwrap();
-    let new = sha256(text.as_bytes());
-    let manifest_path = release.join("manifest.json");
-    let manifest = fs::read_to_string(&manifest_path).unwrap();
-    let old_manifest = sha256(manifest.as_bytes());
-    let entry = manifest.find(&format!("\"path\": \"{path}\"")).unwrap();
-    let sizes = [old_bytes, text.len() as u64].map(|n| format!("\"bytes\": {n}"));
-    let entry = format!("{}{}", &manifest[..entry], manifest[entry..].replacen(&sizes[0], &sizes[1], 1));
-    let manifest = entry.replace(&old, &new);
-    fs::write(&manifest_path, &manifest).unwrap();
-    let sums_path = release.join("SHA256SUMS");
-    let list = fs::read_to_string(&sums_path).unwrap();
-    fs::write(&sums_path, list.replace(&old, &new).replace(&old_manifest, &sha256(manifest.as_bytes()))).unwrap();
+    forge_manifest(release, |manifest| {
+        let artifact = artifact_of(manifest, path);
+        artifact["bytes"] = text.len().into();
+        artifact["sha256"] = sha256(text.as_bytes()).into();
+    });
+}
+
+fn artifact_of<'a>(manifest: &'a mut Value, path: &str) -> &'a mut Value {
+    manifest["artifacts"].as_array_mut().unwrap().iter_mut().find(|a| a["path"] == path).unwrap()
+}
+
+/// Changes the manifest and mends the sums.
+fn forge_manifest(release: &Path, change: impl FnOnce(&mut Value)) {
+    let path = release.join("manifest.json");
+    let mut manifest: Value = serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
+    change(&mut manifest);
+    fs::write(&path, serde_json::to_string_pretty(&manifest).unwrap() + "\n").unwrap();
+    let text = |value: &Value| value.as_str().unwrap().to_owned();
+    let artifacts = manifest["artifacts"].as_array().unwrap().iter();
+    let mut sums: Vec<(String, String)> = artifacts.map(|a| (text(&a["path"]), text(&a["sha256"]))).collect();
+    sums.push(("manifest.json".to_owned(), sha256(&fs::read(&path).unwrap())));
+    sums.sort();
+    let lines = sums.iter().map(|(path, sha256)| format!("{sha256}  {path}\n"));
+    fs::write(release.join("SHA256SUMS"), lines.collect::<String>()).unwrap();
 }
 
 fn sha256(bytes: &[u8]) -> String {
@@ -334,9 +396,37 @@ fn val_a_recording_is_judged_as_its_mission() {
         let call = sastrugi_in(folder.path(), &["run", "study.toml", "-o", "release", "--quiet"]);
         assert_eq!(call.code, 0, "{}", call.stderr);
         recordings_are_judged_as_missions(folder.path());
+        if flavour == "ros2" {
+            bags_are_judged_as_their_files(folder.path());
+        }
         let call = sastrugi_in(folder.path(), &["verify", "release", "--recompute", "all", "--quiet"]);
         assert_eq!(call.code, 0, "{}", call.stderr);
     }
+}
+
+/// A bag is named by its folder; other folders are refused with what would be right.
+fn bags_are_judged_as_their_files(folder: &Path) {
+    let bag = "release/mcap/smooth/husky-0001";
+    let json = |arguments: &[&str]| -> Value {
+        let call = sastrugi_in(folder, &[arguments, &["--json"]].concat());
+        assert_eq!(call.code, 0, "{arguments:?}: {}", call.stderr);
+        serde_json::from_str(&call.stdout).unwrap()
+    };
+    let file = format!("{bag}/husky-0001.mcap");
+    let (mut of_bag, of_file) = (json(&["analyze", bag]), json(&["analyze", &file]));
+    assert_eq!(of_bag[0]["log"]["log_id"], bag);
+    of_bag[0]["log"]["log_id"] = file.as_str().into();
+    assert_eq!(of_bag, of_file);
+    let described = json(&["info", bag]);
+    assert_eq!((&described["what"], &described["husky-0001.mcap"]), (&"ROS 2 bag".into(), &json(&["info", &file])));
+    let refused = |words: &str| {
+        let call = sastrugi_in(folder, &["analyze", "bag"]);
+        assert!(call.code == 65 && call.stderr.contains(words), "{} {}", call.code, call.stderr);
+    };
+    fs::create_dir(folder.join("bag")).unwrap();
+    refused("name an .mcap file");
+    write(&folder.join("bag"), "metadata.yaml", "rosbag2_bagfile_information:\n  relative_file_paths:\n    - a.db3\n");
+    refused("`ros2 bag convert`");
 }
 
 fn recordings_are_judged_as_missions(folder: &Path) {

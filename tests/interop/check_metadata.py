@@ -7,10 +7,13 @@
 
 import fnmatch
 import hashlib
+import json
 import logging
 import re
 import warnings
+from pathlib import Path
 
+import cffconvert
 import mlcroissant
 import pyarrow.parquet as pq
 from cffconvert.cli.create_citation import create_citation
@@ -19,6 +22,8 @@ from ruamel.yaml import YAML
 
 from common import expect, manifest, run
 
+# Stages that only take files into the release.
+COPIES = {"original", "mask"}
 PARTS = ["train", "validation", "test"]
 # Tables of more files are a set of files only; their hashes are in the manifest.
 DESCRIBED_FILES = 64
@@ -76,17 +81,43 @@ def check_croissant(release):
     if "splits" in sets:
         parts = [record["splits/name"] for record in dataset.records("splits")]
         expect(sorted(map(plain, parts)) == sorted(PARTS), f"croissant.json: splits {parts}")
-    files = {file.content_url: file.sha256 for file in dataset.metadata.file_objects}
-    for folder in sorted((release / "tables").iterdir()):
-        parts = sorted(folder.glob("*.parquet"))
-        if len(parts) > DESCRIBED_FILES:
-            continue
-        for part in parts:
-            path = str(part.relative_to(release))
-            sha256 = hashlib.sha256(part.read_bytes()).hexdigest()
-            expect(files.pop(path, None) == sha256, f"croissant.json: the hash of {path} is wrong or missing")
-    expect(not files, f"croissant.json names {sorted(files)}")
+        check_references(release, sets)
+    check_distribution(release, dataset.metadata)
     return {"records": counts, "warnings": sorted(issues.warnings)}
+
+
+def check_references(release, sets):
+    """Every column that names a part refers to the record set of the parts."""
+    described = json.loads((release / "croissant.json").read_text())["recordSet"]
+    fields = {field["@id"]: field for record_set in described for field in record_set["field"]}
+    expect("cr:Split" in fields["splits/url"]["dataType"], "croissant.json: the parts are no cr:Split")
+    columns = [f"{name}/split" for name in sorted(sets) if f"{name}/split" in fields]
+    expect(columns, "croissant.json: no column names a part")
+    for column in columns:
+        field = fields[column]
+        refers = field.get("references") == {"field": {"@id": "splits/name"}} and "cr:Split" in field["dataType"]
+        expect(refers, f"croissant.json: {column} does not refer to splits/name")
+
+
+def check_distribution(release, metadata):
+    """Every file of the release is a file object with its hash, or in a set; every set has a file."""
+    objects = {file.content_url: file.sha256 for file in metadata.file_objects}
+    patterns = {file_set.id: file_set.includes for file_set in metadata.file_sets}
+    found = set()
+    for path in sorted(path for path in release.rglob("*") if path.is_file()):
+        name = str(path.relative_to(release))
+        holders = {key for key, includes in patterns.items() if any(fnmatch.fnmatchcase(name, one) for one in includes)}
+        found |= holders
+        if name in objects:
+            sha256 = hashlib.sha256(path.read_bytes()).hexdigest()
+            expect(objects.pop(name) == sha256, f"croissant.json: the hash of {name} is wrong")
+        else:
+            expect(holders, f"croissant.json: {name} is in no file object and no file set")
+            table = name.split("/")[1] if name.startswith("tables/") else None
+            parts = len(list((release / "tables" / table).glob("*.parquet"))) if table else DESCRIBED_FILES + 1
+            expect(parts > DESCRIBED_FILES, f"croissant.json: the hash of {name} is missing")
+    expect(not objects, f"croissant.json names {sorted(objects)}")
+    expect(found == set(patterns), f"croissant.json: no file is in {sorted(set(patterns) - found)}")
 
 
 def check_crate(release):
@@ -105,16 +136,61 @@ def check_crate(release):
             expect(linked, f"ro-crate-metadata.json: {action.id} has no {key}")
             unknown = [entity for entity in linked if isinstance(entity, str) or entity is None]
             expect(not unknown, f"ro-crate-metadata.json: {action.id}: {key} {unknown} is not described")
-    stages = {artifact["stage"] for artifact in manifest(release)["artifacts"]} - {""}
+    stages = {artifact["stage"] for artifact in manifest(release)["artifacts"]} - {"", *COPIES}
     named = {action["name"].removeprefix("stage ") for action in actions}
     expect(named == stages, f"ro-crate-metadata.json: actions {sorted(named)}, stages {sorted(stages)}")
+    check_provenance(release, actions)
     return {"entities": len(crate.get_entities()), "actions": sorted(named)}
 
 
+def check_provenance(release, actions):
+    """What each action read and made, against the parents in the manifest."""
+    artifacts = manifest(release)["artifacts"]
+    stage_of = {artifact["path"]: artifact["stage"] for artifact in artifacts}
+    ids = [entity["@id"] for entity in json.loads((release / "ro-crate-metadata.json").read_text())["@graph"]]
+    expect(len(ids) == len(set(ids)), "ro-crate-metadata.json: two entities have one id")
+
+    def linked(action, key):
+        entities = action[key]
+        return [entity.id for entity in (entities if isinstance(entities, list) else [entities])]
+
+    def stages_in(entity):
+        return {stage for path, stage in stage_of.items() if path == entity or (entity[-1] == "/" and path.startswith(entity))}
+
+    for action in actions:
+        stage = action["name"].removeprefix("stage ")
+        for entity in linked(action, "result"):
+            expect(stage in stages_in(entity), f"ro-crate-metadata.json: stage {stage} did not make {entity}")
+        if stage == "report":
+            continue
+        parts = set(stage.split("+"))
+        parents = {parent.split("/")[0] for a in artifacts if a["stage"] in parts for parent in a.get("parents", [])}
+        for entity in linked(action, "object"):
+            fits = entity == "study.toml" or (stages_in(entity) & parents and not entity.startswith("tables/"))
+            expect(fits, f"ro-crate-metadata.json: stage {stage} did not read {entity}")
+
+
 def check_citation(release):
+    """Valid; the licence where the format has it; the creators as Croissant names them, people as people."""
     citation = create_citation(str(release / "CITATION.cff"), None)
     citation.validate()
-    return citation.as_bibtex()
+    file = citation.cffobj
+    schema = json.loads((Path(cffconvert.__file__).parent / "schemas/1.2.0/schema.json").read_text())
+    known = schema["definitions"]["license-enum"]["enum"]
+    stated = manifest(release)["license"].split(" OR ")
+    named = file.get("license", [])
+    expected = stated if all(part in known for part in stated) else []
+    expect(([named] if isinstance(named, str) else named) == expected, f"CITATION.cff: license {named} for {stated}")
+    creators = json.loads((release / "croissant.json").read_text())["creator"]
+    for author, creator in zip(file["authors"], creators, strict=True):
+        person = creator["@type"] == "sc:Person"
+        given = [author[key] for key in ("family-names", "given-names") if key in author]
+        name = author.get("alias") or ", ".join(given) if person else author.get("name")
+        expect(name == creator["name"], f"CITATION.cff: {author} is not {creator}")
+    bibtex = citation.as_bibtex()
+    for author in file["authors"]:
+        expect(all(part in bibtex for part in author.values()), f"cffconvert does not name {author}: {bibtex}")
+    return {"bibtex": bibtex, "license": named, "license-url": file.get("license-url")}
 
 
 def check_card(release):

@@ -40,6 +40,14 @@ GRID_MAP = {
     ],
 }
 CELL_HEIGHT_TOLERANCE_M = 1e-3
+# Most cells along a side of the grid map.
+GRID_CELLS = 128
+NO_CLASS = 255
+WHEELS = ["front_left_wheel", "front_right_wheel", "rear_left_wheel", "rear_right_wheel"]
+# Steps of the table, as the topics of the other flavour state them: rad/s, N m. Commands are in none.
+COMMAND_STEP, SPIN_STEP, TORQUE_STEP = 1e-12, 1 / 1024, 1 / 64
+# Steps of simulated poses and motions, as the recording states them.
+POSE_STEP, RATE_STEP = 2**-20, 2**-16
 
 
 @functools.cache
@@ -131,6 +139,7 @@ def read_mcap(path):
         expect(header.profile == "ros2", f"{path} has the profile {header.profile}")
         for schema, channel, message, decoded in reader.iter_decoded_messages(log_time_order=False):
             expect(schema.encoding == "ros2msg", f"{path}: {channel.topic} has the schema encoding {schema.encoding}")
+            expect(channel.metadata.get("description"), f"{path}: {channel.topic} is not described")
             expect(channel.message_encoding == "cdr", f"{path}: {channel.topic} is {channel.message_encoding}")
             content.text(channel.topic)
             content.u64(message.log_time)
@@ -144,19 +153,23 @@ def stamp_ns(stamp):
 
 
 def check_same(path, ours, theirs):
-    """Both readers see the same values."""
-    for topic in ("/odom", "/imu", "/tf", "/cmd_vel", "/joint_states"):
+    """Both readers see the same values, on every topic."""
+    for topic in TOPICS:
         for (t, a), (u, b) in zip(ours[topic], theirs[topic], strict=True):
             expect(t == u and flat(a) == flat(b), f"{path}: the readers differ on {topic} at {t}")
 
 
 def flat(message):
-    """Every number and text of a message, in order."""
+    """Every number and text of a message, in order; NaN as None, which equals itself."""
     if isinstance(message, (int, float, str, bool)):
-        return [message]
-    if isinstance(message, (list, tuple, np.ndarray)):
-        return [x for part in message for x in flat(part.item() if isinstance(part, np.generic) else part)]
-    names = [n for n in getattr(message, "__slots__", None) or vars(message) if not n.startswith("__")]
+        return [message if message == message else None]
+    if isinstance(message, (bytes, np.ndarray)):
+        numbers = np.frombuffer(message, np.uint8) if isinstance(message, bytes) else message
+        return [None if x != x else x for x in numbers.tolist()]
+    if isinstance(message, (list, tuple)):
+        return [x for part in message for x in flat(part)]
+    # One of the readers holds a definition's constants, whose names are upper case, beside its fields.
+    names = [n for n in getattr(message, "__slots__", None) or vars(message) if not n.startswith("__") and not n.isupper()]
     return [x for name in names for x in flat(getattr(message, name))]
 
 
@@ -183,23 +196,92 @@ def check_motion(path, messages, samples, mission):
     expect(messages["/events"][-1][1].name == mission["outcome"], f"{path}: another outcome than in table missions")
 
 
-def check_terrain(path, messages, raster):
-    """The grid map and the cloud have the heights of the terrain, at their places."""
+def check_others(path, messages, samples):
+    """Commands and wheels are those of the table, as in the other flavour: there in the steps that its topics state. The IMU, which
+    no table has, turns with the odometry. Without an equivalent: angles turned by the wheels (in neither table nor odometry) and
+    specific forces; `analyze` judges them alike in both flavours.
+    """
+    start, odometry = messages["/odom"][0][0], dict(messages["/odom"])
+    rows = {round(row["time_s"] * 1e9) + start: row for row in samples}
+
+    def compare(topic, what, time, found, expected, step):
+        # Half a step is rounding; a billionth of it is the conversion of degrees.
+        off = np.abs(np.asarray(found) - np.asarray(expected)).max()
+        expect(off <= step / 2 * (1 + 1e-9), f"{path}: {what} of {topic} at {time} is {off} off")
+
+    for time, message in messages["/cmd_vel"]:
+        row, twist = rows[time], message.twist
+        compare("/cmd_vel", "speed", time, twist.linear.x, row["command_speed_m_s"], COMMAND_STEP)
+        yaw_rate = math.radians(row["command_yaw_rate_deg_s"])
+        compare("/cmd_vel", "yaw rate", time, twist.angular.z, yaw_rate, COMMAND_STEP)
+    for time, message in messages["/joint_states"]:
+        row = rows[time]
+        expect(list(message.name) == WHEELS, f"{path}: wheels {message.name}")
+        compare("/joint_states", "spin", time, message.velocity, row["wheel_spin_rad_s"], SPIN_STEP)
+        compare("/joint_states", "torque", time, message.effort, row["wheel_torque_n_m"], TORQUE_STEP)
+    shared = [(time, message, odometry[time]) for time, message in messages["/imu"] if time in odometry]
+    expect(len(shared) >= len(odometry) - 1, f"{path}: {len(shared)} of {len(odometry)} odometries have an IMU's message")
+    for time, message, odom in shared:
+        compare("/imu", "orientation", time, values(message.orientation), values(odom.pose.pose.orientation), POSE_STEP)
+        compare("/imu", "rate", time, values(message.angular_velocity), values(odom.twist.twist.angular), RATE_STEP)
+
+
+def bilinear(heights, col, row):
+    """Heights between the cell centres; beyond the outer ones, and beside cells without data, that of the cell."""
+    rows, cols = heights.shape
+    i, j = (np.clip(np.floor(at).astype(int), 0, n - 2) for at, n in ((col, cols), (row, rows)))
+    u, v = col - i, row - j
+    north, south = (heights[j + k, i] + (heights[j + k, i + 1] - heights[j + k, i]) * u for k in (0, 1))
+    between = north + (south - north) * v
+    outside = (col < 0) | (row < 0) | (col > cols - 1) | (row > rows - 1)
+    cell = heights[cells_at(row, rows), cells_at(col, cols)]
+    return np.where(outside | np.isnan(between), cell, between)
+
+
+def cells_at(position, count):
+    return np.clip(np.floor(position + 0.5).astype(int), 0, count - 1)
+
+
+def check_grid_map(path, message, raster, classes):
+    """Every cell of the grid map has the terrain's height at the place that the map states, and the class of the cell there.
+    Returns the size of its cells in cells of the terrain."""
     heights, to_map = raster
     rows, cols = heights.shape
-    info, layers = messages["/terrain"][0][1].info, messages["/terrain"][0][1]
-    expect(layers.layers == ["elevation", "class"], f"{path}: layers {layers.layers}")
-    dim = [(d.label, d.size, d.stride) for d in layers.data[0].layout.dim]
+    info, pose = message.info, message.info.pose
+    expect(message.layers == ["elevation", "class"], f"{path}: layers {message.layers}")
+    dim = [(d.label, d.size, d.stride) for d in message.data[0].layout.dim]
     ny, nx = dim[0][1], dim[1][1]
     expect(dim == [("column_index", ny, nx * ny), ("row_index", nx, nx)], f"{path}: layout {dim}")
+    expect(max(nx, ny) <= GRID_CELLS, f"{path}: the grid map has {nx} x {ny} cells")
+    expect((message.outer_start_index, message.inner_start_index) == (0, 0), f"{path}: the grid map is rolled")
+    expect(values(pose.orientation) == [0, 0, 0, 1], f"{path}: the grid map is turned")
+    expect(np.allclose((info.length_x, info.length_y), (nx * info.resolution, ny * info.resolution), rtol=1e-12, atol=0),
+           f"{path}: {nx} x {ny} cells of {info.resolution} m are {info.length_x} x {info.length_y} m")
+    corner = (pose.position.x - info.length_x / 2, pose.position.y + info.length_y / 2)
+    expect(np.allclose(corner, (to_map.c, to_map.f), rtol=0, atol=1e-6), f"{path}: the grid map begins at {corner}")
+    bare = (cols * to_map.a - info.length_x, rows * -to_map.e - info.length_y)
+    expect(all(-0.01 * info.resolution < b < info.resolution for b in bare), f"{path}: the grid map leaves {bare} m out")
     # Rows of a grid map run from the largest x, columns from the largest y.
-    elevation = np.asarray(layers.data[0].data).reshape(ny, nx)[:, ::-1]
-    if abs(info.resolution - to_map.a) < 1e-9:
-        expect(elevation.shape == heights.shape, f"{path}: the grid map has {elevation.shape} cells of {heights.shape}")
-        off = np.nanmax(np.abs(elevation - heights))
-        expect(off <= CELL_HEIGHT_TOLERANCE_M, f"{path}: the grid map is {off} m off")
-        corner = (info.pose.position.x - info.length_x / 2, info.pose.position.y + info.length_y / 2)
-        expect(np.allclose(corner, (to_map.c, to_map.f), rtol=0, atol=1e-6), f"{path}: the grid map begins at {corner}")
+    x = pose.position.x + info.length_x / 2 - (np.arange(nx) + 0.5) * info.resolution
+    y = pose.position.y + info.length_y / 2 - (np.arange(ny) + 0.5) * info.resolution
+    col, row = np.meshgrid((x - to_map.c) / to_map.a - 0.5, (y - to_map.f) / to_map.e - 0.5)
+    elevation, code = (np.asarray(layer.data, np.float32).reshape(ny, nx) for layer in message.data)
+    expected = bilinear(heights, col, row)
+    expect((np.isnan(elevation) == np.isnan(expected)).all(), f"{path}: the grid map has gaps in other places")
+    off = np.abs(elevation - expected)
+    # One unit in the last place of single precision; the places are good to far less than 1e-9 m.
+    fits = np.isnan(expected) | (off <= np.spacing(np.abs(expected).astype(np.float32)) + 1e-9)
+    expect(fits.all(), f"{path}: the grid map is {np.nanmax(off)} m off")
+    # A centre between cells may take either.
+    near = [classes[cells_at(row + v, rows), cells_at(col + u, cols)] for u in (-1e-6, 1e-6) for v in (-1e-6, 1e-6)]
+    found = np.where(np.isnan(code), NO_CLASS, code)
+    expect(np.any([found == one for one in near], axis=0).all(), f"{path}: the grid map has other classes")
+    return round(info.resolution / to_map.a, 6)
+
+
+def check_cloud(path, messages, raster):
+    """The cloud has the heights of the terrain, at their places."""
+    heights, to_map = raster
     origin = values(messages["/tf_static"][0][1].transforms[0].transform.translation)
     cloud = messages["/terrain/points"][0][1]
     expect(cloud.header.frame_id == messages["/tf_static"][0][1].transforms[0].child_frame_id, f"{path}: cloud's frame")
@@ -233,9 +315,13 @@ def check_release(release):
         messages = read_bag(path.parent, definitions)
         check_same(path, messages, theirs)
         check_motion(path, messages, samples[mission["terrain_id"], mission["mission_id"]], mission)
-        points = check_terrain(path, messages, raster(terrains[mission["terrain_id"]]))
+        check_others(path, messages, samples[mission["terrain_id"], mission["mission_id"]])
+        ground = raster(terrains[mission["terrain_id"]])
+        classes, _ = raster(release / "classes" / f"{mission['terrain_id']}.raw.tif")
+        cells = check_grid_map(path, messages["/terrain"][0][1], ground, classes)
+        points = check_cloud(path, messages, ground)
         report[mission["path"]] = {"messages": sum(map(len, messages.values())), "points": points,
-                                   "bytes": path.stat().st_size}
+                                   "grid_map_cell": cells, "bytes": path.stat().st_size}
     expect(report, f"{release} holds no mission")
     return report
 

@@ -36,18 +36,26 @@ fn val_readers_agree_with_a_release() {
     assert_eq!(call.code, 0, "{}{}", call.stdout, call.stderr);
 }
 
-/// Bags of ROS 2 as rosbags and mcap-ros2-support read them, and `analyze`: the same missions as in the viewer flavour.
+/// Bags of ROS 2 as rosbags and mcap-ros2-support read them, and `analyze`: the same missions as in the viewer flavour. Grid maps
+/// with the terrain's own cells, and with larger ones.
 #[test]
 fn val_ros_reads_the_bags() {
     let Some(python) = python() else { return };
     let folder = area();
-    write(folder.path(), "study.toml", &small_study().replace("seed = 7\n", "seed = 7\nmcap = \"ros2\"\n"));
+    let small = "size_px = [120, 100]\ncell_m = 0.2";
+    let study =
+        small_study().replace("seed = 7\n", "seed = 7\nmcap = \"ros2\"\n").replace("size_px = [280, 300]", small);
+    write(folder.path(), "study.toml", &study);
     let call = sastrugi_in(folder.path(), &["run", "study.toml", "-o", "release", "--quiet"]);
     assert_eq!(call.code, 0, "{}", call.stderr);
-    for script in ["check_ros2.py", "check_rerun.py"] {
-        let call = check(&python, script, &[&folder.path().join("release")]);
-        assert_eq!(call.code, 0, "{script}: {}{}", call.stdout, call.stderr);
-    }
+    let release = folder.path().join("release");
+    let bags = check(&python, "check_ros2.py", &[&release]);
+    assert_eq!(bags.code, 0, "{}{}", bags.stdout, bags.stderr);
+    let bags: Value = serde_json::from_str(&bags.stdout).unwrap();
+    let cells = |terrain: &str| bags[format!("mcap/{terrain}/husky-0001/husky-0001.mcap")]["grid_map_cell"].as_f64();
+    assert_eq!((cells("smooth"), cells("rough-0001")), (Some(1.0), Some(3.0)));
+    let call = check(&python, "check_rerun.py", &[&release]);
+    assert_eq!(call.code, 0, "{}{}", call.stdout, call.stderr);
 }
 
 /// `--cog` and `geotiff = "cog"`: valid for rio-cogeo, and the heights of the plain file.
@@ -99,6 +107,38 @@ fn val_a_table_of_many_files_is_one_set() {
     assert_eq!(call.code, 0, "{}{}", call.stdout, call.stderr);
 }
 
+/// Whatever the licence is called, cffconvert finds the citation valid, and the licence where the format has it.
+#[test]
+fn val_any_licence_makes_a_valid_citation() {
+    let Some(python) = python() else { return };
+    let folder = area();
+    for (license, named, url) in [
+        ("CC-BY-4.0", "\"CC-BY-4.0\"", "null"),
+        ("MIT OR Apache-2.0", "[\"MIT\",\"Apache-2.0\"]", "null"),
+        ("DL-DE-BY-2.0", "[]", "\"https://spdx.org/licenses/DL-DE-BY-2.0\""),
+        ("https://example.org/terms", "[]", "\"https://example.org/terms\""),
+        ("proprietary", "[]", "null"),
+    ] {
+        let head = format!(
+            "license = \"{license}\"\ncreators = [\"Doe, Jane\", \"J. Doe\", \"A group\"]\norganizations = [\"A group\"]\n"
+        );
+        let study = MANY_TERRAINS.split("[[missions]]").next().unwrap().replace("count = 66\n", "");
+        write(folder.path(), "study.toml", &study.replace("license = \"CC-BY-4.0\"\n", &head));
+        let call = sastrugi_in(folder.path(), &["run", "study.toml", "-o", "release"]);
+        assert_eq!(call.code, 0, "{}", call.stderr);
+        let listed = ["https://example.org/terms", "proprietary"].iter().all(|unlisted| *unlisted != license);
+        assert_eq!(call.stderr.contains("is not in the SPDX list"), !listed, "{license}: {}", call.stderr);
+        let call = check(&python, "check_metadata.py", &[&folder.path().join("release")]);
+        assert_eq!(call.code, 0, "{license}: {}{}", call.stdout, call.stderr);
+        let found: Value = serde_json::from_str(&call.stdout).unwrap();
+        let citation = &found["citation"];
+        assert_eq!(
+            (citation["license"].to_string(), citation["license-url"].to_string()),
+            (named.to_owned(), url.to_owned())
+        );
+    }
+}
+
 /// Smooth terrains of 13 m, driven for half a second each.
 const MANY_TERRAINS: &str = "[study]\nname = \"many\"\nseed = 7\ndate = \"2026-11-22\"\nlicense = \"CC-BY-4.0\"\n\n\
     [[terrain]]\nid = \"t\"\nkind = \"weierstrass_mandelbrot\"\ncount = 66\nsize_px = [64, 64]\ncell_m = 0.2\n\
@@ -109,7 +149,7 @@ const MANY_TERRAINS: &str = "[study]\nname = \"many\"\nseed = 7\ndate = \"2026-1
 /// The small study with all that a release can say of itself: version and DOI, terms of its data, a split.
 fn described_study() -> String {
     let head = "seed = 7\ntitle = \"Small: \\\"rough\\\" & smooth\"\nversion = \"1.0.0\"\ndoi = \"10.5281/zenodo.1234567\"\n\
-        creators = [\"A. Person\", \"A group\"]\norganizations = [\"A group\"]\nsplit = [0.4, 0.3, 0.3]\n";
+        creators = [\"Person, A.\", \"A group\"]\norganizations = [\"A group\"]\nsplit = [0.4, 0.3, 0.3]\n";
     let dem =
         "id = \"site\"\nlicense = \"public domain\"\nattribution = \"NASA and USGS\"\ncitation = \"SRTM (2000)\"\n";
     let study = small_study().replace("seed = 7\n", head).replace("id = \"site\"\n", dem);
@@ -241,7 +281,7 @@ fn find<'a>(answer: &'a Value, name: &str) -> Option<&'a Value> {
 
 /// Logs by the writers of mcap-ros2-support, rosbags and mcap-protobuf-support have the figures that numpy takes from the same
 /// motion (interpolation and differences alike; angles to the rounding of the interpolated quaternions' lengths), whichever
-/// messages carry it; bad ones are refused by name.
+/// messages carry it; bags are named by their folder, one file or several; bad ones are refused by name.
 #[test]
 fn val_logs_of_other_writers_are_judged_alike() {
     let Some(python) = python() else { return };

@@ -5,6 +5,7 @@ JSON: for each log the figures expected of `analyze`.
 """
 
 import json
+import shutil
 import sys
 from pathlib import Path
 
@@ -127,6 +128,18 @@ def write_bag(folder, stamps, positions, quaternions):
     return next(Path(folder).glob("*.mcap"))
 
 
+def write_split_bag(folder, messages, parts=11):
+    """A bag of several files, whose order is not that of their names' letters."""
+    folder.mkdir()
+    names = [f"split_{k}.mcap" for k in range(parts)]
+    size = -(-len(messages) // parts)
+    for k, name in enumerate(names):
+        write_ros2(folder / name, "/odom", "nav_msgs/msg/Odometry", messages[k * size : (k + 1) * size])
+    listed = "".join(f"    - {name}\n" for name in names)
+    text = f"rosbag2_bagfile_information:\n  version: 5\n  storage_identifier: mcap\n  relative_file_paths:\n{listed}"
+    (folder / "metadata.yaml").write_text(text)
+
+
 def write_foxglove(path, stamps, positions, quaternions):
     with open(path, "wb") as stream, ProtobufWriter(stream) as writer:
         for ns, p, q in zip(stamps, positions, quaternions):
@@ -169,8 +182,9 @@ def main(folder):
     tf = [(ns, {"transforms": [transform_dict(ns, "odom", "base_link", p, q)]}) for ns, p, q in rows]
     tf[0][1]["transforms"].append(transform_dict(rows[0][0], "map", "odom", (0.0, 0.0, 3.0), (0.0, 0.0, 0.0, 1.0)))
     write_ros2(folder / "tf.mcap", "/tf", "tf2_msgs/msg/TFMessage", tf)
-    bag = write_bag(folder / "bag", stamps, positions, quaternions)
-    bag.rename(folder / "pose_stamped.mcap")
+    bag = write_bag(folder / "bag.mcap", stamps, positions, quaternions)
+    shutil.copy(bag, folder / "pose_stamped.mcap")
+    write_split_bag(folder / "split.mcap", [(ns, odometry(ns, p, q)) for ns, p, q in rows])
     write_foxglove(folder / "pose_in_frame.mcap", stamps, positions, quaternions)
     write_foxglove_tf(folder / "frame_transforms.mcap", stamps, positions, quaternions)
 
@@ -184,7 +198,7 @@ def main(folder):
     damaged[len(damaged) // 2] ^= 0xFF
     (folder / "damaged.mcap").write_bytes(bytes(damaged))
     (folder / "text.mcap").write_text("not an MCAP file at all\n")
-    print(json.dumps({name: figures for name in ("odometry", "tf", "pose_stamped", "pose_in_frame", "frame_transforms")}))
+    print(json.dumps({name: figures for name in ("odometry", "tf", "pose_stamped", "pose_in_frame", "frame_transforms", "bag", "split")}))
 
 
 main(Path(sys.argv[1]))

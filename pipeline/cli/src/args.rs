@@ -116,7 +116,7 @@ pub enum Verb {
     #[command(after_help = "Examples:\n  sastrugi kinds\n  sastrugi kinds multifractal")]
     Kinds(Kinds),
     /// Print the JSON Schema of study files, or the columns of a table.
-    #[command(after_help = "Examples:\n  sastrugi schema\n  sastrugi schema missions")]
+    #[command(after_help = "Examples:\n  sastrugi schema\n  sastrugi schema missions\n  sastrugi schema /wheels")]
     Schema(Schema),
     /// Print shell completions.
     #[command(
@@ -437,7 +437,7 @@ pub struct Report {
 /// `analyze`.
 #[derive(Debug, Args)]
 pub struct Analyze {
-    /// MCAP logs.
+    /// MCAP logs; folders of ROS 2 bags.
     #[arg(required = true, value_name = "MCAP")]
     pub logs: Vec<PathBuf>,
     /// Topic of the poses; the best one when absent.
@@ -589,7 +589,7 @@ pub struct Kinds {
 /// `schema`.
 #[derive(Debug, Args)]
 pub struct Schema {
-    /// `study` (default), `tables`, or the name of a table.
+    /// `study` (default), `tables`, `topics`, or the name of a table or topic.
     pub name: Option<String>,
 }
 

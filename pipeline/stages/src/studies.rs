@@ -1,7 +1,7 @@
 //! What a command does with a whole study: run, plan, merge. What it does with a release is in [`crate::verification`].
 
 use crate::error::{Error, of_build};
-use crate::jobs::{ItemRef, mask, original};
+use crate::jobs::{ItemRef, original};
 use crate::registry::{self, Plan};
 use crate::runner::assemble::{Contents, assemble};
 use crate::runner::cache::Cache;
@@ -153,12 +153,12 @@ pub fn run(loaded: &Loaded, request: &RunRequest<'_>, progress: &dyn Progress) -
 
 /// Files are only copied: with nothing else there is no release to make.
 fn is_worth_a_release(stage: &str, purpose: Option<&str>) -> bool {
-    purpose.map_or(![original::STAGE, mask::STAGE].contains(&stage), |purpose| purpose == stage)
+    purpose.map_or(!original::only_copies(stage), |purpose| purpose == stage)
 }
 
 /// A folder that is not ours is refused before any work is done.
 fn check_destination(request: &RunRequest<'_>) -> Result<(), Error> {
-    let ours = if request.part.is_some() { "shard.json" } else { release::MANIFEST };
+    let ours = if request.part.is_some() { release::SHARD } else { release::MANIFEST };
     match fs::read_dir(request.output).map(|mut entries| entries.next().is_some()) {
         Ok(true) if !request.output.join(ours).is_file() => {
             let what = if request.part.is_some() { "shard" } else { "release" };
@@ -197,7 +197,8 @@ pub fn resolved(path: &Path) -> PathBuf {
     })
 }
 
-fn located(graph: &Graph, cache: &Cache, execution: &Execution, position: usize) -> (ItemRef, Option<PathBuf>) {
+/// The item at a position with the folder of its result, where it has one.
+pub fn located(graph: &Graph, cache: &Cache, execution: &Execution, position: usize) -> (ItemRef, Option<PathBuf>) {
     let item = graph.node(position).item.clone();
     let done = execution.done.binary_search(&position).is_ok();
     let folder = done.then(|| cache.result_folder(&item, graph.key(position)));

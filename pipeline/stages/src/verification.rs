@@ -2,19 +2,25 @@
 
 use crate::error::Error;
 use crate::jobs::{ItemRef, Rows, traverse};
-use crate::runner::assemble::release_error;
+use crate::runner::assemble::{Contents, artifacts, notes, release_error};
 use crate::runner::cache::{Cache, Record};
 use crate::runner::execute::{Limits, execute};
 use crate::runner::progress::Progress;
+use crate::runner::sources::Sources;
 use crate::splits;
-use crate::studies::{Loaded, RunRequest, load, run};
+use crate::studies::{Loaded, RunRequest, load, located, run};
 use sastrugi_schemas::Record as Row;
+use sastrugi_schemas::manifest::{Artifact, ItemNote, Manifest};
 use sastrugi_schemas::tables::SampleRow;
-use sastrugi_store::release::{self, Problem, ProblemKind, Release, VerifyReport};
+use sastrugi_store::release::{self, Head, MANIFEST, Problem, ProblemKind, Release, VerifyReport};
 use serde::Serialize;
+use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
+
+/// Key of a manifest's list of files.
+const ARTIFACTS: &str = "artifacts";
 
 /// Which items to compute again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -131,24 +137,57 @@ fn recompute_all(
     let output = scratch.join("release");
     let work = scratch.join("work");
     run(loaded, &RunRequest { output: &output, work: Some(&work), part: None, purpose: None, limits }, progress)?;
-    let again = Release::open(&output).map_err(release_error)?;
     verification.recomputed = loaded.graph.nodes().iter().map(|n| n.item.to_string()).collect();
-    let sums = |r: &Release| -> BTreeMap<String, String> {
-        r.manifest().artifacts.iter().map(|a| (a.path.clone(), a.sha256.clone())).collect()
-    };
-    verification.differences.extend(compare_sums(&sums(release), &sums(&again)));
+    let (there, here) = (manifest_in(release.folder())?, manifest_in(&output)?);
+    verification.differences.extend(compare_manifests(&there, &here));
     Ok(())
 }
 
-fn compare_sums(there: &BTreeMap<String, String>, here: &BTreeMap<String, String>) -> Vec<Difference> {
-    let paths: BTreeSet<&String> = there.keys().chain(here.keys()).collect();
-    let problem = |path: &&String| match (there.get(*path), here.get(*path)) {
-        (Some(a), Some(b)) if a == b => None,
-        (Some(_), Some(_)) => Some("computed again, its bytes differ"),
-        (Some(_), None) => Some("computed again, it does not appear"),
-        _ => Some("computed again, it appears, and is not in the release"),
-    };
-    paths.iter().filter_map(|p| Some(Difference { path: (*p).clone(), problem: problem(p)?.to_owned() })).collect()
+/// The manifest in a folder with all that its text holds, known to this program or not.
+fn manifest_in(folder: &Path) -> Result<Value, Error> {
+    let path = folder.join(MANIFEST);
+    let text = fs::read(&path).map_err(|e| Error::failed(format!("{}: {e}", path.display())))?;
+    serde_json::from_slice(&text).map_err(|e| Error::Input(format!("{}: {e}", path.display())))
+}
+
+/// Every file and every statement of a manifest that is not what is computed again.
+fn compare_manifests(there: &Value, here: &Value) -> Vec<Difference> {
+    let (files_there, files_here) = (files_of(there), files_of(here));
+    let paths: BTreeSet<&str> = files_there.keys().chain(files_here.keys()).copied().collect();
+    let of_files = paths.into_iter().flat_map(|p| compare_files(p, files_there.get(p), files_here.get(p)));
+    let of_head = differing_keys(there, here).into_iter().filter(|key| key != ARTIFACTS);
+    let mut differences: Vec<Difference> = of_files.chain(of_head.map(|key| stated(MANIFEST, &key))).collect();
+    if differences.is_empty() && there != here {
+        differences.push(stated(MANIFEST, ARTIFACTS));
+    }
+    differences
+}
+
+/// What a manifest says of each file, by path.
+fn files_of(manifest: &Value) -> BTreeMap<&str, &Value> {
+    let artifacts = manifest[ARTIFACTS].as_array().into_iter().flatten();
+    artifacts.filter_map(|artifact| Some((artifact["path"].as_str()?, artifact))).collect()
+}
+
+fn compare_files(path: &str, there: Option<&&Value>, here: Option<&&Value>) -> Vec<Difference> {
+    let difference = |problem: &str| vec![Difference { path: path.to_owned(), problem: problem.to_owned() }];
+    match (there, here) {
+        (Some(a), Some(b)) if a["sha256"] != b["sha256"] => difference("computed again, its bytes differ"),
+        (Some(a), Some(b)) => differing_keys(a, b).iter().map(|key| stated(path, key)).collect(),
+        (Some(_), None) => difference("computed again, it does not appear"),
+        _ => difference("computed again, it appears, and is not in the release"),
+    }
+}
+
+/// The difference of a statement in the manifest.
+fn stated(path: &str, key: &str) -> Difference {
+    let problem = format!("computed again, `{key}` differs from what {MANIFEST} states");
+    Difference { path: path.to_owned(), problem }
+}
+
+fn differing_keys(there: &Value, here: &Value) -> BTreeSet<String> {
+    let keys = [there, here].into_iter().filter_map(Value::as_object).flat_map(|object| object.keys());
+    keys.filter(|key| there.get(key.as_str()) != here.get(key.as_str())).cloned().collect()
 }
 
 fn recompute_some(
@@ -175,24 +214,58 @@ fn recompute_some(
             problem: format!("cannot be computed again: {}", f.message),
         }),
     );
-    let there: BTreeMap<&str, &str> =
-        release.manifest().artifacts.iter().map(|a| (a.path.as_str(), a.sha256.as_str())).collect();
+    let items = (0..graph.len()).map(|p| located(graph, &cache, &execution, p)).collect();
+    let Loaded { study, released: text, splits, .. } = loaded;
+    let contents = Contents { study, text, splits, items, failures: &execution.failures };
+    let mut again = Again { sources: Sources::of(&contents)?, ..Again::default() };
     for position in chosen {
         let item = &graph.node(position).item;
         let Some(mut record) = cache.load(item, graph.key(position)) else { continue };
-        splits::fill(&mut record.rows, &loaded.splits);
+        again.add(&record);
+        splits::fill(&mut record.rows, splits);
         verification.recomputed.push(item.to_string());
-        verification.differences.extend(compare_files(&there, &record));
         let samples = cache.result_folder(item, &record.key).join(traverse::SAMPLES);
         verification.differences.extend(compare_tables(release, record.rows, &samples)?);
     }
+    verification.differences.extend(again.compare(release.manifest(), contents.head())?);
     Ok(())
 }
 
-fn compare_files(there: &BTreeMap<&str, &str>, record: &Record) -> Vec<Difference> {
-    let released = record.files.iter().filter_map(|f| Some((f.product.release_path.clone()?, f.sha256.as_str())));
-    let differing = released.filter(|(path, sha256)| there.get(path.as_str()) != Some(sha256));
-    differing.map(|(path, _)| Difference { path, problem: "computed again, its bytes differ".to_owned() }).collect()
+/// What a manifest says of some items, computed again.
+#[derive(Default)]
+struct Again {
+    sources: Sources,
+    items: BTreeSet<ItemRef>,
+    artifacts: Vec<Artifact>,
+    notes: Vec<ItemNote>,
+}
+
+impl Again {
+    fn add(&mut self, record: &Record) {
+        self.items.insert(record.item.clone());
+        self.artifacts.extend(artifacts(record, &self.sources));
+        self.notes.extend(notes(record));
+    }
+
+    /// Compares the release's manifest with itself after its lines on these items are replaced.
+    fn compare(self, there: &Manifest, head: Head) -> Result<Vec<Difference>, Error> {
+        let Self { sources, items, artifacts, mut notes } = self;
+        let others = |stage: &str, item: &str| !items.contains(&ItemRef::new(stage, item));
+        notes.extend(sources.notes.into_iter().filter(|n| !others(&n.stage, &n.item)));
+        let Head { name, study_sha256, seed, version, license } = head;
+        let mut here = Manifest { name, study_sha256, seed, version, license, sources: sources.list, ..there.clone() };
+        here.artifacts.retain(|a| others(&a.origin.stage, &a.origin.item));
+        here.artifacts.extend(artifacts);
+        here.notes.retain(|n| others(&n.stage, &n.item));
+        here.notes.extend(notes);
+        here.failed.retain(|f| others(&f.stage, &f.item));
+        let value = |mut manifest: Manifest| {
+            manifest.artifacts.sort_by(|a, b| a.path.cmp(&b.path));
+            manifest.notes.sort();
+            serde_json::to_value(manifest).map_err(Error::failed)
+        };
+        Ok(compare_manifests(&value(there.clone())?, &value(here)?))
+    }
 }
 
 /// Compares an item's rows with the tables; `samples` is the file of its samples, where it has one.

@@ -9,9 +9,41 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// Start of the name of every file under construction; no artifact's name starts with a dot.
 const TEMPORARY_PREFIX: &str = ".sastrugi-partial-";
 
-/// Start of the name of a folder under construction. Who makes it brings its entries to disk, once, before it gets its
-/// name; so its files are not brought there name by name.
-pub const UNFINISHED: &str = "unfinished-";
+/// Where a file goes, and who brings its name to disk: the file itself, unless it goes into a [`Draft`].
+#[derive(Clone, Copy, Debug)]
+pub struct Target<'a> {
+    /// Path of the file.
+    pub path: &'a Path,
+    in_draft: bool,
+}
+
+impl<'a, P: AsRef<Path> + ?Sized> From<&'a P> for Target<'a> {
+    fn from(path: &'a P) -> Self {
+        Self { path: path.as_ref(), in_draft: false }
+    }
+}
+
+impl<'a> From<&'a DraftFile> for Target<'a> {
+    fn from(file: &'a DraftFile) -> Self {
+        Self { path: &file.0, in_draft: true }
+    }
+}
+
+/// A folder under construction. Who makes it brings its entries to disk ([`sync_folder`]), once, before it gets its name; so its
+/// files are not brought there name by name.
+#[derive(Clone, Copy, Debug)]
+pub struct Draft<'a>(pub &'a Path);
+
+impl Draft<'_> {
+    /// A file of the folder.
+    pub fn file(&self, name: &str) -> DraftFile {
+        DraftFile(self.0.join(name))
+    }
+}
+
+/// A file of a [`Draft`].
+#[derive(Clone, Debug)]
+pub struct DraftFile(PathBuf);
 
 /// A file under construction. Dropped without [`AtomicFile::commit`], it leaves nothing behind.
 #[derive(Debug)]
@@ -19,18 +51,21 @@ pub struct AtomicFile {
     writer: Option<BufWriter<File>>,
     temporary: PathBuf,
     path: PathBuf,
+    in_draft: bool,
 }
 
 impl AtomicFile {
-    /// Starts a file that will appear as `path`; missing folders are made.
+    /// Starts a file that will appear at `target`; missing folders are made.
     ///
     /// # Errors
     /// The folder cannot be made or written to.
-    pub fn create(path: &Path) -> io::Result<Self> {
+    pub fn create<'a>(target: impl Into<Target<'a>>) -> io::Result<Self> {
+        let Target { path, in_draft } = target.into();
         let folder = folder_of(path);
         fs::create_dir_all(folder)?;
         let (file, temporary) = temporary_file(folder)?;
-        Ok(Self { writer: Some(BufWriter::with_capacity(1 << 16, file)), temporary, path: path.to_owned() })
+        let writer = Some(BufWriter::with_capacity(1 << 16, file));
+        Ok(Self { writer, temporary, path: path.to_owned(), in_draft })
     }
 
     /// Brings the file to disk and gives it its name.
@@ -43,8 +78,7 @@ impl AtomicFile {
         file.sync_all()?;
         drop(file);
         fs::rename(&self.temporary, &self.path)?;
-        let folder = folder_of(&self.path);
-        if is_unfinished(folder) { Ok(()) } else { sync_folder(folder) }
+        if self.in_draft { Ok(()) } else { sync_folder(folder_of(&self.path)) }
     }
 
     fn writer(&mut self) -> io::Result<&mut BufWriter<File>> {
@@ -78,8 +112,8 @@ impl Drop for AtomicFile {
 ///
 /// # Errors
 /// The file system refused.
-pub fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    let mut file = AtomicFile::create(path)?;
+pub fn write<'a>(target: impl Into<Target<'a>>, bytes: &[u8]) -> io::Result<()> {
+    let mut file = AtomicFile::create(target)?;
     file.write_all(bytes)?;
     file.commit()
 }
@@ -90,10 +124,6 @@ pub fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
 /// The file system refused.
 pub fn sync_folder(folder: &Path) -> io::Result<()> {
     File::open(folder)?.sync_all()
-}
-
-fn is_unfinished(folder: &Path) -> bool {
-    folder.file_name().is_some_and(|name| name.to_string_lossy().starts_with(UNFINISHED))
 }
 
 fn folder_of(path: &Path) -> &Path {
@@ -154,6 +184,19 @@ mod tests {
         write(&path, b"again").unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"again");
         assert_eq!(fs::read_dir(folder.path().join("a")).unwrap().count(), 1);
+    }
+
+    /// Who brings a name to disk goes by the type, whatever the folder is called.
+    #[test]
+    fn val_only_drafts_leave_names_to_their_folder() {
+        let folder = tempfile::tempdir().unwrap();
+        let unfinished = folder.path().join("unfinished-1");
+        let draft = Draft(&unfinished);
+        let of = |target: Target<'_>| (target.path.to_owned(), target.in_draft);
+        assert_eq!(of((&draft.file("a")).into()), (unfinished.join("a"), true));
+        assert_eq!(of((&unfinished.join("a")).into()), (unfinished.join("a"), false));
+        write(&draft.file("a"), b"whole").unwrap();
+        assert_eq!(fs::read(unfinished.join("a")).unwrap(), b"whole");
     }
 
     #[test]

@@ -8,7 +8,7 @@
 mod tests;
 
 use crate::PROGRAM;
-use crate::atomic::AtomicFile;
+use crate::atomic::{AtomicFile, Target};
 use crate::digest::ContentHash;
 use arrow_array::builder::{BooleanBuilder, Float32Builder, Float64Builder, Int64Builder, ListBuilder, StringBuilder};
 use arrow_array::types::{ArrowPrimitiveType, Float32Type, Float64Type};
@@ -207,11 +207,13 @@ impl<R: Record> TableWriter<R> {
     ///
     /// # Errors
     /// The file cannot be made.
-    pub fn create(path: &Path, metadata: &TableMetadata) -> Result<Self, TableError> {
+    pub fn create<'a>(target: impl Into<Target<'a>>, metadata: &TableMetadata) -> Result<Self, TableError> {
+        let target = target.into();
+        let path = target.path;
         let encoding = |source| TableError::Encoding { path: path.to_owned(), source };
         let table = R::TABLE;
         let schema = schema(&table);
-        let file = AtomicFile::create(path).map_err(|e| TableError::io(path, e))?;
+        let file = AtomicFile::create(target).map_err(|e| TableError::io(path, e))?;
         let properties = properties(&table, metadata).map_err(encoding)?;
         let writer = ArrowWriter::try_new(file, schema.clone(), Some(properties)).map_err(encoding)?;
         Ok(Self {

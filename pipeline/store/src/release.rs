@@ -23,6 +23,8 @@ use std::path::{Path, PathBuf};
 pub const MANIFEST: &str = "manifest.json";
 /// Name of the list of checksums in a release, in the form of `sha256sum`.
 pub const SUMS: &str = "SHA256SUMS";
+/// What a folder has that is one shard of a release.
+pub const SHARD: &str = "shard.json";
 /// Folder of the tables in a release.
 pub const TABLES: &str = "tables";
 
@@ -90,7 +92,13 @@ impl ReleaseError {
     }
 
     fn not_a_release(path: &Path, reason: impl Into<String>) -> Self {
-        Self::NotARelease { path: path.to_owned(), reason: reason.into() }
+        let reason = match path.join(SHARD).is_file() {
+            true => {
+                "it is one shard of a release; join the shards first: `sastrugi merge SHARD... -o RELEASE`".to_owned()
+            }
+            false => reason.into(),
+        };
+        Self::NotARelease { path: path.to_owned(), reason }
     }
 }
 

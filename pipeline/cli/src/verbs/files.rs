@@ -7,6 +7,7 @@ use crate::failure::{Code, Failure};
 use crate::output::{columns, print};
 use sastrugi_stages::verbs::{Read, Reading, describe_grid, numbers, read_as_it_is, transects};
 use sastrugi_store::dem::{self, Dem, DemError};
+use sastrugi_store::mcap;
 use sastrugi_store::release::Release;
 use sastrugi_store::transect::Transects;
 use serde_json::{Value, json};
@@ -44,8 +45,9 @@ pub fn convert(args: &Convert, common: &Common) -> Verdict {
 pub fn info(args: &Info, common: &Common) -> Verdict {
     let extension = args.path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
     let result = match extension.as_str() {
+        _ if args.path.join(mcap::BAG).is_file() => mcap::describe_bag(&args.path).map_err(Failure::input)?,
         _ if args.path.is_dir() => release(&args.path)?,
-        "mcap" => sastrugi_store::mcap::describe_file(&args.path).map_err(Failure::input)?,
+        "mcap" => mcap::describe_file(&args.path).map_err(Failure::input)?,
         "parquet" => sastrugi_store::parquet::describe_file(&args.path).map_err(Failure::input)?,
         "json" => fit(&args.path)?,
         _ => raster(&args.path, &args.reading)?,

@@ -5,6 +5,8 @@ use crate::args::{Arguments, Common, Completions, Kinds, Schema};
 use crate::failure::{Code, Failure};
 use crate::output::{columns, print};
 use clap::CommandFactory;
+use sastrugi_schemas::topics::ros2::ROS2;
+use sastrugi_schemas::topics::{self, Field, Topic};
 use sastrugi_schemas::{Kind, Table, tables};
 use sastrugi_stages::registry;
 use sastrugi_stages::study::keys::nearest;
@@ -73,15 +75,42 @@ pub fn schema(args: &Schema, common: &Common) -> Verdict {
             let text: Vec<String> = tables::ALL.iter().map(|t| describe_table(t)).collect();
             print(common.json, &json!(tables::ALL), &text.join("\n\n"))?;
         }
+        Some("topics") => {
+            let of = |flavour: &str, topics: &[&Topic]| {
+                let described: Vec<String> = topics.iter().map(|t| describe_topic(t)).collect();
+                format!("mcap = \"{flavour}\"\n\n{}", described.join("\n\n"))
+            };
+            let text = [of("viewer", &topics::VIEWER), of("ros2", &ROS2)].join("\n\n");
+            print(common.json, &json!({ "viewer": topics::VIEWER, "ros2": ROS2 }), &text)?;
+        }
+        Some(name) if name.starts_with('/') => {
+            let found: Vec<&Topic> = topics::VIEWER.into_iter().chain(ROS2).filter(|t| t.name == name).collect();
+            if found.is_empty() {
+                return Err(Failure::usage(format!("there is no topic `{name}`; `sastrugi schema topics` lists them")));
+            }
+            let text: Vec<String> = found.iter().map(|t| describe_topic(t)).collect();
+            print(common.json, &json!(found), &text.join("\n\n"))?;
+        }
         Some(name) => {
             let table = tables::by_name(name).ok_or_else(|| {
                 let known: Vec<&str> = tables::ALL.iter().map(|t| t.name).collect();
-                Failure::usage(format!("there is no schema `{name}`; there are study, tables, {}", known.join(", ")))
+                let known = known.join(", ");
+                Failure::usage(format!("there is no schema `{name}`; there are study, tables, topics, {known}"))
             })?;
             print(common.json, &json!(table), &describe_table(table))?;
         }
     }
     Ok(Code::Done)
+}
+
+fn describe_topic(topic: &Topic) -> String {
+    let row = |field: &Field| {
+        let kind = format!("{:?}", field.kind).to_lowercase();
+        vec![format!("  {}", field.name), kind, field.unit.to_owned(), field.description.to_owned()]
+    };
+    let rows: Vec<Vec<String>> = topic.fields.iter().map(row).collect();
+    let text = format!("{} {}: {}", topic.name, topic.schema, topic.description);
+    if rows.is_empty() { text } else { format!("{text}\n{}", columns(&rows)) }
 }
 
 fn describe_table(table: &Table) -> String {

@@ -1,7 +1,7 @@
 //! Stage `dem`: a measured DEM into metres, window applied.
 
 use super::original::{self, Original};
-use super::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work, raster_options};
+use super::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work, raster_options, raster_packing};
 use crate::registry::{BuildError, Builder, Heightfield, InputPlace};
 use crate::revision::Room;
 use crate::runner::graph::Node;
@@ -162,7 +162,8 @@ fn gridding(item: &DemItem) -> Result<GridSettings, String> {
     Ok(GridSettings { cell_m: None, statistic, fill_cells, ground_only })
 }
 
-/// What decides the result beside the original, whose item is a parent.
+/// What decides the result beside the original, whose item is a parent. Licence, attribution and citation do not: they join the
+/// release when it is assembled.
 fn recipe(item: &DemItem) -> Value {
     json!({
         "window": item.window,
@@ -170,17 +171,16 @@ fn recipe(item: &DemItem) -> Value {
         "statistic": item.statistic,
         "fill_cells": item.fill_cells,
         "ground_only": item.ground_only,
-        "license": item.license,
-        "attribution": item.attribution,
-        "citation": item.citation,
     })
 }
 
 impl Job for DemJob {
     fn recipe(&self) -> Value {
-        let mut recipe = recipe(&self.item);
-        recipe["geotiff"] = json!(self.geotiff);
-        recipe
+        recipe(&self.item)
+    }
+
+    fn packing(&self) -> Value {
+        raster_packing(self.geotiff)
     }
 
     fn rooms(&self) -> &'static [Room] {

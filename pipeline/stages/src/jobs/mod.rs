@@ -19,12 +19,13 @@ use sastrugi_schemas::tables::{
     ParameterRow, ProfilePsdRow, PsdRow, ReplicateRow, ScoreCovarianceRow, ScoreRow, StructureRow, SurfaceRow,
     TerrainRow,
 };
+use sastrugi_store::atomic::{Draft, DraftFile};
 use sastrugi_store::dem::WriteOptions;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fmt;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Name of an item: its stage and its id.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -50,8 +51,12 @@ impl fmt::Display for ItemRef {
 
 /// What one item of a study does. A job is glue: it reads the artifacts of its parents, calls a kernel, and writes files.
 pub trait Job: Send + Sync {
-    /// Everything in the study that decides the result, defaults filled in.
+    /// Everything in the study that decides what the result holds, defaults filled in.
     fn recipe(&self) -> Value;
+    /// What decides only how the same heights are packed: items made from them stay as they are. Null for the usual way.
+    fn packing(&self) -> Value {
+        Value::Null
+    }
     /// Rooms whose code decides the result, besides the ones that every job stands on.
     fn rooms(&self) -> &'static [Room];
     /// Peak working memory, bytes.
@@ -70,6 +75,14 @@ fn raster_options(geotiff: GeoTiff) -> WriteOptions {
     WriteOptions { cloud_optimised: geotiff == GeoTiff::Cog, ..WriteOptions::default() }
 }
 
+/// What [`Job::packing`] says of rasters written with [`raster_options`].
+fn raster_packing(geotiff: GeoTiff) -> Value {
+    match geotiff {
+        GeoTiff::Plain => Value::Null,
+        GeoTiff::Cog => "cog".into(),
+    }
+}
+
 /// Rough cost of an item on one core.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Estimate {
@@ -82,7 +95,7 @@ pub struct Estimate {
 /// Where a job finds its inputs and leaves its outputs.
 pub struct Work<'a> {
     /// Folder for the outputs.
-    pub folder: &'a Path,
+    pub folder: Draft<'a>,
     /// Folders of the parents' artifacts.
     pub parents: &'a BTreeMap<ItemRef, PathBuf>,
 }
@@ -97,9 +110,9 @@ impl Work<'_> {
         Ok(folder.join(file))
     }
 
-    /// Path of an output.
-    pub fn output(&self, file: &str) -> PathBuf {
-        self.folder.join(file)
+    /// An output.
+    pub fn output(&self, file: &str) -> DraftFile {
+        self.folder.file(file)
     }
 }
 

@@ -14,6 +14,11 @@ use std::path::{Path, PathBuf};
 /// Name of the stage.
 pub const STAGE: &str = "original";
 
+/// True for stages that only take files into the release.
+pub fn only_copies(stage: &str) -> bool {
+    [STAGE, super::mask::STAGE].contains(&stage)
+}
+
 /// A measured file with what lies beside it.
 pub struct Original {
     files: Vec<Copied>,
@@ -134,7 +139,7 @@ impl Job for Original {
     }
 }
 
-fn copy(input: &InputFile, target: &Path) -> Result<(), JobError> {
+fn copy(input: &InputFile, target: &atomic::DraftFile) -> Result<(), JobError> {
     let unreadable = |e: std::io::Error| JobError::input(format!("{}: {e}", input.path.display()));
     let mut from = std::fs::File::open(&input.path).map_err(unreadable)?;
     let mut to = atomic::AtomicFile::create(target).map_err(JobError::new)?;

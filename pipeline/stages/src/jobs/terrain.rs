@@ -1,7 +1,7 @@
 //! Stage `terrain`: one generated heightfield.
 
 use super::dem::HEIGHTS;
-use super::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work, raster_options};
+use super::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work, raster_options, raster_packing};
 use crate::registry::{BuildError, Builder, Heightfield};
 use crate::revision::Room;
 use crate::runner::graph::Node;
@@ -9,6 +9,7 @@ use crate::study::Entry;
 use crate::study::entry::Expanded;
 use sastrugi_numeric::{Grid, Streams};
 use sastrugi_schemas::study::{GeoTiff, TerrainItem};
+use sastrugi_store::atomic::Target;
 use sastrugi_store::dem::{self, Crs};
 use sastrugi_store::digest;
 use sastrugi_terrain::Generator;
@@ -96,7 +97,12 @@ fn name_families(
 
 impl Job for TerrainJob {
     fn recipe(&self) -> Value {
-        json!({ "kind": self.generator.kind(), "params": self.generator.parameters(), "png16": self.png16, "geotiff": self.geotiff })
+        json!({ "kind": self.generator.kind(), "params": self.generator.parameters() })
+    }
+
+    fn packing(&self) -> Value {
+        let raster = raster_packing(self.geotiff);
+        if self.png16 { json!({ "raster": raster, "png16": true }) } else { raster }
     }
 
     fn rooms(&self) -> &'static [Room] {
@@ -146,11 +152,15 @@ pub fn generate(generator: &dyn Generator, streams: &Streams) -> Result<Grid, Jo
 ///
 /// # Errors
 /// When the file cannot be written.
-pub fn write_png16(generator: &dyn Generator, heights: &Grid, path: &std::path::Path) -> Result<String, JobError> {
+pub fn write_png16<'a>(
+    generator: &dyn Generator,
+    heights: &Grid,
+    target: impl Into<Target<'a>>,
+) -> Result<String, JobError> {
     let Some(levels) = generator.levels(heights) else {
-        return dem::write_png_heights(path, heights).map(|scale| scale.sentence()).map_err(JobError::new);
+        return dem::write_png_heights(target.into(), heights).map(|scale| scale.sentence()).map_err(JobError::new);
     };
-    dem::write_png16(path, &levels.grid).map_err(JobError::new)?;
+    dem::write_png16(target.into(), &levels.grid).map_err(JobError::new)?;
     Ok(format!(
         "16-bit PNG: height_m = (level - {}) * {:e}; {} x {} posts",
         levels.zero_level,

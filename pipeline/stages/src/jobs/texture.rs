@@ -3,7 +3,7 @@
 use super::dem::{HEIGHTS, input_error};
 use super::scoreboard::{self, Entrant, ScoreboardJob};
 use super::surface::{Surface, describe_residual};
-use super::{Estimate, ItemRef, Job, JobError, Outcome, Product, Rows, Work, fit, raster_options};
+use super::{Estimate, ItemRef, Job, JobError, Outcome, Product, Rows, Work, fit, raster_options, raster_packing};
 use crate::registry::{BuildError, Builder, Heightfield, unknown_id};
 use crate::revision::Room;
 use crate::runner::graph::Node;
@@ -344,7 +344,6 @@ impl Job for TextureJob {
             "params": self.draft.parameters(),
             "fit": self.matched.describe(),
             "onto": base,
-            "geotiff": self.geotiff,
         });
         match &self.modulation {
             None => {}
@@ -355,6 +354,10 @@ impl Job for TextureJob {
             recipe["fill"] = json!(dem.to_string());
         }
         recipe
+    }
+
+    fn packing(&self) -> Value {
+        raster_packing(self.geotiff)
     }
 
     fn rooms(&self) -> &'static [Room] {

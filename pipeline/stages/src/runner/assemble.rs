@@ -13,7 +13,7 @@ use crate::jobs::{ItemRef, Rows, fit, roughness, scoreboard, texture, traverse};
 use crate::splits::{self, Splits};
 use crate::study::Study;
 use sastrugi_schemas::Record as Row;
-use sastrugi_schemas::manifest::{FailedItem, ItemNote, Origin};
+use sastrugi_schemas::manifest::{Artifact, FailedItem, ItemNote, Origin};
 use sastrugi_schemas::study::McapFlavour;
 use sastrugi_schemas::tables::{
     HeightDistributionRow, MissionRow, ParameterRow, ProfilePsdRow, PsdRow, ReplicateRow, SampleRow, StructureRow,
@@ -48,21 +48,19 @@ pub fn assemble(mut contents: Contents<'_>, dest: &Path, progress: &dyn Progress
     let sources = Sources::of(&contents)?;
     contents.items.sort();
     let _lock = DestinationLock::take(dest)?;
-    let study = &contents.study.head;
-    let head = Head {
-        name: study.name.clone(),
-        study_sha256: sastrugi_store::digest::of_text(contents.text),
-        seed: study.seed,
-        version: env!("CARGO_PKG_VERSION").to_owned(),
-        license: study.license.clone(),
-    };
-    let mut builder = ReleaseBuilder::beside(dest, head).map_err(release_error)?;
+    let mut builder = ReleaseBuilder::beside(dest, contents.head()).map_err(release_error)?;
     progress.phase("assembling artifacts");
     add_artifacts(&mut builder, &contents, &sources)?;
     builder.name_sources(sources.list.clone());
     for note in &sources.notes {
         progress.phase(&format!("{}/{}: {}", note.stage, note.item, note.note));
         builder.note(note.clone());
+    }
+    let license = &contents.study.head.license;
+    if !documents::license::is_listed(license) {
+        progress.phase(&format!(
+            "[study] license \"{license}\" is not in the SPDX list; write its identifier, as CC-BY-4.0, if it has one"
+        ));
     }
     progress.phase("writing tables");
     add_tables(&mut builder, &contents)?;
@@ -118,6 +116,18 @@ pub fn release_error(error: ReleaseError) -> Error {
 }
 
 impl Contents<'_> {
+    /// What the release says of itself.
+    pub fn head(&self) -> Head {
+        let study = &self.study.head;
+        Head {
+            name: study.name.clone(),
+            study_sha256: sastrugi_store::digest::of_text(self.text),
+            seed: study.seed,
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            license: study.license.clone(),
+        }
+    }
+
     /// Results of these stages, in order of their ids.
     fn results(&self, stages: &[&str]) -> Vec<(&ItemRef, &PathBuf)> {
         let of_stages = |(item, _): &&(ItemRef, Option<PathBuf>)| stages.contains(&item.stage.as_str());
@@ -141,33 +151,47 @@ fn rows_of(contents: &Contents<'_>, folder: &Path) -> Result<Rows, Error> {
     Ok(rows)
 }
 
+/// What the manifest says of the files that an item brings into the release.
+pub fn artifacts(record: &Record, sources: &Sources) -> Vec<Artifact> {
+    let artifact = |file: &StoredFile| {
+        let origin = Origin {
+            stage: record.item.stage.clone(),
+            item: record.item.id.clone(),
+            content_sha256: file.product.content.clone(),
+            records: file.product.records,
+            parents: record.ingredients.parents.keys().cloned().collect(),
+            stream: record.ingredients.stream.clone(),
+            sources: sources.behind(&record.item),
+        };
+        let path = file.product.release_path.clone()?;
+        Some(Artifact { path, bytes: file.bytes, sha256: file.sha256.clone(), origin })
+    };
+    record.files.iter().filter_map(artifact).collect()
+}
+
+/// What a reader must know of an item.
+pub fn notes(record: &Record) -> Vec<ItemNote> {
+    let ItemRef { stage, id } = &record.item;
+    let note = |note: &String| ItemNote { stage: stage.clone(), item: id.clone(), note: note.clone() };
+    record.notes.iter().map(note).collect()
+}
+
 fn add_artifacts(builder: &mut ReleaseBuilder, contents: &Contents<'_>, sources: &Sources) -> Result<(), Error> {
     for (_, folder) in contents.items.iter() {
         let Some(folder) = folder else { continue };
         let record = record(folder)?;
-        let released = |file: &StoredFile| {
-            let origin = Origin {
-                stage: record.item.stage.clone(),
-                item: record.item.id.clone(),
-                content_sha256: file.product.content.clone(),
-                records: file.product.records,
-                parents: record.ingredients.parents.keys().cloned().collect(),
-                stream: record.ingredients.stream.clone(),
-                sources: sources.behind(&record.item),
-            };
-            let path = file.product.release_path.clone()?;
-            Some(Incoming { path, source: folder.join(&file.product.file), origin })
-        };
-        let (incoming, files): (Vec<Incoming>, Vec<&StoredFile>) =
-            record.files.iter().filter_map(|file| Some((released(file)?, file))).unzip();
-        let copied = builder.add_files(incoming).map_err(release_error)?;
-        if let Some((file, _)) = files.into_iter().zip(&copied).find(|(file, sha256)| file.sha256 != **sha256) {
+        let released = record.files.iter().filter(|file| file.product.release_path.is_some());
+        let files: Vec<(&StoredFile, Artifact)> = released.zip(artifacts(&record, sources)).collect();
+        let incoming = files.iter().map(|(file, artifact)| Incoming {
+            path: artifact.path.clone(),
+            source: folder.join(&file.product.file),
+            origin: artifact.origin.clone(),
+        });
+        let copied = builder.add_files(incoming.collect()).map_err(release_error)?;
+        if let Some(((file, _), _)) = files.iter().zip(&copied).find(|((file, _), sha256)| file.sha256 != **sha256) {
             return Err(damaged(folder, &record.item, &file.product.file));
         }
-        for note in record.notes {
-            let ItemRef { stage, id: item } = record.item.clone();
-            builder.note(ItemNote { stage, item, note });
-        }
+        notes(&record).into_iter().for_each(|note| builder.note(note));
     }
     for failure in contents.failures {
         builder.failed(FailedItem {

@@ -6,7 +6,7 @@
 
 use super::graph::{Graph, Ingredients};
 use crate::jobs::{ItemRef, Outcome, Product, Rows};
-use sastrugi_store::atomic::{self, UNFINISHED};
+use sastrugi_store::atomic::{self, Draft};
 use sastrugi_store::digest;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -16,6 +16,8 @@ use std::path::{Path, PathBuf};
 
 const RECORD: &str = "record.json";
 const FAILURE: &str = "failure.json";
+/// Start of the name of a folder that a job writes into.
+const UNFINISHED: &str = "unfinished-";
 
 /// A finished item.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -194,7 +196,7 @@ impl Cache {
         let record = Record { item, key, ingredients, files, rows: outcome.rows, notes: outcome.notes };
         let path = folder.join(RECORD);
         let text = serde_json::to_vec(&record).map_err(|e| io_error("cannot encode", &path)(e.into()))?;
-        atomic::write(&path, &text).map_err(io_error("cannot write", &path))?;
+        atomic::write(&Draft(folder).file(RECORD), &text).map_err(io_error("cannot write", &path))?;
         let target = self.result_folder(&record.item, &record.key);
         if target.exists() {
             fs::remove_dir_all(&target).map_err(io_error("cannot clear", &target))?;

@@ -4,6 +4,7 @@ use super::cache::Cache;
 use super::graph::Graph;
 use super::progress::{End, Progress};
 use crate::jobs::{ItemRef, JobError, Work};
+use sastrugi_store::atomic::Draft;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
@@ -162,7 +163,7 @@ impl Run<'_> {
                 (self.graph.node(p).item.clone(), self.cache.result_folder(&self.graph.node(p).item, self.graph.key(p)))
             })
             .collect();
-        let work = Work { folder: &folder, parents: &parents };
+        let work = Work { folder: Draft(&folder), parents: &parents };
         // A panic is a bug; it must cost one item, not the run.
         let outcome = catch_unwind(AssertUnwindSafe(|| node.job.run(&work)))
             .unwrap_or_else(|panic| Err(JobError::new(format!("internal error: {}", panic_text(&*panic)))));

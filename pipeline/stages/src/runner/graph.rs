@@ -35,11 +35,14 @@ pub struct InputFile {
 pub struct Ingredients {
     /// The job's recipe.
     pub recipe: Value,
+    /// How the job packs its result.
+    #[serde(default)]
+    pub packing: Value,
     /// Words of the random streams.
     pub stream: Option<String>,
     /// SHA-256 of the input files, in order.
     pub inputs: Vec<String>,
-    /// Keys of the parents.
+    /// Keys of the parents, however they are packed.
     pub parents: BTreeMap<String, String>,
     /// Revision of the code.
     pub revision: String,
@@ -51,6 +54,8 @@ pub struct Ingredients {
 pub struct Graph {
     nodes: Vec<Node>,
     keys: Vec<String>,
+    /// Keys of what results hold, where they are packed in another way than the usual one.
+    unpacked_keys: BTreeMap<usize, String>,
     index: BTreeMap<ItemRef, usize>,
 }
 
@@ -64,7 +69,12 @@ impl Graph {
         if !node.parents.iter().all(|parent| self.index.contains_key(parent)) {
             return false;
         }
-        self.keys.push(key(&node.item, &self.ingredients_of(&node)));
+        let ingredients = self.ingredients_of(&node);
+        self.keys.push(key(&node.item, &ingredients));
+        if !ingredients.packing.is_null() {
+            let unpacked = Ingredients { packing: Value::Null, ..ingredients };
+            self.unpacked_keys.insert(self.nodes.len(), key(&node.item, &unpacked));
+        }
         self.index.insert(node.item.clone(), self.nodes.len());
         self.nodes.push(node);
         true
@@ -106,14 +116,21 @@ impl Graph {
     }
 
     fn ingredients_of(&self, node: &Node) -> Ingredients {
-        let parents = node.parents.iter().filter_map(|p| Some((p.to_string(), self.keys[self.find(p)?].clone())));
+        let parents =
+            node.parents.iter().filter_map(|p| Some((p.to_string(), self.unpacked_key(self.find(p)?).to_owned())));
         Ingredients {
             recipe: node.job.recipe(),
+            packing: node.job.packing(),
             stream: node.stream.clone(),
             inputs: node.inputs.iter().map(|i| i.sha256.clone()).collect(),
             parents: parents.collect(),
             revision: revision(node.job.rooms()),
         }
+    }
+
+    /// Key of what the result of the item at a position holds, however it is packed.
+    fn unpacked_key(&self, position: usize) -> &str {
+        self.unpacked_keys.get(&position).unwrap_or(&self.keys[position])
     }
 
     /// Positions of the parents of the item at a position.
@@ -141,10 +158,10 @@ impl Graph {
 }
 
 fn key(item: &ItemRef, ingredients: &Ingredients) -> String {
-    let mut hasher = blake3::Hasher::new_derive_key("sastrugi 2026-11 item keys v2");
-    let Ingredients { recipe, stream, inputs, parents, revision } = ingredients;
+    let mut hasher = blake3::Hasher::new_derive_key("sastrugi 2026-11 item keys v3");
+    let Ingredients { recipe, packing, stream, inputs, parents, revision } = ingredients;
     // Maps keep a fixed order (struct fields, BTreeMap, parameters as the kernels print them), so the text is canonical.
     hasher.update(recipe.to_string().as_bytes());
-    hasher.update(serde_json::json!([item, stream, inputs, parents, revision]).to_string().as_bytes());
+    hasher.update(serde_json::json!([item, packing, stream, inputs, parents, revision]).to_string().as_bytes());
     hasher.finalize().to_hex()[..32].to_owned()
 }

@@ -8,4 +8,4 @@ pub mod graph;
 pub mod plan;
 pub mod progress;
 pub mod shard;
-mod sources;
+pub mod sources;

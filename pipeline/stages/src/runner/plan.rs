@@ -65,6 +65,9 @@ fn difference(old: &Ingredients, new: &Ingredients) -> String {
         changed_values("", &old.recipe, &new.recipe, &mut changes);
         reasons.push(format!("changed: {}", changes.join(", ")));
     }
+    if old.packing != new.packing {
+        reasons.push("its file is packed in another way".to_owned());
+    }
     if old.stream != new.stream {
         reasons.push("the seed or the id changed".to_owned());
     }
@@ -112,6 +115,7 @@ mod tests {
     fn ingredients(recipe: Value) -> Ingredients {
         Ingredients {
             recipe,
+            packing: Value::Null,
             stream: None,
             inputs: Vec::new(),
             parents: [("dem/a".to_owned(), "k1".to_owned())].into(),

@@ -17,7 +17,7 @@ use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 
-const DESCRIPTION: &str = "shard.json";
+const DESCRIPTION: &str = sastrugi_store::release::SHARD;
 const STUDY: &str = "study.toml";
 
 /// Part `index` of `count`, counted from 1.

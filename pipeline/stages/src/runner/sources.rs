@@ -10,6 +10,7 @@ use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Measured data of a study.
+#[derive(Default)]
 pub struct Sources {
     /// What is asked for each, in the study's order.
     pub list: Vec<Source>,

@@ -25,7 +25,7 @@ pub use blocks::{BlockReader, open};
 pub use crs::{Crs, GeoKey};
 pub use png::{HeightScale, write_png_heights, write_png16};
 
-use crate::atomic;
+use crate::atomic::{self, Target};
 use crate::points::{self, GridSettings};
 use sastrugi_numeric::{Geometry, Grid};
 use std::fs::{self, File};
@@ -374,7 +374,14 @@ pub struct WriteOptions {
 ///
 /// # Errors
 /// [`DemError::Unfit`] when the format cannot hold the grid, [`DemError::Io`] when the file cannot be written.
-pub fn write(path: &Path, grid: &Grid, crs: &Crs, options: &WriteOptions) -> Result<Vec<String>, DemError> {
+pub fn write<'a>(
+    target: impl Into<Target<'a>>,
+    grid: &Grid,
+    crs: &Crs,
+    options: &WriteOptions,
+) -> Result<Vec<String>, DemError> {
+    let target = target.into();
+    let path = target.path;
     let unfit = |reason: Refusal| DemError::Unfit { path: path.to_owned(), reason: reason.0 };
     let (bytes, notes) = match Format::of_name(path) {
         Some(Format::GeoTiff) => (tiff_writer::heights(grid, crs, options).map_err(unfit)?, vec![]),
@@ -382,7 +389,7 @@ pub fn write(path: &Path, grid: &Grid, crs: &Crs, options: &WriteOptions) -> Res
         Some(Format::Hgt) => hgt::render(path, grid, crs).map_err(unfit)?,
         Some(Format::Npy) => (npy::render(grid), vec!["a .npy file keeps no cell size, place or CRS".to_owned()]),
         Some(Format::Png) => {
-            let scale = write_png_heights(path, grid)?;
+            let scale = write_png_heights(target, grid)?;
             return Ok(vec![scale.sentence()]);
         }
         Some(Format::Obj) => (obj::render(grid), lost_crs(crs)),
@@ -392,7 +399,7 @@ pub fn write(path: &Path, grid: &Grid, crs: &Crs, options: &WriteOptions) -> Res
             return Err(DemError::Unfit { path: path.to_owned(), reason });
         }
     };
-    save(path, &bytes)?;
+    save(target, &bytes)?;
     Ok(notes)
 }
 
@@ -401,17 +408,18 @@ fn lost_crs(crs: &Crs) -> Vec<String> {
     known.then(|| "the format keeps no coordinate reference system".to_owned()).into_iter().collect()
 }
 
-fn save(path: &Path, bytes: &[u8]) -> Result<(), DemError> {
-    atomic::write(path, bytes).map_err(|source| DemError::Io { path: path.to_owned(), source })
+fn save(target: Target<'_>, bytes: &[u8]) -> Result<(), DemError> {
+    atomic::write(target, bytes).map_err(|source| DemError::Io { path: target.path.to_owned(), source })
 }
 
 /// Writes a class map: 8-bit GeoTIFF, no data 255.
 ///
 /// # Errors
 /// The file cannot be written.
-pub fn write_classes(path: &Path, grid: &Grid<u8>, crs: &Crs) -> Result<(), DemError> {
-    let unfit = |reason: Refusal| DemError::Unfit { path: path.to_owned(), reason: reason.0 };
-    save(path, &tiff_writer::classes(grid, crs).map_err(unfit)?)
+pub fn write_classes<'a>(target: impl Into<Target<'a>>, grid: &Grid<u8>, crs: &Crs) -> Result<(), DemError> {
+    let target = target.into();
+    let unfit = |reason: Refusal| DemError::Unfit { path: target.path.to_owned(), reason: reason.0 };
+    save(target, &tiff_writer::classes(grid, crs).map_err(unfit)?)
 }
 
 /// Reads a class map that [`write_classes`] wrote.

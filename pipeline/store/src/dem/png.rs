@@ -1,6 +1,7 @@
 //! Greyscale PNG: heights as 16-bit levels, for game engines and image programs.
 
 use super::{Claimed, Crs, Dem, DemError, DemInfo, Format, MAX_CELLS, ReadOptions, Refusal, cell_count, geotiff, save};
+use crate::atomic::Target;
 use sastrugi_numeric::Grid;
 use std::fs::File;
 use std::io::{Cursor, Read};
@@ -60,8 +61,9 @@ pub(super) fn claimed(mut file: File, options: &ReadOptions) -> Option<Claimed> 
 ///
 /// # Errors
 /// The grid is too large for a PNG, or the file cannot be written.
-pub fn write_png16(path: &Path, grid: &Grid<u16>) -> Result<(), DemError> {
-    save(path, &encode(path, grid, None)?)
+pub fn write_png16<'a>(target: impl Into<Target<'a>>, grid: &Grid<u16>) -> Result<(), DemError> {
+    let target = target.into();
+    save(target, &encode(target.path, grid, None)?)
 }
 
 /// Writes heights as levels from the lowest (1) to the highest (65535) and returns the scale, which is also in the
@@ -69,9 +71,10 @@ pub fn write_png16(path: &Path, grid: &Grid<u16>) -> Result<(), DemError> {
 ///
 /// # Errors
 /// As [`write_png16`].
-pub fn write_png_heights(path: &Path, grid: &Grid) -> Result<HeightScale, DemError> {
+pub fn write_png_heights<'a>(target: impl Into<Target<'a>>, grid: &Grid) -> Result<HeightScale, DemError> {
+    let target = target.into();
     let scale = HeightScale::of(grid);
-    save(path, &encode(path, &grid.map(|v| scale.level(v)), Some(scale))?)?;
+    save(target, &encode(target.path, &grid.map(|v| scale.level(v)), Some(scale))?)?;
     Ok(scale)
 }
 

@@ -16,8 +16,9 @@ mod tests;
 
 pub use log::read_log;
 
+use crate::PROGRAM;
+use crate::atomic::{self, Target};
 use crate::digest::ContentHash;
-use crate::{PROGRAM, atomic};
 use foxglove::messages as fox;
 use mcap::records::{MessageHeader, Metadata};
 use mcap::{Compression, WriteOptions, Writer};
@@ -32,6 +33,8 @@ use std::sync::OnceLock;
 /// Panels of Foxglove and Lichtblick for recordings of the viewer flavour: a layout file to import.
 pub const VIEWER_LAYOUT: &str = include_str!("viewer-layout.json");
 
+/// What makes a bag of a folder.
+pub const BAG: &str = "metadata.yaml";
 /// Level of Zstandard.
 const ZSTD_LEVEL: u32 = 1;
 /// Uncompressed size of a chunk, bytes.
@@ -202,10 +205,45 @@ impl Timeline {
 ///
 /// # Errors
 /// See [`McapError`].
-pub fn write_mission(path: &Path, mission: &MissionMcap) -> Result<McapSummary, McapError> {
+pub fn write_mission<'a>(target: impl Into<Target<'a>>, mission: &MissionMcap<'_>) -> Result<McapSummary, McapError> {
+    let target = target.into();
     let (bytes, summary) = encode_mission(mission)?;
-    atomic::write(path, &bytes).map_err(|source| McapError::Io { path: path.to_owned(), source })?;
+    atomic::write(target, &bytes).map_err(|source| McapError::Io { path: target.path.to_owned(), source })?;
     Ok(summary)
+}
+
+/// The MCAP files of a ROS 2 bag, in the order in which they were recorded.
+///
+/// # Errors
+/// [`McapError::Unusable`] for a folder that is no bag, or a bag of other files; [`McapError::Io`].
+pub fn bag_files(folder: &Path) -> Result<Vec<PathBuf>, McapError> {
+    let unusable = |reason: String| McapError::Unusable { path: folder.to_owned(), reason };
+    let path = folder.join(BAG);
+    let text = std::fs::read_to_string(&path).map_err(|source| match source.kind() {
+        io::ErrorKind::NotFound => unusable(format!("the folder is no bag, it has no {BAG}; name an .mcap file")),
+        _ => McapError::Io { path, source },
+    })?;
+    let names = ros2::bag_names(&text);
+    match names.iter().find(|name| !name.ends_with(".mcap")) {
+        Some(other) => Err(unusable(format!(
+            "the bag holds {other}; `ros2 bag convert` makes MCAP without file compression of it"
+        ))),
+        None if names.is_empty() => Err(unusable(format!("its {BAG} names no files; name an .mcap file"))),
+        None => Ok(names.iter().map(|name| folder.join(name)).collect()),
+    }
+}
+
+/// What a ROS 2 bag is, for people: its files in order, each as [`describe_file`] does.
+///
+/// # Errors
+/// As [`bag_files`] and [`describe_file`].
+pub fn describe_bag(folder: &Path) -> Result<serde_json::Value, McapError> {
+    let mut described = serde_json::Map::from_iter([("what".to_owned(), "ROS 2 bag".into())]);
+    for file in bag_files(folder)? {
+        let name = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        described.insert(name, describe_file(&file)?);
+    }
+    Ok(described.into())
 }
 
 /// What an MCAP file is, for people: its topics with their message counts, and its length in time.

@@ -1,26 +1,77 @@
 //! `croissant.json`: every table in Croissant 1.1 (MLCommons, "Croissant Format Specification", version 1.1), so that data
 //! loaders find its columns with type, unit and description, and its files with their hashes.
 
-use super::{Described, add_terms, address_of_license, citation_line, page};
+use super::{Described, add_terms, citation_line, license, page};
+use crate::jobs::original;
 use crate::splits::PARTS;
 use sastrugi_schemas::manifest::{Artifact, Source};
+use sastrugi_schemas::study::McapFlavour;
 use sastrugi_schemas::tables::{self, Column, ColumnType, Table};
 use serde_json::{Value, json};
 
 /// Record set of the parts of a split, and the column that names one.
 const SPLITS: &str = "splits";
+const SPLIT_NAME: &str = "splits/name";
 const SPLIT_COLUMN: &str = "split";
 const PARQUET: &str = "application/x-parquet";
 /// Most files of a table that are described one by one; more are one set, and their hashes are in the manifest alone, so
 /// that this file, which loaders read whole, stays small.
 const DESCRIBED_FILES: usize = 64;
-/// Files beside the tables: name, pattern of their paths, media type, what they are.
-const RASTERS: [(&str, &str, &str, &str); 4] = [
-    ("terrain", "terrain/*.tif", "image/tiff", "Generated heightfields, GeoTIFF, float32 metres"),
-    ("texture", "texture/*.tif", "image/tiff", "Synthesised textures, GeoTIFF, float32 metres"),
-    ("dem", "dem/*.metric.tif", "image/tiff", "Measured heights in metres, GeoTIFF"),
-    ("mcap", "mcap/**/*.mcap", "application/octet-stream", "Recordings of the missions, MCAP"),
+/// Files beside the tables, which the manifest lists with their hashes: id of the set, folder, ending, media type, what they are.
+const SETS: [(&str, &str, &str, &str, &str); 9] = [
+    ("terrain-files", "terrain", ".tif", "image/tiff", "Generated heightfields, GeoTIFF, float32 metres"),
+    ("terrain-pictures", "terrain", ".png", "image/png", "Generated heightfields in steps of 16 bit"),
+    ("texture-files", "texture", ".tif", "image/tiff", "Synthesised textures, GeoTIFF, float32 metres"),
+    ("dem-files", "dem", ".metric.tif", "image/tiff", "Measured heights in metres, GeoTIFF"),
+    (
+        "class-files",
+        "classes",
+        ".tif",
+        "image/tiff",
+        "Roughness classes: 0 low, 1 semi, 2 high; `.raw.tif` before closing",
+    ),
+    ("fit-files", "fit", ".json", "application/json", "Covariance fits"),
+    (
+        "fit-rasters",
+        "fit",
+        ".tif",
+        "image/tiff",
+        "Background, residual, covariance and used cells of the fits, GeoTIFF",
+    ),
+    ("mcap-files", "mcap", ".mcap", "application/octet-stream", "Recordings of the missions, MCAP"),
+    ("bag-files", "mcap", "metadata.yaml", "application/yaml", "Descriptions of the recordings for bag readers"),
 ];
+/// What the release says of itself, and shows: id of the set, patterns, media types, what they are.
+const DOCUMENTS: [(&str, &[&str], &[&str], &str); 2] = [
+    (
+        "documents",
+        &[
+            "README.md",
+            "CITATION.cff",
+            "LICENSE",
+            "study.toml",
+            "croissant.json",
+            "ro-crate-metadata.json",
+            "manifest.json",
+            "SHA256SUMS",
+        ],
+        &["text/markdown", "application/yaml", "text/plain", "application/json", "application/toml"],
+        "What the release says of itself: study, licence, citation, and every file with its hash",
+    ),
+    (
+        "report",
+        &["report/index.html", "report/figures/*.svg", "report/data/*.json"],
+        &["text/html", "image/svg+xml", "application/json"],
+        "The report: one offline page, its figures and its numbers",
+    ),
+];
+/// Layout of a viewer for recordings of that flavour.
+const LAYOUT: (&str, &[&str], &[&str], &str) = (
+    "viewer-layout",
+    &["mcap/foxglove-layout.json"],
+    &["application/json"],
+    "A layout of the viewer for the recordings",
+);
 
 /// The text of `croissant.json`.
 pub fn croissant(described: &Described<'_>) -> Value {
@@ -35,7 +86,7 @@ pub fn croissant(described: &Described<'_>) -> Value {
         "conformsTo": "http://mlcommons.org/croissant/1.1",
         "name": head.title,
         "description": if head.description.is_empty() { &head.title } else { &head.description },
-        "license": address_of_license(&head.license),
+        "license": license::address(&head.license),
         "creator": described.creators().map(creator).collect::<Vec<_>>(),
         "datePublished": head.date,
         "citeAs": citation_line(head),
@@ -63,45 +114,73 @@ fn work(source: &Source) -> Value {
     work
 }
 
-/// Every file of a table with its hash, up to [`DESCRIBED_FILES`]; tables of several files, and rasters, as sets besides.
+/// Every file of the release. Those of tables, up to [`DESCRIBED_FILES`], and what was measured come with their hashes; tables of
+/// several files, and all else, are sets.
 fn distribution(described: &Described<'_>) -> Vec<Value> {
     let few = |table: &&&'static Table| described.parts(table.name).count() <= DESCRIBED_FILES;
     let parts = |table: &&'static Table| described.parts(table.name);
-    let mut files: Vec<Value> = tables::ALL.iter().filter(few).flat_map(parts).map(file_object).collect();
+    let given = described.artifacts.iter().filter(|a| original::only_copies(&a.origin.stage));
+    let mut files: Vec<Value> = given.map(|artifact| file_object(artifact, media_of(&artifact.path))).collect();
+    files.extend(tables::ALL.iter().filter(few).flat_map(parts).map(|artifact| file_object(artifact, PARQUET)));
     let several = tables::ALL.iter().filter(|table| described.parts(table.name).count() > 1);
     files.extend(several.map(|table| {
         let includes = format!("tables/{}/*.parquet", table.name);
-        file_set(&set_id(table), &includes, PARQUET, table.description)
+        file_set(&set_id(table), &[&includes], &[PARQUET], table.description)
     }));
-    let there = |folder: &str| described.artifacts.iter().any(|a| a.path.starts_with(&format!("{folder}/")));
-    let rasters = RASTERS.iter().filter(|(folder, ..)| there(folder));
-    files.extend(
-        rasters.map(|(folder, includes, media, what)| file_set(&format!("{folder}-files"), includes, media, what)),
-    );
+    let there = |folder: &str, ending: &str| {
+        let folder = format!("{folder}/");
+        described.artifacts.iter().any(|a| a.path.starts_with(&folder) && a.path.ends_with(ending))
+    };
+    for (id, folder, ending, media, what) in SETS.into_iter().filter(|(_, folder, ending, ..)| there(folder, ending)) {
+        let below = if folder == "mcap" { "**/" } else { "" };
+        files.push(file_set(id, &[&format!("{folder}/{below}*{ending}")], &[media], what));
+    }
+    let layout = (described.head.mcap == McapFlavour::Viewer && there("mcap", ".mcap")).then_some(LAYOUT);
+    let documents = DOCUMENTS.into_iter().chain(layout);
+    files.extend(documents.map(|(id, includes, media, what)| file_set(id, includes, media, what)));
     files
 }
 
-fn file_object(artifact: &Artifact) -> Value {
+/// Media type of a measured file or a mask.
+fn media_of(path: &str) -> &'static str {
+    match path.rsplit('.').next() {
+        Some("tif" | "tiff") => "image/tiff",
+        Some("png") => "image/png",
+        Some("asc" | "prj") => "text/plain",
+        Some("geojson" | "json") => "application/geo+json",
+        _ => "application/octet-stream",
+    }
+}
+
+fn file_object(artifact: &Artifact, media: &str) -> Value {
     json!({
         "@type": "cr:FileObject",
         "@id": artifact.path,
         "name": artifact.path,
         "contentUrl": artifact.path,
         "contentSize": format!("{} B", artifact.bytes),
-        "encodingFormat": PARQUET,
+        "encodingFormat": media,
         "sha256": artifact.sha256,
     })
 }
 
-fn file_set(id: &str, includes: &str, media: &str, description: &str) -> Value {
+fn file_set(id: &str, includes: &[&str], media: &[&str], description: &str) -> Value {
     json!({
         "@type": "cr:FileSet",
         "@id": id,
         "name": id,
         "description": description,
-        "encodingFormat": media,
-        "includes": includes,
+        "encodingFormat": one_or_many(media),
+        "includes": one_or_many(includes),
     })
+}
+
+/// JSON-LD's way to write one value.
+fn one_or_many(values: &[&str]) -> Value {
+    match values {
+        [one] => json!(one),
+        _ => json!(values),
+    }
 }
 
 fn set_id(table: &Table) -> String {
@@ -123,7 +202,7 @@ fn record_set(table: &Table, described: &Described<'_>) -> Option<Value> {
         "name": table.name,
         "description": table.description,
         "key": keys.map(|column| json!({ "@id": field_id(table, column) })).collect::<Vec<_>>(),
-        "field": table.columns.iter().map(|column| field(table, column, &source)).collect::<Vec<_>>(),
+        "field": table.columns.iter().map(|column| field(described, table, column, &source)).collect::<Vec<_>>(),
     }))
 }
 
@@ -131,7 +210,7 @@ fn field_id(table: &Table, column: &Column) -> String {
     format!("{}/{}", table.name, column.name)
 }
 
-fn field(table: &Table, column: &Column, source: &Value) -> Value {
+fn field(described: &Described<'_>, table: &Table, column: &Column, source: &Value) -> Value {
     let (data_type, is_list) = match column.column_type {
         ColumnType::Text => ("sc:Text", false),
         ColumnType::F64 => ("cr:Float64", false),
@@ -155,6 +234,9 @@ fn field(table: &Table, column: &Column, source: &Value) -> Value {
     }
     if column.name == SPLIT_COLUMN {
         field["dataType"] = json!(["sc:Text", "cr:Split"]);
+        if described.head.split.is_some() {
+            field["references"] = json!({ "field": { "@id": SPLIT_NAME } });
+        }
     }
     if is_list {
         field["isArray"] = json!(true);
@@ -165,23 +247,21 @@ fn field(table: &Table, column: &Column, source: &Value) -> Value {
 
 /// The parts that the column `split` names.
 fn splits() -> Value {
-    let column = |name: &str, data_type: &str| {
-        let id = format!("{SPLITS}/{name}");
+    const SPLIT_URL: &str = "splits/url";
+    let column = |id: &str, data_type: Value| {
+        let name = id.rsplit('/').next();
         json!({ "@type": "cr:Field", "@id": id, "name": name, "dataType": data_type })
     };
     let urls = ["cr:TrainingSplit", "cr:ValidationSplit", "cr:TestSplit"];
-    let rows = PARTS
-        .iter()
-        .zip(urls)
-        .map(|(part, url)| json!({ (format!("{SPLITS}/name")): part, (format!("{SPLITS}/url")): url }));
+    let rows = PARTS.iter().zip(urls).map(|(part, url)| json!({ SPLIT_NAME: part, SPLIT_URL: url }));
     json!({
         "@type": "cr:RecordSet",
         "@id": SPLITS,
         "name": SPLITS,
         "description": "Parts of the terrains: every group has each in the shares that the study asks for",
         "dataType": "cr:Split",
-        "key": { "@id": format!("{SPLITS}/name") },
-        "field": [column("name", "sc:Text"), column("url", "sc:URL")],
+        "key": { "@id": SPLIT_NAME },
+        "field": [column(SPLIT_NAME, json!("sc:Text")), column(SPLIT_URL, json!(["sc:URL", "cr:Split"]))],
         "data": rows.collect::<Vec<_>>(),
     })
 }

@@ -1,6 +1,7 @@
 //! The documents of a release for people and catalogues: what it is, how to cite it, under which licence.
 
 mod croissant;
+pub mod license;
 mod ro_crate;
 
 pub use croissant::croissant;
@@ -37,6 +38,8 @@ const FOLDERS: [(&str, &str); 9] = [
     ("tables/", "Parquet, units and descriptions in the column metadata"),
     ("report/", "report: `index.html`, one offline page"),
 ];
+/// A creator that is no person, in the words of schema.org.
+const ORGANIZATION: &str = "Organization";
 /// Names under which dataset hubs know licences, where they are not the SPDX identifier in lower case.
 const HUB_NAMES: [(&str, &str); 3] = [("PDDL-1.0", "pddl"), ("ODC-By-1.0", "odc-by"), ("ODbL-1.0", "odbl")];
 /// Starts of identifiers that dataset hubs know in lower case.
@@ -53,7 +56,7 @@ impl<'a> Described<'a> {
     fn creators(&self) -> impl Iterator<Item = (&'a str, &'static str)> {
         let head = self.head;
         let names = head.creators.iter().map(String::as_str).chain(head.creators.is_empty().then_some("unnamed"));
-        names.map(|name| (name, if head.organizations.iter().any(|o| o == name) { "Organization" } else { "Person" }))
+        names.map(|name| (name, if head.organizations.iter().any(|o| o == name) { ORGANIZATION } else { "Person" }))
     }
 
     /// Tables that have a file.
@@ -131,23 +134,20 @@ fn card(described: &Described<'_>) -> String {
 
 /// Hubs know a list of licences by names of their own; others are named beside `other`.
 fn hub_license(license: &str) -> String {
-    let known = HUB_NAMES.iter().find(|(spdx, _)| *spdx == license).map(|(_, name)| (*name).to_owned());
-    let plain = || HUB_FAMILIES.iter().any(|f| license.starts_with(f)) && is_spdx_identifier(license);
-    match known.or_else(|| plain().then(|| license.to_lowercase())) {
+    let of_hub = |id: &str| {
+        let known = HUB_NAMES.iter().find(|(spdx, _)| *spdx == id).map(|(_, name)| (*name).to_owned());
+        known.or_else(|| HUB_FAMILIES.iter().any(|f| id.starts_with(f)).then(|| id.to_lowercase()))
+    };
+    match license::identifier(license).and_then(of_hub) {
         Some(name) => format!("license: {name}\n"),
         None => format!("license: other\nlicense_name: {}\nlicense_link: LICENSE\n", quoted(license)),
     }
 }
 
-/// Where a licence can be read: its page in the SPDX list, or the licence as it is stated.
-fn address_of_license(license: &str) -> String {
-    if is_spdx_identifier(license) { format!("https://spdx.org/licenses/{license}") } else { license.to_owned() }
-}
-
 /// Adds what measured data asks for to its description in the words of schema.org.
 fn add_terms(work: &mut Value, source: &Source) {
     let terms = [
-        ("license", source.license.as_deref().map(address_of_license)),
+        ("license", source.license.as_deref().map(license::address)),
         ("creditText", source.attribution.clone()),
         ("citation", source.citation.clone()),
     ];
@@ -170,7 +170,7 @@ fn citation_line(head: &StudyHead) -> String {
 }
 
 fn authors(head: &StudyHead) -> String {
-    if head.creators.is_empty() { "unnamed".to_owned() } else { head.creators.join(", ") }
+    if head.creators.is_empty() { "unnamed".to_owned() } else { head.creators.join("; ") }
 }
 
 /// Measured data with what their makers ask for.
@@ -208,11 +208,9 @@ pub fn citation(described: &Described<'_>) -> String {
     line("version", head.version.as_deref());
     line("doi", head.doi.as_deref());
     line("url", head.url.as_deref());
-    line("license", is_spdx_identifier(&head.license).then_some(head.license.as_str()));
+    text.push_str(&license::cited(&head.license));
     text.push_str("authors:\n");
-    for (author, _) in described.creators() {
-        let _ = writeln!(text, "  - name: {}", quoted(author));
-    }
+    text.extend(described.creators().map(author));
     if !sources.is_empty() {
         text.push_str("references:\n");
         sources.iter().for_each(|source| text.push_str(&reference(source)));
@@ -231,22 +229,34 @@ fn reference(source: &Source) -> String {
     )
 }
 
-/// True for one identifier; the Citation File Format takes no expressions such as `MIT OR Apache-2.0`.
-fn is_spdx_identifier(license: &str) -> bool {
-    license.bytes().all(|b| b.is_ascii_alphanumeric() || b".-+".contains(&b))
+/// An author of `CITATION.cff`: `name` is for what is no person. Which part of a person's name is which only `Family, Given`
+/// tells; a name in one piece is what they are called.
+fn author((name, kind): (&str, &str)) -> String {
+    let parts = name.split_once(',').map(|(family, given)| (family.trim(), given.trim()));
+    match parts {
+        _ if kind == ORGANIZATION => format!("  - name: {}\n", quoted(name)),
+        Some((family, given)) if !family.is_empty() && !given.is_empty() => {
+            format!("  - family-names: {}\n    given-names: {}\n", quoted(family), quoted(given))
+        }
+        _ => format!("  - alias: {}\n", quoted(name)),
+    }
 }
 
 /// `LICENSE`.
 pub fn license(described: &Described<'_>) -> String {
     let (head, sources) = (described.head, described.sources);
     let version = head.version.as_ref().map_or_else(String::new, |v| format!(", version {v}"));
-    let mut text = format!(
-        "SPDX-License-Identifier: {0}\n\n{1}{version} ({2}) by {3} is licensed under {0}. Its text is found by that identifier in the SPDX licence list.\n",
-        head.license,
-        head.title,
-        head.date,
-        authors(head)
-    );
+    let what = format!("{}{version} ({}) by {}", head.title, head.date, authors(head));
+    let mut text = match license::is_listed(&head.license) {
+        true => format!(
+            "SPDX-License-Identifier: {0}\n\n{what} is licensed under {0}. Its text is found by that identifier in the SPDX licence list.\n",
+            head.license,
+        ),
+        false => format!(
+            "{what} is licensed under:\n\n{}\n\nThe SPDX licence list does not have it; its terms are to be had from the creators.\n",
+            head.license
+        ),
+    };
     if let Some(page) = page(head) {
         let _ = writeln!(text, "{page}");
     }

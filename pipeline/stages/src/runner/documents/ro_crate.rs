@@ -1,8 +1,10 @@
 //! `ro-crate-metadata.json`: what made what, as an RO-Crate 1.1 (<https://w3id.org/ro/crate/1.1>) of the profile Process Run
-//! Crate 0.5 (<https://w3id.org/ro/wfrun/process/0.5>): one `CreateAction` per stage. Folders stand for their files;
-//! `manifest.json` has the parents, stream and hash of each.
+//! Crate 0.5 (<https://w3id.org/ro/wfrun/process/0.5>): one `CreateAction` per stage, from what its items read to what they
+//! made. Measured data and masks were there before, so that no action makes them. Folders stand for their files; `manifest.json`
+//! has the parents, stream and hash of each.
 
-use super::{Described, FOLDERS, add_terms, address_of_license, citation_line, is_spdx_identifier, page};
+use super::{Described, FOLDERS, add_terms, citation_line, license, page};
+use crate::jobs::{ItemRef, original};
 use sastrugi_schemas::manifest::{Artifact, PROGRAM as PROGRAM_NAME, Source};
 use sastrugi_schemas::tables;
 use serde_json::{Value, json};
@@ -32,10 +34,9 @@ pub fn ro_crate(described: &Described<'_>) -> Value {
     graph.extend(parts);
     graph.push(json!({ "@id": PROFILE, "@type": "CreativeWork", "name": "Process Run Crate", "version": "0.5" }));
     graph.push(program());
-    graph.extend(license(&described.head.license));
-    graph.extend(
-        described.creators().map(|(name, kind)| json!({ "@id": creator_id(name), "@type": kind, "name": name })),
-    );
+    graph.extend(license_entity(&described.head.license));
+    let creator = |(n, (name, kind))| json!({ "@id": creator_id(n), "@type": kind, "name": name });
+    graph.extend(described.creators().enumerate().map(creator));
     graph.extend(described.sources.iter().map(work));
     graph.extend(stages.actions());
     // Words of schema.org that came after the crate's context was frozen.
@@ -61,7 +62,7 @@ fn root(described: &Described<'_>, parts: &[Value], stages: &Stages) -> Value {
         "description": if head.description.is_empty() { &head.title } else { &head.description },
         "datePublished": head.date,
         "license": { "@id": license_id(&head.license) },
-        "author": described.creators().map(|(name, _)| json!({ "@id": creator_id(name) })).collect::<Vec<_>>(),
+        "author": described.creators().enumerate().map(|(n, _)| json!({ "@id": creator_id(n) })).collect::<Vec<_>>(),
         "creditText": citation_line(head),
         "conformsTo": { "@id": PROFILE },
         "hasPart": parts.iter().map(|part| json!({ "@id": part["@id"] })).collect::<Vec<_>>(),
@@ -87,14 +88,14 @@ fn own_file((path, media, description): &(&str, &str, &str)) -> Value {
 
 /// A licence of the SPDX list by its page there, any other by the file that names it.
 fn license_id(license: &str) -> String {
-    if is_spdx_identifier(license) { address_of_license(license) } else { "LICENSE".to_owned() }
+    license::identifier(license).map_or_else(|| "LICENSE".to_owned(), |_| license::address(license))
 }
 
 /// The entity of a licence that is no file of the release.
-fn license(license: &str) -> Option<Value> {
-    let id = is_spdx_identifier(license).then(|| license_id(license))?;
-    let description = format!("The licence that the SPDX list calls {license}");
-    Some(json!({ "@id": id, "@type": "CreativeWork", "name": license, "description": description }))
+fn license_entity(license: &str) -> Option<Value> {
+    let name = license::identifier(license)?;
+    let description = format!("The licence that the SPDX list calls {name}");
+    Some(json!({ "@id": license_id(license), "@type": "CreativeWork", "name": name, "description": description }))
 }
 
 fn program() -> Value {
@@ -106,17 +107,13 @@ fn program() -> Value {
     })
 }
 
-fn creator_id(name: &str) -> String {
-    format!("#creator-{}", word(name))
+/// Names would have to be spelled anew to be part of an identifier, and two could become one.
+fn creator_id(position: usize) -> String {
+    format!("#creator-{}", position + 1)
 }
 
 fn source_id(source: &Source) -> String {
     format!("#source-{}", source.id)
-}
-
-/// A name as part of an identifier.
-fn word(name: &str) -> String {
-    name.chars().map(|c| if c.is_alphanumeric() { c } else { '-' }).collect()
 }
 
 fn work(source: &Source) -> Value {
@@ -128,6 +125,8 @@ fn work(source: &Source) -> Value {
 /// What each stage made, and from what, in entities of the crate.
 #[derive(Default)]
 struct Stages {
+    /// Files that were there before: measured data and masks.
+    given: BTreeSet<String>,
     made: BTreeMap<String, BTreeSet<String>>,
     used: BTreeMap<String, BTreeSet<String>>,
 }
@@ -135,29 +134,45 @@ struct Stages {
 impl Stages {
     fn of(described: &Described<'_>) -> Self {
         let mut stages = Self::default();
-        let released = described.artifacts.iter().filter(|a| !a.origin.stage.is_empty());
-        let mut parents: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
-        for artifact in released {
-            let stage = artifact.origin.stage.as_str();
-            stages.made.entry(stage.to_owned()).or_default().insert(entity(artifact));
-            let above = artifact.origin.parents.iter().filter_map(|parent| parent.split('/').next());
-            // Tables that several stages fill are made from what those stages made.
-            let filling = stage.split('+').filter(|part| *part != stage);
-            parents.entry(stage).or_default().extend(above.chain(filling));
+        let released = || described.artifacts.iter().filter(|a| !a.origin.stage.is_empty());
+        let mut of_item: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
+        for artifact in released().filter(|a| !a.origin.item.is_empty()) {
+            let item = ItemRef::new(&artifact.origin.stage, &artifact.origin.item).to_string();
+            of_item.entry(item).or_default().insert(entity(artifact));
         }
-        for (stage, parents) in parents {
-            let used = parents.iter().filter_map(|parent| stages.made.get(*parent)).flatten().cloned();
-            stages.used.insert(stage.to_owned(), [STUDY.to_owned()].into_iter().chain(used).collect());
+        let (given, derived): (Vec<_>, Vec<_>) = released().partition(|a| original::only_copies(&a.origin.stage));
+        stages.given = given.into_iter().map(entity).collect();
+        for artifact in derived {
+            let stage = &artifact.origin.stage;
+            stages.made.entry(stage.clone()).or_default().insert(entity(artifact));
+            let used = stages.used.entry(stage.clone()).or_insert_with(|| BTreeSet::from([STUDY.to_owned()]));
+            used.extend(artifact.origin.parents.iter().filter_map(|parent| of_item.get(parent)).flatten().cloned());
         }
-        let tables = stages.made.values().flatten().filter(|e| e.starts_with("tables/")).cloned().collect();
-        stages.made.insert("report".to_owned(), BTreeSet::from(["report/".to_owned()]));
-        stages.used.insert("report".to_owned(), tables);
+        stages.share_tables();
+        stages.add_report(described);
         stages
+    }
+
+    /// Tables that several stages fill come from what those stages read.
+    fn share_tables(&mut self) {
+        let shared: Vec<String> = self.made.keys().filter(|stage| stage.contains('+')).cloned().collect();
+        for stage in shared {
+            let used = stage.split('+').filter_map(|part| self.used.get(part)).flatten().cloned().collect();
+            self.used.insert(stage, used);
+        }
+    }
+
+    /// The report shows tables and what was computed of rasters.
+    fn add_report(&mut self, described: &Described<'_>) {
+        let shown = |a: &&Artifact| a.path.starts_with("tables/") || a.path.ends_with(".tif");
+        let derived = described.artifacts.iter().filter(|a| !original::only_copies(&a.origin.stage));
+        self.used.insert("report".to_owned(), derived.filter(shown).map(entity).collect());
+        self.made.insert("report".to_owned(), BTreeSet::from(["report/".to_owned()]));
     }
 
     /// Folders and measured files.
     fn entities(&self, described: &Described<'_>) -> Vec<Value> {
-        let all: BTreeSet<&String> = self.made.values().flatten().collect();
+        let all: BTreeSet<&String> = self.made.values().flatten().chain(&self.given).collect();
         all.into_iter().map(|id| described_entity(id, described)).collect()
     }
 
@@ -179,7 +194,7 @@ impl Stages {
 }
 
 fn action_id(stage: &str) -> String {
-    format!("#stage-{}", word(stage))
+    format!("#stage-{}", stage.replace('+', "-"))
 }
 
 /// What stands for a file: itself where it was given, else its folder.

@@ -6,7 +6,7 @@
 mod foxglove;
 mod ros2;
 
-use super::McapError;
+use super::{McapError, bag_files};
 use mcap::records::Record;
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use sastrugi_schemas::log::{ImuStream, Log, PoseStream, TimedForce, TimedPose, TransformStream};
@@ -54,12 +54,27 @@ fn is_known(schema: &str) -> bool {
     foxglove::decoder(schema).is_some() || ros2::decoder(schema).is_some()
 }
 
-/// Reads a log.
+/// Reads a log: a file, or the folder of a ROS 2 bag, whose files follow each other.
 ///
 /// # Errors
 /// [`McapError::Io`]; [`McapError::Unusable`] for a file that is no MCAP, whose checksums are wrong, or that holds a message
-/// that does not decode as its schema says. A file that only ends too early is no error: see [`Log::broken`].
+/// that does not decode as its schema says, and for a folder that is no bag of MCAP files. A file that only ends too early is no
+/// error: see [`Log::broken`].
 pub fn read_log(path: &Path) -> Result<Log, McapError> {
+    if !path.is_dir() {
+        let mut gathered = Gathered::default();
+        read_file(path, &mut gathered)?;
+        return Ok(gathered.log);
+    }
+    let mut gathered = Gathered::default();
+    for file in bag_files(path)? {
+        read_file(&file, &mut gathered)?;
+        gathered.next_file();
+    }
+    Ok(gathered.log)
+}
+
+fn read_file(path: &Path, gathered: &mut Gathered) -> Result<(), McapError> {
     let unusable = |reason: String| McapError::Unusable { path: path.to_owned(), reason };
     let io = |source| McapError::Io { path: path.to_owned(), source };
     let mut file = File::open(path).map_err(io)?;
@@ -68,7 +83,6 @@ pub fn read_log(path: &Path) -> Result<Log, McapError> {
         .with_validate_data_section_crc(true)
         .with_record_length_limit(RECORD_MAX);
     let mut reader = LinearReader::new_with_options(options);
-    let mut gathered = Gathered::default();
     while let Some(event) = reader.next_event() {
         match event {
             Ok(LinearReadEvent::ReadRequest(wanted)) => {
@@ -81,7 +95,8 @@ pub fn read_log(path: &Path) -> Result<Log, McapError> {
                 gathered.take(&record).map_err(unusable)?;
             }
             Err(mcap::McapError::UnexpectedEof) if gathered.begun => {
-                gathered.log.broken = Some(gathered.broken());
+                let broken = gathered.broken();
+                gathered.log.broken.get_or_insert(broken);
                 break;
             }
             Err(mcap::McapError::BadMagic | mcap::McapError::UnexpectedEof) => {
@@ -92,7 +107,7 @@ pub fn read_log(path: &Path) -> Result<Log, McapError> {
             }
         }
     }
-    Ok(gathered.log)
+    Ok(())
 }
 
 /// A channel whose messages are read.
@@ -114,6 +129,8 @@ struct Gathered {
     last_ns: u64,
     schemas: BTreeMap<u16, String>,
     channels: BTreeMap<u16, Known>,
+    /// Places of the files before, by topic and schema.
+    places: Vec<(String, String, usize)>,
     /// Transforms by topic, parent and child.
     links: BTreeMap<(String, String, String), usize>,
 }
@@ -123,6 +140,20 @@ impl Gathered {
     fn broken(&self) -> String {
         let seconds = self.last_ns.saturating_sub(self.first_ns.unwrap_or(self.last_ns)) as f64 * 1e-9;
         format!("the file breaks off after {} messages, {seconds:.3} s after the first", self.messages)
+    }
+
+    /// Makes ready for the next file of a bag, which numbers its channels anew and goes on with their streams.
+    fn next_file(&mut self) {
+        self.begun = false;
+        self.schemas.clear();
+        let channels = std::mem::take(&mut self.channels).into_values();
+        self.places.extend(channels.filter_map(|known| Some((known.topic, known.schema, known.place?))));
+    }
+
+    /// Where a stream of the files before is kept; each goes on in one channel.
+    fn place_of(&mut self, topic: &str, schema: &str) -> Option<usize> {
+        let found = self.places.iter().position(|(t, s, _)| t == topic && s == schema)?;
+        Some(self.places.remove(found).2)
     }
 
     fn take(&mut self, record: &Record<'_>) -> Result<(), String> {
@@ -144,15 +175,16 @@ impl Gathered {
     }
 
     fn channel(&mut self, channel: &mcap::records::Channel) {
-        let Some(schema) = self.schemas.get(&channel.schema_id) else { return };
+        let Some(schema) = self.schemas.get(&channel.schema_id).cloned() else { return };
         if self.channels.contains_key(&channel.id) {
             return;
         }
         let (topic, encoding) = (&channel.topic, &channel.message_encoding);
-        if let Some(decoder) = decoder(schema, encoding) {
-            let known = Known { topic: topic.clone(), schema: schema.clone(), decoder, place: None };
+        if let Some(decoder) = decoder(&schema, encoding) {
+            let place = self.place_of(topic, &schema);
+            let known = Known { topic: topic.clone(), schema, decoder, place };
             self.channels.insert(channel.id, known);
-        } else if is_known(schema) {
+        } else if is_known(&schema) {
             let unread = format!("{topic} ({schema} in the encoding `{encoding}`)");
             if !self.log.unread.contains(&unread) {
                 self.log.unread.push(unread);

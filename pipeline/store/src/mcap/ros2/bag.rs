@@ -31,6 +31,15 @@ pub(in super::super) fn metadata(file: &str, summary: &McapSummary) -> String {
     )
 }
 
+/// Names of the files of messages in a `metadata.yaml`, in order: the list below `relative_file_paths`, one a line, as bags of ROS 2
+/// have it.
+pub(in super::super) fn names(metadata: &str) -> Vec<String> {
+    let mut lines = metadata.lines().map(str::trim).skip_while(|line| *line != "relative_file_paths:");
+    lines.next();
+    let entries = lines.map_while(|line| line.strip_prefix("- "));
+    entries.map(|name| name.trim().trim_matches(['"', '\'']).to_owned()).collect()
+}
+
 fn topic_entry(topic: &Topic, count: u64) -> String {
     let quality = quality_of_service(topic).replace('\n', "\\n");
     format!(
@@ -38,4 +47,25 @@ fn topic_entry(topic: &Topic, count: u64) -> String {
          offered_qos_profiles: \"{quality}\"\n      message_count: {count}\n",
         topic.name, topic.schema
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn val_the_names_of_a_bags_files() {
+        let summary = McapSummary {
+            messages: 1,
+            counts: vec![0; ROS2.len()],
+            start_ns: 0,
+            end_ns: 1,
+            data_bytes: 1,
+            content_sha256: String::new(),
+        };
+        assert_eq!(names(&metadata("a-0001.mcap", &summary)), ["a-0001.mcap"]);
+        let split = "rosbag2_bagfile_information:\n  relative_file_paths:\n  - drive_0.mcap\n  - \"drive_1.mcap\"\n  - 'drive_10.mcap'\n  files:\n  - path: x\n";
+        assert_eq!(names(split), ["drive_0.mcap", "drive_1.mcap", "drive_10.mcap"]);
+        assert!(names("").is_empty() && names("relative_file_paths:").is_empty());
+    }
 }

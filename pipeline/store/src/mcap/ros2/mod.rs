@@ -7,7 +7,7 @@ mod bag;
 mod definitions;
 pub(super) mod message;
 
-pub(super) use bag::metadata as bag_metadata;
+pub(super) use bag::{metadata as bag_metadata, names as bag_names};
 pub(super) use message::GridMap;
 
 use super::frames::{BASE, IDENTITY, MAP, class_rgb, corridor, rotated, wheel_rotation};
@@ -52,7 +52,11 @@ fn schema(topic: &Topic) -> Result<Vec<u8>, McapError> {
 }
 
 fn channel_metadata(topic: &Topic) -> BTreeMap<String, String> {
-    BTreeMap::from([("offered_qos_profiles".to_owned(), bag::quality_of_service(topic))])
+    let pair = |key: &str, value: String| (key.to_owned(), value);
+    BTreeMap::from([
+        pair("description", topic.description.to_owned()),
+        pair("offered_qos_profiles", bag::quality_of_service(topic)),
+    ])
 }
 
 /// Puts all messages of a mission on the timeline.
