@@ -99,6 +99,7 @@ fn val_only_whole_releases_are_packed() {
         &["pack", "shard", "-o", "a.tar"][..],
         &["compare", "shard", "release"],
         &["info", "shard"],
+        &["report", "shard", "-o", "r"],
         &["verify", "shard"],
     ] {
         refused(arguments, 65, "join the shards first: `sastrugi merge");

@@ -45,6 +45,12 @@ pub enum ReportError {
         /// The folder.
         path: PathBuf,
     },
+    /// The folder is a part of a release.
+    #[error("{path}: one shard of a release; join the shards first: `sastrugi merge SHARD... -o RELEASE`")]
+    Shard {
+        /// The folder.
+        path: PathBuf,
+    },
     /// A file could not be written.
     #[error("write {path}: {source}")]
     Write {
@@ -83,7 +89,10 @@ pub enum ReportError {
 impl ReportError {
     /// True when the release is the cause (missing or unusable), not the place of the report.
     pub fn unusable_input(&self) -> bool {
-        matches!(self, Self::NotARelease { .. } | Self::Read { .. } | Self::Other { .. } | Self::Logs { .. })
+        matches!(
+            self,
+            Self::NotARelease { .. } | Self::Shard { .. } | Self::Read { .. } | Self::Other { .. } | Self::Logs { .. }
+        )
     }
 
     /// The same about the release to compare with.

@@ -8,7 +8,7 @@ use sastrugi_schemas::fit::FitFile;
 use sastrugi_schemas::manifest::{self, Manifest};
 use sastrugi_schemas::study::HypothesisItem;
 use sastrugi_schemas::tables::{LogRow, SampleRow};
-use sastrugi_store::release::{MANIFEST, TABLES};
+use sastrugi_store::release::{MANIFEST, SHARD, TABLES};
 use sastrugi_store::{dem, digest, parquet};
 use std::fmt::Display;
 use std::fs;
@@ -22,9 +22,12 @@ impl Data {
     /// Reads the tables of a release.
     ///
     /// # Errors
-    /// [`ReportError::NotARelease`] for a folder that is none; a file that is there but cannot be read.
+    /// [`ReportError::NotARelease`] for a folder that is none, [`ReportError::Shard`] for a part of one; a file that is there but cannot be read.
     pub fn open(folder: &Path) -> Result<Self, ReportError> {
         let release = Release { folder: folder.to_owned() };
+        if folder.join(SHARD).is_file() {
+            return Err(ReportError::Shard { path: folder.to_owned() });
+        }
         if !folder.join(STUDY).is_file() && !folder.join(TABLES).is_dir() {
             return Err(ReportError::NotARelease { path: folder.to_owned() });
         }
