@@ -357,7 +357,8 @@ pub struct HypothesisItem {
     pub statistic: Statistic,
     /// Labels of the groups: two for `difference` and `equivalence`, three or more in their order for `trend`.
     pub groups: Vec<String>,
-    /// Id of the `[[traverse]]` whose missions are meant; needed where several drive these groups.
+    /// Id of the `[[traverse]]` whose missions are meant, one that drives all of these groups and has no sweep; needed where several
+    /// drive them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub traverse: Option<String>,
     /// What is claimed.

@@ -82,6 +82,15 @@ fn val_hypotheses_are_refused_with_the_line() {
     refused("\"difference\"", "\"difference\"\ntraverse = \"nobody\"", &["traverse", "nobody", "husky"]);
     let second = "[[traverse]]\nid = \"again\"\nmissions = \"short\"\n\n[[hypothesis]]";
     refused("[[hypothesis]]", second, &["traverse", "is missing", "again, husky"]);
+    let swept = "missions = \"short\"\nsweep.speed_m_s = [0.5, 1.0]\n";
+    let hypothesis = format!("{swept}{good}");
+    study_refused("missions = \"short\"\n", &hypothesis, &["traverse", "no run without a sweep"]);
+    let other = good.replace("\"h\"", "\"k\"") + "alpha = 0.01\n";
+    study_refused(
+        "missions = \"short\"\n",
+        &format!("missions = \"short\"\n{good}{other}"),
+        &["alpha", "shares one level"],
+    );
 }
 
 #[test]

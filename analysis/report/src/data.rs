@@ -149,11 +149,20 @@ impl Data {
     /// Missions by group, groups in natural order. Where the release has several runs each is a group of its own: other vehicles or
     /// other ways are no repetitions.
     pub fn groups_of<'a>(&'a self, missions: Vec<&'a MissionRow>) -> Vec<Group<'a, MissionRow>> {
-        let labels: BTreeMap<&str, &str> = self.terrains.iter().map(|t| (t.terrain_id.as_str(), label(t))).collect();
-        let of_terrain = |m: &MissionRow| labels.get(m.terrain_id.as_str()).copied();
+        let names = self.names();
+        self.grouped(missions.into_iter().map(|m| (names(m), m)))
+    }
+
+    /// Label and run of any mission.
+    fn names<'a>(&'a self) -> impl Fn(&MissionRow) -> Of<'a> {
+        let kinds: BTreeMap<&str, &str> = self.terrains.iter().map(|t| (t.terrain_id.as_str(), label(t))).collect();
+        let labels: BTreeSet<&str> = self.missions.iter().filter_map(|m| m.group.as_deref()).collect();
         let runs = self.runs();
-        let name = |m: &'a MissionRow| (m.group.as_deref().or(of_terrain(m)).unwrap_or("all"), run(&runs, m));
-        self.grouped(missions.into_iter().map(|m| (name(m), m)))
+        move |m| {
+            let own = m.group.as_deref().and_then(|group| labels.get(group).copied());
+            let of_terrain = || kinds.get(m.terrain_id.as_str()).copied();
+            (own.or_else(of_terrain).unwrap_or("all"), run(&runs, m))
+        }
     }
 
     /// Ids of the runs: those of the plain missions, to which variants belong.
@@ -175,8 +184,7 @@ impl Data {
             Some(run) if runs.len() > 1 => format!("{label}, {run}"),
             _ => label.to_owned(),
         };
-        let missions: BTreeSet<_> =
-            self.missions.iter().filter_map(|m| Some((m.group.as_deref()?, run(&runs, m)))).collect();
+        let missions: BTreeSet<Of> = self.missions.iter().map(self.names()).collect();
         let terrains = self.terrains.iter().map(|t| (label(t), None));
         let names: BTreeSet<Natural> =
             terrains.chain(missions).map(|(label, run)| natural(&named(label, run))).collect();

@@ -2,8 +2,8 @@
 //! release both say.
 //!
 //! Terrains are the units: a terrain's value is the mean over its missions (of success: of all; of other figures: of the
-//! successful ones). Terrains that both releases have, with equal heights or from the same random draws under one id, are compared in
-//! pairs, and a group that has such terrains by these alone; other groups are compared as independent samples. Tests and shifts are
+//! successful ones). Where all terrains of the smaller group are in both releases, with equal heights or from the same random draws
+//! under one id, these are compared in pairs; other groups as independent samples. Tests and shifts are
 //! those of [`Difference`], adjusted by Holm over all figures; a difference of means whose interval of coverage `1 - 2 alpha` lies
 //! within the margin is none that matters (two one-sided tests).
 
@@ -15,6 +15,8 @@ use sastrugi_statistics::{Difference, Interval, MeanDifference, holm, permutatio
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 
+/// Name of the random streams.
+pub const STREAMS: &str = "compare";
 /// Margin of equivalence: a share of the other release's mean; of success and the shares of classes, of one.
 pub const MARGIN: f64 = 0.05;
 
@@ -56,7 +58,9 @@ pub struct Quantity {
     pub terrains: [usize; 2],
     /// True when terrains are compared in pairs.
     pub paired: bool,
-    /// True when the terrains compared have the same values in both.
+    /// Terrains of A and B that have no partner and were left out.
+    pub left_out: [usize; 2],
+    /// True when all terrains have the same values in both.
     pub equal: bool,
     /// Mean of A.
     pub a: f64,
@@ -85,47 +89,33 @@ pub struct Quantity {
 /// Sum and number of finite values.
 type Mean = (f64, usize);
 
-/// Where rows are compared: table, label, variant, run.
-type Place = (&'static str, String, Option<String>, Option<String>);
+/// Where rows are compared.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Place {
+    table: &'static str,
+    label: String,
+    variant: Option<String>,
+    run: Option<String>,
+}
 
-/// Every figure, by terrain.
-type ByFigure = BTreeMap<Name, BTreeMap<String, Mean>>;
+/// Values of a figure.
+#[derive(Clone, Debug)]
+struct Figure {
+    unit: &'static str,
+    /// Scale of the margin, where it is not the mean.
+    scale: Option<f64>,
+    by_terrain: BTreeMap<String, Mean>,
+}
+
+/// Figures by column.
+type ByFigure = BTreeMap<&'static str, Figure>;
 
 /// Figures of a release, summed row by row: memory grows with the terrains, not with the missions.
 #[derive(Clone, Debug, Default)]
 pub struct Figures {
-    /// By place and figure: by terrain.
     values: BTreeMap<Place, ByFigure>,
     /// Label, hash of the heights and words of the random streams of every terrain.
     terrains: BTreeMap<String, Terrain>,
-}
-
-/// Column, unit, and the scale of the margin where it is not the mean.
-#[derive(Clone, Copy, Debug)]
-struct Name {
-    figure: &'static str,
-    unit: &'static str,
-    scale: Option<f64>,
-}
-
-impl PartialEq for Name {
-    fn eq(&self, other: &Self) -> bool {
-        self.figure == other.figure
-    }
-}
-
-impl Eq for Name {}
-
-impl PartialOrd for Name {
-    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl Ord for Name {
-    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
-        self.figure.cmp(other.figure)
-    }
 }
 
 #[derive(Clone, Debug)]
@@ -138,11 +128,10 @@ struct Terrain {
 impl Figures {
     /// Adds a terrain, with the hash of its heights where the release states it. Before the missions on it.
     pub fn add_terrain(&mut self, row: &TerrainRow, content: Option<&str>) {
-        let label = crate::data::label(row).to_owned();
-        let place = (TerrainRow::TABLE.name, label.clone(), row.variant.clone(), None);
+        let (table, label) = (TerrainRow::TABLE.name, crate::data::label(row).to_owned());
+        let place = Place { table, label: label.clone(), variant: row.variant.clone(), run: None };
         for (figure, scale, value) in OF_TERRAINS {
-            let name = Name { figure, unit: unit::<TerrainRow>(figure), scale };
-            self.add(&place, name, &row.terrain_id, value(row));
+            self.add(&place, (figure, unit::<TerrainRow>(figure), scale), &row.terrain_id, value(row));
         }
         let (content, stream) = (content.map(str::to_owned), row.stream.clone());
         self.terrains.insert(row.terrain_id.clone(), Terrain { label, content, stream });
@@ -152,42 +141,48 @@ impl Figures {
     pub fn add_mission(&mut self, row: &MissionRow) {
         let of_terrain = || self.terrains.get(&row.terrain_id).map(|t| t.label.clone());
         let label = row.group.clone().or_else(of_terrain).unwrap_or_else(|| "all".to_owned());
-        let place = (MissionRow::TABLE.name, label, row.variant.clone(), Some(row.traverse_id.clone()));
+        let (variant, run) = (row.variant.clone(), Some(row.traverse_id.clone()));
+        let place = Place { table: MissionRow::TABLE.name, label, variant, run };
         for statistic in Statistic::ALL {
-            let success = statistic == Statistic::Success;
             let figure = statistic.column();
-            let unit = if success { "%" } else { unit::<MissionRow>(figure) };
-            let name = Name { figure, unit, scale: success.then_some(100.0) };
-            self.add(&place, name, &row.terrain_id, statistic.of(row));
+            let (unit, scale) = match statistic {
+                Statistic::Success => ("%", Some(100.0)),
+                _ => (unit::<MissionRow>(figure), None),
+            };
+            self.add(&place, (figure, unit, scale), &row.terrain_id, statistic.of(row));
         }
     }
 
-    fn add(&mut self, place: &Place, name: Name, terrain: &str, value: f64) {
+    fn add(
+        &mut self,
+        place: &Place,
+        (figure, unit, scale): (&'static str, &'static str, Option<f64>),
+        terrain: &str,
+        value: f64,
+    ) {
         if !self.values.contains_key(place) {
-            self.values.insert(place.clone(), BTreeMap::new());
+            self.values.insert(place.clone(), ByFigure::new());
         }
         let Some(figures) = self.values.get_mut(place).filter(|_| value.is_finite()) else { return };
-        let of_terrains = figures.entry(name).or_default();
-        match of_terrains.get_mut(terrain) {
+        let none = || Figure { unit, scale, by_terrain: BTreeMap::new() };
+        let by_terrain = &mut figures.entry(figure).or_insert_with(none).by_terrain;
+        match by_terrain.get_mut(terrain) {
             Some((sum, count)) => (*sum, *count) = (*sum + value, *count + 1),
-            None => drop(of_terrains.insert(terrain.to_owned(), (value, 1))),
+            None => drop(by_terrain.insert(terrain.to_owned(), (value, 1))),
         }
     }
 
     /// True when missions of one group and variant belong to several runs.
     fn has_several_runs(&self) -> bool {
-        let mut places: Vec<_> = self.values.keys().map(|(table, label, variant, _)| (table, label, variant)).collect();
+        let mut places: Vec<_> = self.values.keys().map(|p| (p.table, &p.label, &p.variant)).collect();
         places.dedup();
         places.len() < self.values.len()
     }
 
-    /// Figures by table and the words of the group.
-    fn by_group(&self, with_runs: bool) -> BTreeMap<(&'static str, String), &ByFigure> {
-        let key = |(table, label, variant, run): &Place| {
-            let parts = [Some(label), variant.as_ref(), run.as_ref().filter(|_| with_runs)];
-            (*table, parts.into_iter().flatten().cloned().collect::<Vec<_>>().join(", "))
-        };
-        self.values.iter().map(|(place, figures)| (key(place), figures)).collect()
+    /// Figures by place; without its run where there is one alone.
+    fn by_place(&self, with_runs: bool) -> BTreeMap<Place, &ByFigure> {
+        let of = |place: &Place| Place { run: place.run.clone().filter(|_| with_runs), ..place.clone() };
+        self.values.iter().map(|(place, figures)| (of(place), figures)).collect()
     }
 
     /// True when a terrain is the same in both, or made from the same random draws.
@@ -198,28 +193,42 @@ impl Figures {
     }
 }
 
+impl Place {
+    /// Group, variant and run.
+    fn in_words(&self) -> String {
+        let parts = [Some(&self.label), self.variant.as_ref(), self.run.as_ref()];
+        parts.into_iter().flatten().cloned().collect::<Vec<_>>().join(", ")
+    }
+}
+
 /// Every figure that both releases have, and the groups that only A and only B has.
 pub fn compare(a: &Figures, b: &Figures, settings: Settings, streams: &Streams) -> (Vec<Quantity>, [Vec<String>; 2]) {
     let with_runs = a.has_several_runs() || b.has_several_runs();
-    let (of_a, of_b) = (a.by_group(with_runs), b.by_group(with_runs));
+    let (of_a, of_b) = (a.by_place(with_runs), b.by_place(with_runs));
     let mut compared = Vec::new();
-    for ((table, group), figures) in &of_a {
-        let Some(others) = of_b.get(&(*table, group.clone())) else { continue };
-        let terrains: BTreeSet<&String> = figures.values().flat_map(BTreeMap::keys).collect();
-        let paired = terrains.into_iter().any(|t| a.shares_ground(b, t));
-        for (name, first) in figures.iter() {
-            let Some(second) = others.get(name) else { continue };
-            let shared = |t: &str| paired && a.shares_ground(b, t);
-            compared.push(((*table, group.as_str(), *name), Sides::of(first, second, paired, shared)));
+    for (place, figures) in &of_a {
+        let Some(others) = of_b.get(place) else { continue };
+        let terrains = |figures: &ByFigure| -> BTreeSet<String> {
+            figures.values().flat_map(|figure| figure.by_terrain.keys().cloned()).collect()
+        };
+        let (here, there) = (terrains(figures), terrains(others));
+        let shared: BTreeSet<&String> = here.intersection(&there).filter(|t| a.shares_ground(b, t)).collect();
+        let paired = !shared.is_empty() && shared.len() == here.len().min(there.len());
+        for (name, first) in *figures {
+            if let Some(second) = others.get(name) {
+                compared.push((place, *name, first, Sides::of(first, second, paired.then_some(&shared))));
+            }
         }
     }
     let draws = permutation::draws(compared.len(), settings.alpha);
-    let of = |(key, sides): &(_, Sides)| quantity(*key, sides, settings, draws, streams);
+    let of = |(place, name, figure, sides): &(&Place, _, &Figure, Sides)| {
+        quantity(place, (*name, *figure), sides, settings, draws, streams)
+    };
     let mut quantities: Vec<Quantity> = compared.iter().map(of).collect();
     judge(&mut quantities, settings.alpha);
-    let alone = |one: &BTreeMap<(&str, String), _>, other: &BTreeMap<(&str, String), _>| {
-        let only = one.keys().filter(|key| !other.contains_key(*key));
-        only.map(|(table, group)| format!("{group} ({table})")).collect()
+    let alone = |one: &BTreeMap<Place, _>, other: &BTreeMap<Place, _>| {
+        let only = one.keys().filter(|place| !other.contains_key(*place));
+        only.map(|place| format!("{} ({})", place.in_words(), place.table)).collect()
     };
     (quantities, [alone(&of_a, &of_b), alone(&of_b, &of_a)])
 }
@@ -229,19 +238,23 @@ struct Sides {
     first: Vec<f64>,
     second: Vec<f64>,
     paired: bool,
+    left_out: [usize; 2],
 }
 
 impl Sides {
-    fn of(a: &BTreeMap<String, Mean>, b: &BTreeMap<String, Mean>, paired: bool, shared: impl Fn(&str) -> bool) -> Self {
+    fn of(a: &Figure, b: &Figure, shared: Option<&BTreeSet<&String>>) -> Self {
         let mean = |(sum, n): &Mean| sum / *n as f64;
-        if !paired {
+        let (a, b) = (&a.by_terrain, &b.by_terrain);
+        let Some(shared) = shared else {
             let all = |of: &BTreeMap<String, Mean>| of.values().map(mean).collect();
-            return Self { first: all(a), second: all(b), paired };
-        }
-        let pair =
-            |(terrain, value): (&String, &Mean)| Some((mean(value), mean(b.get(terrain).filter(|_| shared(terrain))?)));
+            return Self { first: all(a), second: all(b), paired: false, left_out: [0; 2] };
+        };
+        let pair = |(terrain, value): (&String, &Mean)| {
+            Some((mean(value), mean(b.get(terrain).filter(|_| shared.contains(terrain))?)))
+        };
         let (first, second): (Vec<f64>, Vec<f64>) = a.iter().filter_map(pair).unzip();
-        Self { first, second, paired }
+        let left_out = [a.len() - first.len(), b.len() - first.len()];
+        Self { first, second, paired: true, left_out }
     }
 }
 
@@ -251,21 +264,23 @@ fn unit<R: Record>(column: &str) -> &'static str {
 
 /// A figure without its answer, which needs all of them.
 fn quantity(
-    (table, group, name): (&'static str, &str, Name),
+    place: &Place,
+    (name, figure): (&'static str, &Figure),
     sides: &Sides,
     settings: Settings,
     draws: usize,
     streams: &Streams,
 ) -> Quantity {
-    let Sides { first, second, paired } = sides;
-    let mut stream = streams.stream(&format!("{table}/{group}/{}", name.figure));
+    let Sides { first, second, paired, left_out } = sides;
+    let (table, group) = (place.table, place.in_words());
+    let mut stream = streams.stream(&format!("{table}/{group}/{name}"));
     let pairs = first.iter().zip(second).map(|(a, b)| [*a, *b]);
     let Difference { test, effect, means } = match paired {
         true => Difference::of_pairs(pairs, 1.0 - settings.alpha, draws, &mut stream),
         false => Difference::apart(first, second, 1.0 - settings.alpha, draws, &mut stream),
     };
-    let equal = !first.is_empty() && first == second;
-    let scale = name.scale.unwrap_or_else(|| sums::mean(first).abs());
+    let equal = !first.is_empty() && first == second && *left_out == [0; 2];
+    let scale = figure.scale.unwrap_or_else(|| sums::mean(first).abs());
     let margin = Some(settings.margin * scale).filter(|margin| *margin > 0.0);
     let known = |p: f64| Some(p).filter(|p| !p.is_nan());
     let three = |i: Interval| [i.estimate, i.low, i.high];
@@ -274,11 +289,12 @@ fn quantity(
     let [a, b] = [first, second].map(|values| sums::mean(values));
     Quantity {
         table,
-        group: group.to_owned(),
-        figure: name.figure,
-        unit: name.unit,
+        group,
+        figure: name,
+        unit: figure.unit,
         terrains: [first.len(), second.len()],
         paired: *paired,
+        left_out: *left_out,
         equal,
         a,
         b,
@@ -317,11 +333,11 @@ mod tests {
     fn drawn(terrains: usize, seed: u64, shift: f64) -> Figures {
         let mut stream = Streams::for_seed(seed, "drawn").stream("values");
         let mut figures = Figures::default();
-        let place = ("missions", "g".to_owned(), None, None);
+        let place = Place { table: "missions", label: "g".to_owned(), variant: None, run: None };
         for k in 0..terrains {
             let terrain = format!("t-{k:04}");
             for figure in COLUMNS {
-                figures.add(&place, Name { figure, unit: "m", scale: None }, &terrain, 10.0 + shift + stream.normal());
+                figures.add(&place, (figure, "m", None), &terrain, 10.0 + shift + stream.normal());
             }
             let of = Terrain { label: "g".into(), content: None, stream: Some(seed.to_string()) };
             figures.terrains.insert(terrain, of);
@@ -354,7 +370,8 @@ mod tests {
         assert!(all(compared(&a, &a), Answer::Same));
         let raised = |by: f64| {
             let mut b = drawn(20, 1, 0.0);
-            let means = b.values.values_mut().flat_map(BTreeMap::values_mut).flat_map(BTreeMap::values_mut);
+            let figures = b.values.values_mut().flat_map(BTreeMap::values_mut);
+            let means = figures.flat_map(|figure| figure.by_terrain.values_mut());
             means.enumerate().for_each(|(k, (sum, _))| *sum += by + 1e-3 * (k % 7) as f64);
             b
         };
@@ -375,14 +392,36 @@ mod tests {
     fn val_shared_terrains_are_pairs() {
         let (few, more) = (drawn(12, 1, 0.0), drawn(20, 1, 0.0));
         for q in compared(&few, &more) {
-            assert_eq!((q.paired, q.terrains, q.equal, q.answer), (true, [12, 12], true, Answer::Same));
+            assert_eq!((q.paired, q.terrains, q.left_out, q.equal), (true, [12, 12], [0, 8], false));
+            // No difference on 12 terrains: a sign test against the margin, 2^-12.
+            assert_eq!((q.p, q.p_equivalence, q.answer), (Some(1.0), Some(1.0 / 4096.0), Answer::Same));
         }
         let mut without = drawn(12, 1, 0.0);
         let figures = without.values.values_mut().flat_map(BTreeMap::values_mut);
-        figures.take(1).for_each(|of| assert!(of.remove("t-0003").is_some()));
+        figures.take(1).for_each(|figure| assert!(figure.by_terrain.remove("t-0003").is_some()));
         let found: Vec<(bool, usize, bool)> =
             compared(&few, &without).iter().map(|q| (q.paired, q.terrains[0], q.equal)).collect();
-        assert_eq!(found, [(true, 11, true), (true, 12, true), (true, 12, true), (true, 12, true)]);
+        assert_eq!(found, [(true, 11, false), (true, 12, true), (true, 12, true), (true, 12, true)]);
+    }
+
+    /// One terrain in common of many: the others are not left out.
+    #[test]
+    fn val_groups_that_share_few_terrains_are_apart() {
+        let (a, mut b) = (drawn(20, 1, 0.0), drawn(20, 2, 0.0));
+        b.terrains.insert("t-0000".into(), a.terrains["t-0000"].clone());
+        assert!(compared(&a, &b).iter().all(|q| !q.paired && q.terrains == [20, 20] && !q.equal));
+    }
+
+    /// Every terrain later by the same little: a difference that is found, within the margin.
+    #[test]
+    fn val_a_constant_difference_within_the_margin_is_none() {
+        let (a, mut b) = (drawn(20, 1, 0.0), drawn(20, 1, 0.0));
+        for figure in b.values.values_mut().flat_map(BTreeMap::values_mut) {
+            figure.by_terrain.values_mut().for_each(|(sum, _)| *sum += 0.05);
+        }
+        for q in compared(&a, &b) {
+            assert!(q.p.is_some_and(|p| p < 1e-3) && q.answer == Answer::Same, "{q:?}");
+        }
     }
 
     /// Runs of other names are one another's while there is one in each release, and are told apart where there are two.
@@ -391,7 +430,7 @@ mod tests {
         let renamed = |run: &str| {
             let mut figures = drawn(5, 1, 0.0);
             let old = std::mem::take(&mut figures.values);
-            figures.values = old.into_iter().map(|(p, f)| ((p.0, p.1, p.2, Some(run.to_owned())), f)).collect();
+            figures.values = old.into_iter().map(|(p, f)| (Place { run: Some(run.to_owned()), ..p }, f)).collect();
             figures
         };
         let (one, mut two) = (renamed("husky"), renamed("jackal"));

@@ -11,6 +11,8 @@
 //! p = max of P(t > (margin + d) / s), P(t > (margin - d) / s)
 //! ```
 //!
+//! Where no value varies `s` is 0 and tells nothing; then `p = 2^-n`, that of a sign test against the margin, of the median.
+//!
 //! `p <= alpha` exactly where the interval of coverage `1 - 2 alpha` lies within the margins. Terrain means are near
 //! enough to normal for a mean of ten or more; below that the t distribution is an assumption.
 
@@ -28,6 +30,8 @@ pub struct MeanDifference {
     pub standard_error: f64,
     /// Degrees of freedom of the standard error.
     pub freedom: f64,
+    /// Pairs, or terrains of the smaller group.
+    pub values: usize,
 }
 
 impl MeanDifference {
@@ -39,14 +43,16 @@ impl MeanDifference {
             parts[0] * parts[0] / (first.len() as f64 - 1.0) + parts[1] * parts[1] / (second.len() as f64 - 1.0);
         let freedom = if total > 0.0 { total * total / per_freedom } else { (first.len() + second.len()) as f64 - 2.0 };
         let estimate = sums::mean(second) - sums::mean(first);
-        Self { estimate, standard_error: total.sqrt(), freedom }.if_known()
+        let values = first.len().min(second.len());
+        Self { estimate, standard_error: total.sqrt(), freedom, values }.if_known()
     }
 
     /// Of paired groups, from the differences within blocks; `None` with fewer than two.
     pub fn of_pairs(differences: &[f64]) -> Option<Self> {
         let standard_error = squared_error(differences).sqrt();
         let estimate = sums::mean(differences);
-        Self { estimate, standard_error, freedom: differences.len() as f64 - 1.0 }.if_known()
+        let values = differences.len();
+        Self { estimate, standard_error, freedom: values as f64 - 1.0, values }.if_known()
     }
 
     /// False where no value varies: nothing then tells how far the estimate may be off.
@@ -61,15 +67,14 @@ impl MeanDifference {
         Interval { estimate: self.estimate, low: self.estimate - reach, high: self.estimate + reach, level }
     }
 
-    /// Probability, at most, of a difference so well within the margin when the true one is not; NaN where nothing varies.
+    /// Probability, at most, of a difference so well within the margin when the true one is not.
     pub fn equivalence_p(&self, margin: f64) -> f64 {
         self.above(-margin).max(self.above_mirrored(-margin))
     }
 
-    /// Probability, at most, of a difference so far beyond the margin when the true one is not; NaN where nothing varies.
+    /// Probability, at most, of a difference so far beyond the margin when the true one is not.
     pub fn beyond_p(&self, margin: f64) -> f64 {
-        let p = 2.0 * self.above(margin).min(self.above_mirrored(margin));
-        if p > 1.0 { 1.0 } else { p }
+        (2.0 * self.above(margin).min(self.above_mirrored(margin))).min(1.0)
     }
 
     /// The smallest margin within which the groups are equivalent at level `alpha`: the farther end of the interval of
@@ -79,10 +84,13 @@ impl MeanDifference {
         i.low.abs().max(i.high.abs())
     }
 
-    /// One-sided p against a true difference of at most `bound`.
+    /// One-sided p against a true difference of at most `bound`. Where nothing varies that of a sign test: all values lie above.
     fn above(&self, bound: f64) -> f64 {
-        let error = if self.scatters() { self.standard_error } else { f64::NAN };
-        student::cdf((bound - self.estimate) / error, self.freedom)
+        match self.scatters() {
+            true => student::cdf((bound - self.estimate) / self.standard_error, self.freedom),
+            false if self.estimate > bound => libm::exp2(-(self.values as f64)),
+            false => 1.0,
+        }
     }
 
     /// The same of the first less the second.

@@ -16,7 +16,8 @@
 //! that the test keeps its level with any number of draws. Cost: one evaluation of the statistic per arrangement.
 //!
 //! Of rank statistics of very many values the exact variance over all arrangements is used with the normal distribution
-//! (A. Wald and J. Wolfowitz, 1944): random arrangements would be slow, and no p below one in their number.
+//! (A. Wald and J. Wolfowitz, 1944), where no single term is large beside their sum (G. Noether, 1949; few values apart from many
+//! ties, or a small group beside a large one, are such terms): random arrangements would be slow, and no p below one in their number.
 
 use crate::correlation::ranks;
 use crate::normal;
@@ -26,15 +27,21 @@ use sastrugi_numeric::{Stream, sums};
 pub(crate) const EQUAL: f64 = 1e-10;
 /// Values from which rank statistics are taken for normal.
 const NORMAL_FROM: usize = 300;
+/// Largest square of one term, as a share of the variance of the sum, with which the sum is taken for normal; 300 values without ties
+/// in two equal groups have 0.04.
+const TERM_MAX: f64 = 0.05;
 /// Random arrangements of a test, where several tests at once do not call for more.
 const DRAWS: usize = 9999;
 /// With as many arrangements as this times the tests over their level, Holm's adjustment leaves p that are found.
 const DRAWS_PER_TEST: f64 = 4.0;
 
+/// Arrangements at most: beyond some hundred tests at small levels they would take hours.
+const DRAWS_MAX: f64 = 1e5;
+
 /// Random arrangements for each of several tests that are adjusted together to a level; where there are no more than these,
 /// all are looked at.
 pub fn draws(tests: usize, alpha: f64) -> usize {
-    DRAWS.max((DRAWS_PER_TEST * tests as f64 / alpha).min(1e6) as usize)
+    DRAWS.max((DRAWS_PER_TEST * tests as f64 / alpha).min(DRAWS_MAX) as usize)
 }
 
 /// Where the arrangements of a test come from.
@@ -57,18 +64,8 @@ pub struct Permutation {
     pub p: f64,
     /// What it is a share of.
     pub arrangements: Arrangements,
-}
-
-impl Permutation {
-    /// The least p that any data of these numbers of values could have: of two arrangements, one the mirror of the other, both are
-    /// as extreme.
-    pub fn least_p(&self) -> f64 {
-        match self.arrangements {
-            Arrangements::All(n) => 2.0 / n as f64,
-            Arrangements::Drawn(n) => 1.0 / n as f64,
-            Arrangements::Normal => 0.0,
-        }
-    }
+    /// The least p that any data of these numbers of values could have.
+    pub least_p: f64,
 }
 
 /// The test of any statistic of labels that move within blocks. `blocks` are the lengths of consecutive runs of
@@ -98,9 +95,9 @@ pub fn within_blocks(
                 break;
             }
         }
-        let p = large as f64 / arrangements as f64;
-        let arrangements = Arrangements::All(arrangements);
-        return (all > 1.0).then_some(Permutation { observed, p, arrangements });
+        let share = |n: usize| n as f64 / arrangements as f64;
+        let (p, least_p, arrangements) = (share(large), share(1), Arrangements::All(arrangements));
+        return (all > 1.0).then_some(Permutation { observed, p, arrangements, least_p });
     }
     let mut large = 1;
     for _ in 0..draws {
@@ -108,8 +105,9 @@ pub fn within_blocks(
         large += usize::from(statistic(&labels) >= least);
     }
     let arrangements = draws + 1;
-    let p = large as f64 / arrangements as f64;
-    (draws > 0).then_some(Permutation { observed, p, arrangements: Arrangements::Drawn(arrangements) })
+    let share = |n: usize| n as f64 / arrangements as f64;
+    let (p, least_p, arrangements) = (share(large), share(1), Arrangements::Drawn(arrangements));
+    (draws > 0).then_some(Permutation { observed, p, arrangements, least_p })
 }
 
 /// The two-sided test of the sum of label times score, scores having mean 0 in every block: by arrangements as
@@ -121,22 +119,48 @@ pub(crate) fn linear_within_blocks(
     draws: usize,
     stream: &mut Stream,
 ) -> Option<Permutation> {
-    if labels.len() < NORMAL_FROM || number_of_arrangements(labels, blocks) <= draws as f64 {
-        return within_blocks(labels, blocks, draws, stream, |labels| linear(labels, scores).abs());
+    let normal = || normal_test(labels, scores, blocks).filter(|_| labels.len() >= NORMAL_FROM);
+    if number_of_arrangements(labels, blocks) > draws as f64
+        && let Some(test) = normal()
+    {
+        return Some(test);
     }
+    let test = within_blocks(labels, blocks, draws, stream, |labels| linear(labels, scores).abs())?;
+    // Of two arrangements, one the mirror of the other, both are as extreme.
+    let mirrored = matches!(test.arrangements, Arrangements::All(_)) && have_mirror_images(labels, blocks);
+    Some(if mirrored { Permutation { least_p: 2.0 * test.least_p, ..test } } else { test })
+}
+
+/// The same by the normal distribution; `None` where a single term is too large for it.
+fn normal_test(labels: &[usize], scores: &[f64], blocks: &[usize]) -> Option<Permutation> {
     let observed = linear(labels, scores).abs();
+    let (mut variance, mut term) = (0.0, 0.0f64);
     let mut at = 0;
-    let of_block = |n: &usize| {
-        let of = at..at + n;
+    for n in blocks {
+        let labels: Vec<f64> = labels.get(at..at + n)?.iter().map(|l| *l as f64).collect();
+        let scores = scores.get(at..at + n)?;
         at += n;
-        let labels: Vec<f64> = labels[of.clone()].iter().map(|l| *l as f64).collect();
-        // Squares about the means are n times the variances.
-        let squares = [&labels, &scores[of]].map(|v| sums::variance(v) * *n as f64);
-        if *n > 1 { squares[0] * squares[1] / (*n as f64 - 1.0) } else { 0.0 }
-    };
-    let variance: f64 = blocks.iter().map(of_block).sum();
-    let p = if variance > 0.0 { (2.0 * normal::cdf(-observed / variance.sqrt())).min(1.0) } else { 1.0 };
-    observed.is_finite().then_some(Permutation { observed, p, arrangements: Arrangements::Normal })
+        if *n > 1 {
+            // Squares about the means are n times the variances.
+            let squares = [&labels, scores].map(|v| sums::variance(v) * *n as f64);
+            variance += squares[0] * squares[1] / (*n as f64 - 1.0);
+            let largest = |v: &[f64]| v.iter().fold(0.0f64, |largest, x| largest.max(x.abs()));
+            let span = largest(&labels) - labels.iter().copied().fold(f64::INFINITY, f64::min);
+            term = term.max(span * largest(scores));
+        }
+    }
+    let p = (2.0 * normal::cdf(-observed / variance.sqrt())).min(1.0);
+    let fits = observed.is_finite() && term * term <= TERM_MAX * variance && variance > 0.0;
+    fits.then_some(Permutation { observed, p, arrangements: Arrangements::Normal, least_p: 0.0 })
+}
+
+/// True when labels in each block, turned from the largest to the least, are the same labels.
+fn have_mirror_images(labels: &[usize], blocks: &[usize]) -> bool {
+    let mut sorted = labels.to_vec();
+    each_block(&mut sorted, blocks).all(|block| {
+        block.sort_unstable();
+        block.iter().zip(block.iter().rev()).all(|(a, b)| a + b == block[0] + block[block.len() - 1])
+    })
 }
 
 /// Two independent groups and any statistic of both, large when they differ.

@@ -24,7 +24,7 @@ pub struct Target {
     pub difference: f64,
     /// Variance between terrains (for paired groups: of the differences between blocks).
     pub between: f64,
-    /// Variance between missions of one terrain (for paired groups: the sum of both groups').
+    /// Variance between missions of one terrain (for paired groups: of the differences within pairs of missions).
     pub within: f64,
 }
 

@@ -8,7 +8,7 @@ use crate::study::{Entry, StudyError};
 use sastrugi_schemas::ParameterError;
 use sastrugi_schemas::study::{HypothesisItem, TraverseItem};
 use serde_json::{Value, json};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Name of the section.
 pub const SECTION: &str = "hypothesis";
@@ -18,6 +18,7 @@ pub const SECTION: &str = "hypothesis";
 /// # Errors
 /// The first one that no test can be made of.
 pub fn check(builder: &mut Builder<'_>) -> Result<(), BuildError> {
+    let mut families = BTreeMap::new();
     for entry in builder.study.entries(SECTION)? {
         let (item, rest): (HypothesisItem, Value) = entry.read()?;
         entry.check_keys::<HypothesisItem>(&rest, &json!({}))?;
@@ -30,6 +31,7 @@ pub fn check(builder: &mut Builder<'_>) -> Result<(), BuildError> {
             return Err(suggesting(error, group, &known).into());
         }
         check_run(builder, &entry, &item)?;
+        check_level(&mut families, &entry, &item)?;
     }
     Ok(())
 }
@@ -57,7 +59,8 @@ fn driven<'b>(builder: &'b Builder<'_>) -> impl Iterator<Item = (&'b str, &'b st
     })
 }
 
-/// Refuses a run that is none, and the lack of one where several drive the groups: their missions are no repetitions of each other.
+/// Refuses a run that does not drive every group, and the lack of one where several drive them: their missions are no repetitions of
+/// each other. Values of a sweep are variants, which no hypothesis is about.
 fn check_run(builder: &Builder<'_>, entry: &Entry<'_>, item: &HypothesisItem) -> Result<(), BuildError> {
     let mut plain = BTreeSet::new();
     for entry in builder.study.entries(traverse::STAGE)? {
@@ -66,18 +69,34 @@ fn check_run(builder: &Builder<'_>, entry: &Entry<'_>, item: &HypothesisItem) ->
             plain.insert(run.id);
         }
     }
-    let of_groups = driven(builder).filter(|(_, group)| item.groups.iter().any(|g| g == group)).map(|(run, _)| run);
-    let runs: BTreeSet<&str> = of_groups.filter(|run| plain.contains(*run)).collect();
-    let list = runs.iter().copied().collect::<Vec<_>>().join(", ");
-    match item.traverse.as_deref() {
-        None if runs.len() > 1 => {
-            let message = format!("is missing; these groups are driven by {list}");
-            Err(entry.refuse(ParameterError::new("traverse", message)).into())
+    let of_group = |group: &String| -> BTreeSet<&str> {
+        driven(builder).filter(|(run, of)| of == group && plain.contains(*run)).map(|(run, _)| run).collect()
+    };
+    let runs: Vec<BTreeSet<&str>> = item.groups.iter().map(of_group).collect();
+    let any: BTreeSet<&str> = runs.iter().flatten().copied().collect();
+    let of_all: Vec<&str> = any.iter().copied().filter(|run| runs.iter().all(|of| of.contains(run))).collect();
+    let list = of_all.join(", ");
+    let message = match item.traverse.as_deref() {
+        _ if of_all.is_empty() => "has no answer: no run without a sweep drives all of these groups".to_owned(),
+        None if any.len() > 1 => format!("is missing; several drive these groups, all of them: {list}"),
+        Some(run) if !of_all.contains(&run) => {
+            format!("is \"{run}\", which does not drive all of these groups, or is swept; there are: {list}")
         }
-        Some(run) if !runs.contains(run) => {
-            let message = format!("\"{run}\" drives none of these groups, or is swept; there are: {list}");
-            Err(entry.refuse(ParameterError::new("traverse", message)).into())
-        }
-        _ => Ok(()),
+        _ => return Ok(()),
+    };
+    Err(entry.refuse(ParameterError::new("traverse", message)).into())
+}
+
+/// Refuses another level than that of the family: it is shared.
+fn check_level(
+    families: &mut BTreeMap<String, f64>,
+    entry: &Entry<'_>,
+    item: &HypothesisItem,
+) -> Result<(), BuildError> {
+    let alpha = *families.entry(item.family.clone()).or_insert(item.alpha);
+    if alpha == item.alpha {
+        return Ok(());
     }
+    let message = format!("is {}; the family shares one level, and others of it have {alpha}", item.alpha);
+    Err(entry.refuse(ParameterError::new("alpha", message)).into())
 }

@@ -8,14 +8,23 @@ use sastrugi_schemas::tables::TerrainRow;
 const COMPARED: &str = "terrain_id, mission_id, pair_id, outcome, progress_m, efficiency, time_s, rms_vertical_acceleration_m_s2, \
 rms_pitch_rate_deg_s, rms_roll_rate_deg_s, max_pitch_deg, max_roll_deg";
 
+/// Label of a mission, or of its terrain, or the generator of that.
+const LABEL: &str = "coalesce(\"group\", (select coalesce(terrains.\"group\", terrains.kind) from 'tables/terrains/*.parquet' as terrains \
+where terrains.terrain_id = missions.terrain_id))";
+
 /// Missions of the plain run, of one outcome or of all: the name of the group, then other columns.
 pub fn missions(data: &Data, columns: &str, outcome: Option<&str>) -> String {
     let plain = data.missions.iter().any(|m| m.variant.is_none()).then(|| "variant is null".to_owned());
     let rules: Vec<String> =
         plain.into_iter().chain(outcome.map(|word| format!("outcome = {}", quoted(word)))).collect();
     let rules = if rules.is_empty() { String::new() } else { format!(" where {}", rules.join(" and ")) };
-    let group = if data.has_several_runs() { "\"group\" || ', ' || traverse_id as \"group\"" } else { "\"group\"" };
-    format!("select {group}, {columns} from 'tables/missions/*.parquet'{rules}")
+    let label = match data.missions.iter().all(|m| m.group.is_some()) {
+        true => "\"group\"",
+        false => LABEL,
+    };
+    let run = if data.has_several_runs() { " || ', ' || traverse_id" } else { "" };
+    let name = if label == LABEL || !run.is_empty() { " as \"group\"" } else { "" };
+    format!("select {label}{run}{name}, {columns} from 'tables/missions/*.parquet' as missions{rules}")
 }
 
 /// Everything that groups of missions are compared by.

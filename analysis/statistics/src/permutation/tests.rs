@@ -152,6 +152,38 @@ fn stat_normal_p_is_that_of_arrangements() {
     }
 }
 
+/// Where a few values stand out of many ties, or a small group is beside a large one, the normal distribution is too sure: arrangements are
+/// drawn. Four of 200 pairs differ, all one way: 2 / 2^4 (5 standard errors of 20 000 draws, false alarm 6e-7).
+#[test]
+fn stat_large_terms_are_drawn() {
+    let mut s = stream("terms");
+    let pairs: Vec<f64> = (0..200).map(|k| if k < 4 { 1.0 + f64::from(k) } else { 0.0 }).collect();
+    let test = signed_rank(&pairs, 20_000, &mut s).unwrap();
+    assert_eq!(test.arrangements, Arrangements::Drawn(20_001));
+    assert!((test.p - 0.125).abs() < 5.0 * (0.125f64 * 0.875 / 20_000.0).sqrt(), "{test:?}");
+    let rare = |n: usize| (0..n).map(|k| if k % 100 == 0 { 95.0 } else { 100.0 }).collect::<Vec<_>>();
+    let apart = |n: usize, m: usize, s: &mut Stream| rank_sum(&rare(n), &rare(m), 999, s).unwrap().arrangements;
+    assert_eq!(
+        (apart(280, 20, &mut s), apart(150, 150, &mut s)),
+        (Arrangements::Drawn(1000), Arrangements::Drawn(1000))
+    );
+    let mut even = |n: usize| (0..n).map(|_| s.normal()).collect::<Vec<_>>();
+    let (large, small) = (even(1000), even(20));
+    assert_eq!(rank_sum(&large, &small, 999, &mut s).unwrap().arrangements, Arrangements::Drawn(1000));
+}
+
+/// The least p of groups of equal size is that of an arrangement and its mirror image; ties can leave an unequal one alone: five
+/// terrains at 0, three at 100 give 1 / 56.
+#[test]
+fn val_least_p() {
+    let mut s = stream("least");
+    let equal = rank_sum(&[1.0; 4], &[2.0; 4], 999, &mut s).unwrap();
+    assert_eq!((equal.p, equal.least_p), (2.0 / 70.0, 2.0 / 70.0));
+    let unequal = rank_sum(&[0.0; 5], &[100.0; 3], 999, &mut s).unwrap();
+    assert_eq!((unequal.p, unequal.least_p), (1.0 / 56.0, 1.0 / 56.0));
+    assert_eq!(signed_rank(&[1.0, 2.0, 3.0], 999, &mut s).unwrap().least_p, 0.25);
+}
+
 /// Ranks of values that are equal but for rounding are shared.
 #[test]
 fn val_rounding_makes_no_rank() {

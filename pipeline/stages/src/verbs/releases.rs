@@ -20,7 +20,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 /// Name of the random streams.
-const STAGE: &str = "compare";
+const STAGE: &str = releases::STREAMS;
 
 /// Parameters of the comparison.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]

@@ -69,8 +69,8 @@ fn test<'a>(
         way: f64::NAN,
         p: f64::NAN,
         adjusted: f64::NAN,
-        least_p: 1.0,
-        least_adjusted: 1.0,
+        least_p: f64::NAN,
+        least_adjusted: f64::NAN,
         beyond_p: f64::NAN,
         family,
     };
@@ -84,7 +84,7 @@ fn test<'a>(
         _ => verdicts::over_groups(data, &figure, &members, level),
     };
     let p = test.map_or(f64::NAN, |t| t.p);
-    let least_p = test.map_or(1.0, |t| t.least_p());
+    let least_p = test.map_or(f64::NAN, |t| t.least_p);
     let tested = Tested { of, p, least_p, ..untested };
     match (size, claim.margin) {
         (Measure::Trend(estimate), _) => {
@@ -99,7 +99,7 @@ fn test<'a>(
             let of = |p: fn(&MeanDifference, f64) -> f64| means.map_or(f64::NAN, |d| p(&d, margin));
             let estimate = means.map(|d| d.interval(1.0 - 2.0 * claim.alpha));
             let (p, beyond_p) = (of(MeanDifference::equivalence_p), of(MeanDifference::beyond_p));
-            let least_p = if means.is_some() { 0.0 } else { 1.0 };
+            let least_p = if means.is_some() { 0.0 } else { f64::NAN };
             Tested { what: "difference of means", estimate, p, beyond_p, least_p, ..tested }
         }
     }
@@ -148,7 +148,7 @@ enum Outcome {
     Opposite,
     Apart,
     CannotTell,
-    NoScatter,
+    NoMissions,
     TooFew,
 }
 
@@ -161,7 +161,7 @@ impl Outcome {
             Self::Opposite => "not supported: it goes the other way",
             Self::Apart => "not supported: they differ by more than the margin",
             Self::CannotTell => "cannot tell",
-            Self::NoScatter => "cannot tell: no terrain differs from another",
+            Self::NoMissions => "cannot tell: a group has no missions with this figure",
             Self::TooFew => "cannot tell: too few terrains",
         }
     }
@@ -171,7 +171,7 @@ impl Outcome {
     }
 
     const fn is_open(self) -> bool {
-        matches!(self, Self::CannotTell | Self::NoScatter | Self::TooFew)
+        matches!(self, Self::CannotTell | Self::NoMissions | Self::TooFew)
     }
 }
 
@@ -181,10 +181,10 @@ impl Tested<'_> {
         match self.claim.margin {
             Some(_) if found => Outcome::Equivalent,
             _ if found => self.direction(),
+            _ if self.p.is_nan() => Outcome::NoMissions,
             _ if self.least_adjusted > self.claim.alpha => Outcome::TooFew,
             // Bonferroni's adjustment over the family.
             Some(_) if self.beyond_p * self.family as f64 <= self.claim.alpha => Outcome::Apart,
-            Some(_) if self.p.is_nan() => Outcome::NoScatter,
             Some(_) => Outcome::CannotTell,
             None => Outcome::NotSupported,
         }

@@ -68,9 +68,9 @@ fn introduction(data: &Data, groups: &[Group<MissionRow>], pairing: &Pairing) ->
         _ => "Exploratory: nothing below was declared before the run, and its p values count as hints.",
     };
     let tests = if pairing.is_common() {
-        "Groups share their random draws, so terrains are compared within blocks: signed-rank tests of pairs, shifts and deltas \
-         of differences within blocks (over the missions of pairs that have the figure in both groups), and Page's trend (in all \
-         groups); signs or labels are laid anew within blocks."
+        "Groups share their random draws, so terrains are compared within blocks, over the missions of pairs that have the figure in \
+         all groups compared: signed-rank tests of pairs, shifts and deltas of differences within blocks, and Page's trend; signs or \
+         labels are laid anew within blocks."
     } else {
         "Rank-sum tests of pairs, and the rank correlation with the order of the groups as trend; labels are laid anew over the \
          terrains."
@@ -86,10 +86,11 @@ fn introduction(data: &Data, groups: &[Group<MissionRow>], pairing: &Pairing) ->
     format!(
         "{registered} Every terrain counts once, by the mean of its missions \
          (success: of all; other figures: of the successful ones). {tests} p is the share of all arrangements, or where they are \
-         more than about ten thousand of as many random ones, that are as extreme; for more than 300 values that of the normal \
-         distribution with the variance of all arrangements. The shift is Hodges and Lehmann's, its {} % interval the shifts \
-         that the test does not reject; delta is Cliff's, with Newcombe's interval, of pairs Clopper and Pearson's. Groups are \
-         equivalent, at {} %, within any margin above the one in the last column (two one-sided t tests of means); a margin is \
+         more than about ten thousand of as many random ones, that are as extreme; from 300 values on that of the normal \
+         distribution with the variance of all arrangements, where no value stands out. The shift is Hodges and Lehmann's, its {} % interval \
+         the shifts that the test would not reject if there were no ties, which make it too wide; delta is Cliff's, with Newcombe's interval, \
+         of pairs Clopper and Pearson's; correlations have Bonett and Wright's, of blocks Clopper and Pearson's. Intervals hold less often \
+         where the smaller group scatters more. Groups are equivalent, at {} %, within any margin above the one in the last column (two one-sided t tests of means); a margin is \
          a claim only when it was set before.{few}",
         set::fixed(100.0 * LEVEL, 0),
         set::fixed(100.0 * ALPHA, 0),

@@ -1,7 +1,7 @@
 //! What the next study needs: power of the tests by numbers of terrains and missions, from the scatter of this one.
 
 use super::ALPHA;
-use super::values::{Figure, Values, common_missions};
+use super::values::{Figure, Values, common_missions, share_pairs};
 use crate::content::{Block, Numbers, TableBlock, count, number, text};
 use crate::data::Data;
 use crate::questions::clusters::{Pairing, stream};
@@ -81,7 +81,8 @@ fn table(data: &Data, figures: &[Figure], pairing: &Pairing) -> TableBlock {
 fn target(figure: &Figure, pairing: &Pairing) -> Option<Target> {
     let all: Vec<f64> = figure.groups.iter().flat_map(Values::numbers).collect();
     let difference = if figure.column == "success" { POINTS } else { SHARE * sums::mean(&all).abs() };
-    let (between, within) = paired_scatter(figure, pairing).or_else(|| scatter(figure))?;
+    let scatter = if pairing.is_common() { paired_scatter(figure) } else { scatter(figure) };
+    let (between, within) = scatter?;
     (difference > 0.0).then_some(Target { difference, between, within })
 }
 
@@ -94,10 +95,11 @@ pub fn scatter(figure: &Figure) -> Option<(f64, f64)> {
 /// Variance between blocks of the differences of neighbouring groups, and between the missions of a block; means over the
 /// neighbours. Missions are paired too where groups share pairs: their difference is then what scatters. `None` where no neighbours
 /// share blocks.
-fn paired_scatter(figure: &Figure, pairing: &Pairing) -> Option<(f64, f64)> {
+fn paired_scatter(figure: &Figure) -> Option<(f64, f64)> {
     let of_neighbours = |pair: &[Values]| {
+        let groups = [&pair[0], &pair[1]];
         // Without pairs the missions of two groups have no order in common.
-        let blocks = if pairing.is_common() { common_missions(&[&pair[0], &pair[1]]) } else { Vec::new() };
+        let blocks = if share_pairs(&groups) { common_missions(&groups) } else { Vec::new() };
         let differences: Vec<Vec<f64>> =
             blocks.iter().map(|b| b[0].iter().zip(&b[1]).map(|(a, b)| b - a).collect()).collect();
         Components::within_groups(&[components::Group::of(&differences)])

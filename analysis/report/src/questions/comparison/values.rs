@@ -1,7 +1,7 @@
 //! What is compared: for every figure and group, one number per terrain, or per block of paired terrains.
 
 use crate::data::Group;
-use crate::questions::clusters::Pairing;
+use crate::questions::clusters::{Pairing, block};
 use sastrugi_numeric::sums;
 use sastrugi_schemas::study::Statistic;
 use sastrugi_schemas::tables::MissionRow;
@@ -31,13 +31,15 @@ pub struct Values<'a> {
     pub terrains: BTreeMap<&'a str, Vec<f64>>,
     /// Values in each cluster, with the pair of each: of a terrain, or of a block where groups share draws.
     clusters: BTreeMap<&'a str, Vec<(&'a str, f64)>>,
+    /// Pairs of all missions, whether they have a value or not.
+    pairs: BTreeSet<&'a str>,
     /// Mean of each cluster's missions.
     pub means: BTreeMap<&'a str, f64>,
 }
 
 impl<'a> Values<'a> {
     /// Pairs with a value in a cluster.
-    fn pairs(&self, cluster: &str) -> BTreeSet<&'a str> {
+    fn pairs_in(&self, cluster: &str) -> BTreeSet<&'a str> {
         self.clusters.get(cluster).into_iter().flatten().map(|v| v.0).collect()
     }
 
@@ -93,28 +95,32 @@ fn values<'a>(
         if value.is_finite() {
             let terrain = mission.terrain_id.as_str();
             terrains.entry(terrain).or_default().push(value);
-            clusters.entry(pairing.cluster(terrain)).or_default().push((&mission.pair_id, value));
+            // By the mission's own pair: several tables of missions may lie on one terrain.
+            let cluster = if pairing.is_common() { block(&mission.pair_id) } else { terrain };
+            clusters.entry(cluster).or_default().push((&mission.pair_id, value));
         }
     }
     let mean = |values: &[(&str, f64)]| sums::mean(&values.iter().map(|v| v.1).collect::<Vec<_>>());
     let means = clusters.iter().map(|(name, values)| (*name, mean(values))).collect();
     let (name, label, run) = (&group.name, &group.label, group.run.as_deref());
-    Values { name, label, run, terrains, clusters, means }
+    let pairs = group.rows.iter().map(|m| m.pair_id.as_str()).collect();
+    Values { name, label, run, terrains, clusters, pairs, means }
 }
 
-/// Missions of pairs in the clusters that all these groups have: for each such cluster its missions in every group. Where groups
-/// share pairs these are the pairs that have a value in all of them: means over the survivors of each group alone would compare other
-/// missions.
+/// True when all these groups have pairs in common, whatever became of their missions.
+pub fn share_pairs(groups: &[&Values]) -> bool {
+    let Some((first, others)) = groups.split_first() else { return false };
+    first.pairs.iter().any(|pair| others.iter().all(|g| g.pairs.contains(pair)))
+}
+
+/// The clusters that all these groups have, for each its missions in every group. Where groups share pairs these are the pairs that have
+/// a value in all of them, in one order: means over the survivors of each group alone would compare other missions.
 pub fn common_missions(groups: &[&Values]) -> Vec<Vec<Vec<f64>>> {
     let Some((first, others)) = groups.split_first() else { return Vec::new() };
-    let names = first.clusters.keys().copied().filter(|name| others.iter().all(|g| g.clusters.contains_key(name)));
-    let names: Vec<&str> = names.collect();
-    let shared = |name: &str| {
-        others.iter().fold(first.pairs(name), |common, g| common.intersection(&g.pairs(name)).copied().collect())
-    };
-    let by_pair: Vec<BTreeSet<&str>> = names.iter().map(|name| shared(name)).collect();
-    let paired = by_pair.iter().any(|pairs| !pairs.is_empty());
-    let of = |(name, pairs): (&&str, &BTreeSet<&str>)| {
+    let paired = share_pairs(groups);
+    let of = |name: &&str| {
+        let pairs =
+            others.iter().fold(first.pairs_in(name), |all, g| all.intersection(&g.pairs_in(name)).copied().collect());
         let missions = |g: &&Values| {
             let all = g.clusters.get(*name).into_iter().flatten();
             let mut counted: Vec<(&str, f64)> = all.copied().filter(|v| !paired || pairs.contains(v.0)).collect();
@@ -124,10 +130,10 @@ pub fn common_missions(groups: &[&Values]) -> Vec<Vec<Vec<f64>>> {
         let missions: Vec<Vec<f64>> = groups.iter().map(missions).collect();
         missions.iter().all(|m| !m.is_empty()).then_some(missions)
     };
-    names.iter().zip(&by_pair).filter_map(of).collect()
+    first.clusters.keys().filter_map(of).collect()
 }
 
-/// The blocks that all these groups have, each with the mean of its missions in every group.
-pub fn common_blocks(groups: &[&Values]) -> Vec<Vec<f64>> {
-    common_missions(groups).iter().map(|block| block.iter().map(|missions| sums::mean(missions)).collect()).collect()
+/// The mean of each block's missions in every group.
+pub fn means(blocks: &[Vec<Vec<f64>>]) -> Vec<Vec<f64>> {
+    blocks.iter().map(|block| block.iter().map(|missions| sums::mean(missions)).collect()).collect()
 }

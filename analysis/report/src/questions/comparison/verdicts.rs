@@ -1,7 +1,7 @@
 //! Tests and sizes of the differences: every pair of groups, and the trend over ordered groups.
 
 use super::ALPHA;
-use super::values::{Figure, Values, common_blocks};
+use super::values::{Figure, Values, common_missions, means, share_pairs};
 use crate::content::{Figure as Drawing, Numbers, TableBlock, number, text};
 use crate::data::Data;
 use crate::questions::clusters::stream;
@@ -81,32 +81,39 @@ pub fn pair(data: &Data, figure: &Figure, [from, to]: [&Values; 2], level: Level
     let groups = format!("{} to {}", from.name, to.name);
     let mut stream = stream(data, &groups, &format!("test {}", figure.column));
     let (coverage, draws) = (1.0 - level.alpha, permutation::draws(level.tests, level.alpha));
-    let blocks = common_blocks(&[from, to]);
-    let (of, difference) = if blocks.is_empty() {
+    let blocks = common_missions(&[from, to]);
+    let (of, difference) = if blocks.is_empty() && !share_pairs(&[from, to]) {
         let (a, b) = (from.numbers(), to.numbers());
         let of = format!("{} + {} terrains", a.len(), b.len());
         (of, Difference::apart(&a, &b, coverage, draws, &mut stream))
     } else {
-        let pairs = blocks.iter().map(|b| [b[0], b[1]]);
-        (set::counted(blocks.len(), "block"), Difference::of_pairs(pairs, coverage, draws, &mut stream))
+        let pairs = means(&blocks).into_iter().map(|b| [b[0], b[1]]);
+        (of_blocks(&blocks), Difference::of_pairs(pairs, coverage, draws, &mut stream))
     };
     let (test, size) = (difference.test, Measure::Pair(difference));
     Verdict { figure: figure.name, unit: figure.unit, groups, of, test, adjusted: f64::NAN, size }
+}
+
+/// Blocks, and the missions of them in each group.
+fn of_blocks(blocks: &[Vec<Vec<f64>>]) -> String {
+    let missions = blocks.iter().filter_map(|b| b.first()).map(Vec::len).sum();
+    format!("{}, {}", set::counted(blocks.len(), "block"), set::counted(missions, "mission"))
 }
 
 /// The test of a trend at a level, and an interval of the coverage that goes with it.
 pub fn over_groups(data: &Data, figure: &Figure, groups: &[&Values], level: Level) -> Verdict {
     let mut stream = stream(data, "trend", &format!("test {}", figure.column));
     let (coverage, draws) = (1.0 - level.alpha, permutation::draws(level.tests, level.alpha));
-    let blocks = common_blocks(groups);
-    let (of, test, correlation) = if blocks.is_empty() {
+    let blocks = common_missions(groups);
+    let (of, test, correlation) = if blocks.is_empty() && !share_pairs(groups) {
         let values: Vec<Vec<f64>> = groups.iter().map(|g| g.numbers()).collect();
         let counts = values.iter().map(|v| v.len().to_string()).collect::<Vec<_>>().join(" + ");
         let test = trend::of_groups(&values, draws, &mut stream);
         (format!("{counts} terrains"), test, trend::correlation_of_groups(&values, coverage))
     } else {
-        let test = trend::of_blocks(&blocks, draws, &mut stream);
-        (set::counted(blocks.len(), "block"), test, trend::correlation_of_blocks(&blocks, coverage))
+        let of = of_blocks(&blocks);
+        let blocks = means(&blocks);
+        (of, trend::of_blocks(&blocks, draws, &mut stream), trend::correlation_of_blocks(&blocks, coverage))
     };
     let groups = groups.iter().map(|g| g.name).collect::<Vec<_>>().join(", ");
     let size = Measure::Trend(correlation);

@@ -230,7 +230,8 @@ impl Placed<'_> {
             None if place.p() <= ALPHA && place.p_above < place.p_below => ABOVE,
             None if place.p() <= ALPHA => BELOW,
             None if inside => "within the middle 95 %",
-            None => TOO_FEW,
+            None if place.least_p() > ALPHA => TOO_FEW,
+            None => "cannot tell: at the edge",
         }
     }
 }
@@ -243,15 +244,21 @@ fn in_words(placed: &[Placed]) -> String {
     };
     let logs = placed.iter().map(|p| p.log).max().map_or(0, |last| last + 1);
     let parts: Vec<String> = words.iter().filter_map(part).collect();
-    let judged = placed.iter().filter(|p| p.verdict().ends_with("the missions") || p.verdict().starts_with("within"));
+    let told = |p: &&Placed| p.tells && p.unfinished.is_none() && p.place.is_some_and(|place| place.least_p() <= ALPHA);
+    let judged = placed.iter().filter(told).count();
     format!(
-        "{} of {}, each beside a group of missions: {}. Of figures of drives like the missions about {} in {} would be below or above them by \
-         chance.",
+        "{} of {}, each beside a group of missions: {}.{}",
         set::counted(placed.len(), "figure"),
         set::counted(logs, "log"),
         parts.join(", "),
-        set::plain(ALPHA * judged.clone().count() as f64, 2),
-        set::count(judged.count()),
+        match judged {
+            0 => String::new(),
+            n => format!(
+                " Of {} of drives like the missions, about {} would be below or above them by chance.",
+                set::counted(n, "figure"),
+                set::plain(ALPHA * n as f64, 2)
+            ),
+        }
     )
 }
 

@@ -4,7 +4,6 @@ use super::Question;
 use super::clusters::LEVEL;
 use super::comparison::ALPHA;
 use super::comparison::values::words;
-use super::sql;
 use crate::ReportError;
 use crate::content::{Block, Numbers, TableBlock, number, text};
 use crate::data::{Against, Data};
@@ -19,7 +18,8 @@ pub const QUESTION: Question =
 
 fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     let Some(other) = &data.against else { return Ok(Vec::new()) };
-    let streams = Streams::for_item(data.study.seed, "report", "other release");
+    // Those of the verb `compare`, so that both say the same.
+    let streams = Streams::for_seed(0, releases::STREAMS);
     let settings = Settings { margin: MARGIN, alpha: ALPHA };
     let (quantities, alone) = releases::compare(&figures(&other.data), &figures(data), settings, &streams);
     let mut blocks = vec![Block::Text(introduction(other))];
@@ -44,6 +44,10 @@ fn figures(data: &Data) -> Figures {
     data.missions.iter().for_each(|row| figures.add_mission(row));
     figures
 }
+
+/// What is computed from, in each of the releases.
+const IN_EACH: &str =
+    "select * from 'tables/terrains/*.parquet' left join 'tables/missions/*.parquet' using (terrain_id)";
 
 /// All verdicts, from same to different.
 const VERDICTS: [&str; 5] =
@@ -75,11 +79,11 @@ fn introduction(other: &Against) -> String {
     format!(
         "The other release is {} (study {}, {}, hash of the study {}). Differences are this release less the other. Every terrain counts \
          once, by the mean of its missions (success: of all; other figures: of the successful ones). Terrains are paired where both \
-         releases have the same heights (by the hash of their content) or the same random draws under the same id, and then \
-         those alone are compared: signed-rank tests; elsewhere they are independent: rank-sum tests. The shift is Hodges and Lehmann's; its {} % \
-         interval holds the shifts that the test does not reject. p by permutation, Holm over all tests of this section. \
+         releases have the same heights (by the hash of their content) or the same random draws under the same id, if all of the smaller group \
+         do: signed-rank tests; elsewhere they are independent: rank-sum tests. The shift is Hodges and Lehmann's; its {} % \
+         interval holds the shifts that the test would not reject if there were no ties. p by permutation, Holm over all tests of this section. \
          Equivalent means: within a margin of {} points of success and of the shares of classes, {} % of the other's mean for other \
-         figures, at {} % (two one-sided t tests of means, not adjusted). sastrugi compare says the same. Exploratory, unless both were set \
+         figures, at {} % (two one-sided t tests of means, not adjusted). sastrugi compare gives the same figures; what differs by less than the margin it calls the same. Exploratory, unless both were set \
          before the runs.",
         other.name,
         theirs.study.name,
@@ -115,17 +119,19 @@ fn table(quantities: &[Quantity]) -> TableBlock {
         ("p, equivalence", ""),
         ("compared", ""),
     ];
-    // In either release.
-    let mut numbers = Numbers::computed(sql::variants(), &columns).with_mixed_units();
+    let mut numbers = Numbers::computed(IN_EACH, &columns).with_mixed_units();
     let or_nan = |v: Option<f64>| v.unwrap_or(f64::NAN);
     for q in quantities {
         let (name, unit) = name(q);
         let head = [text(name), text(&q.group), text(verdict(q)), text(unit)];
         let values = [q.a, q.b].into_iter().chain(q.shift.unwrap_or([f64::NAN; 3]));
         let tail = [q.p, q.p_adjusted, q.margin, q.p_equivalence].map(or_nan);
-        let of = match q.paired {
-            true => format!("{}, paired", set::counted(q.terrains[0], "terrain")),
-            false => format!("{} + {} terrains", q.terrains[0], q.terrains[1]),
+        let of = match (q.paired, q.left_out) {
+            (true, [0, 0]) => format!("{}, paired", set::counted(q.terrains[0], "terrain")),
+            (true, [a, b]) => {
+                format!("{}, paired; {a} and {b} left out", set::counted(q.terrains[0], "terrain"))
+            }
+            (false, _) => format!("{} + {} terrains", q.terrains[0], q.terrains[1]),
         };
         numbers.row(head.into_iter().chain(values.chain(tail).map(number)).chain([text(of)]));
     }
