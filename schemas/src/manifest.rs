@@ -67,7 +67,7 @@ pub struct Origin {
     /// Number of rows or messages.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub records: Option<u64>,
-    /// Paths of the files it was made from.
+    /// Items that it was made from, as `terrain/t-0001`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub parents: Vec<String>,
     /// Words of its random streams, joined by `/`.

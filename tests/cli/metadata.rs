@@ -198,6 +198,31 @@ fn val_a_citation_drives_no_mission_again() {
     assert_eq!(ok(&["verify", "release", "--recompute", "5"])["differences"], serde_json::json!([]));
 }
 
+/// A texture that becomes one of several, or is alone again, gets and loses its note: the same release as from scratch.
+#[test]
+fn val_notes_follow_the_number_of_textures() {
+    let folder = area();
+    let path = folder.path();
+    let ok = |arguments: &[&str]| {
+        let call = sastrugi_in(path, &[arguments, &["--quiet"]].concat());
+        assert_eq!(call.code, 0, "{arguments:?}: {}{}", call.stdout, call.stderr);
+    };
+    for (count, notes) in [(1, 0), (2, 2), (1, 0)] {
+        let study = format!(
+            "[study]\nname = \"tx\"\nseed = 7\ndate = \"2026-01-01\"\n\n[[texture]]\nid = \"tx\"\ncount = {count}\n\
+             fit = {{ model = \"exponential\", sigma_m = 0.03, range_m = 0.28 }}\nphase = \"unit\"\nsize_m = [6.0, 6.0]\ncell_m = 0.1\n"
+        );
+        write(path, "study.toml", &study);
+        ok(&["run", "study.toml", "-o", "release"]);
+        let _ = std::fs::remove_dir_all(path.join("fresh"));
+        let _ = std::fs::remove_dir_all(path.join("fresh.work"));
+        ok(&["run", "study.toml", "-o", "fresh"]);
+        assert_eq!(sums(&path.join("release")), sums(&path.join("fresh")));
+        let manifest = read(&path.join("release"), "manifest.json");
+        assert_eq!(manifest.matches("one of several textures").count(), notes, "{manifest}");
+    }
+}
+
 fn text(value: &Value) -> String {
     value.as_str().unwrap().to_owned()
 }

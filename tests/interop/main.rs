@@ -107,7 +107,7 @@ fn val_a_table_of_many_files_is_one_set() {
     assert_eq!(call.code, 0, "{}{}", call.stdout, call.stderr);
 }
 
-/// Whatever the licence is called, cffconvert finds the citation valid, and the licence where the format has it.
+/// Whatever the licence is called and the title holds, cffconvert finds the citation valid, and the licence where the format has it.
 #[test]
 fn val_any_licence_makes_a_valid_citation() {
     let Some(python) = python() else { return };
@@ -120,7 +120,7 @@ fn val_any_licence_makes_a_valid_citation() {
         ("proprietary", "[]", "null"),
     ] {
         let head = format!(
-            "license = \"{license}\"\ncreators = [\"Doe, Jane\", \"J. Doe\", \"A group\"]\norganizations = [\"A group\"]\n"
+            "title = \"A \\u007f\\u0085\\u2028\\ufffe title\"\nlicense = \"{license}\"\ncreators = [\"Doe, Jane\", \"J. Doe\", \"A group\"]\norganizations = [\"A group\"]\n"
         );
         let study = MANY_TERRAINS.split("[[missions]]").next().unwrap().replace("count = 66\n", "");
         write(folder.path(), "study.toml", &study.replace("license = \"CC-BY-4.0\"\n", &head));

@@ -147,6 +147,11 @@ fn check(item: &DemItem) -> Result<(), (&'static str, String)> {
         ));
     }
     gridding(item).map_err(|message| ("statistic", message))?;
+    for (key, text) in [("license", &item.license), ("attribution", &item.attribution), ("citation", &item.citation)] {
+        if text.as_ref().is_some_and(|text| text.trim().is_empty()) {
+            return Err((key, "is empty; leave it out where nothing is known".to_owned()));
+        }
+    }
     match item.cell_m {
         Some(cell) if !cell.iter().all(|c| c.is_finite() && *c > 0.0) => {
             Err(("cell_m", format!("is {cell:?}; both sizes must be above 0")))

@@ -97,10 +97,13 @@ pub fn extension(file: &str) -> String {
     if plain { ending } else { "dat".to_owned() }
 }
 
-/// Where a file goes in the release: an .hgt tile keeps its name, which says where it lies.
+/// Where a file goes in the release: an .hgt tile keeps its name, which says where it lies, but nothing that was added to it, as by a
+/// second download.
 fn release_path(place: &str, file: &str, extension: &str) -> String {
-    match Path::new(file).file_name().and_then(|n| n.to_str()) {
-        Some(name) if extension == "hgt" => format!("{place}/{name}"),
+    let stem = Path::new(file).file_stem().and_then(|n| n.to_str()).unwrap_or_default();
+    let tile = stem.split(|c: char| !c.is_ascii_alphanumeric()).find(|word| !word.is_empty());
+    match tile {
+        Some(tile) if extension == "hgt" => format!("{place}/{tile}.hgt"),
         _ => format!("{place}.{extension}"),
     }
 }

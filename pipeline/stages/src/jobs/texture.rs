@@ -345,6 +345,10 @@ impl Job for TextureJob {
             "fit": self.matched.describe(),
             "onto": base,
         });
+        // Decides a note.
+        if self.one_of_many {
+            recipe["one_of_many"] = json!(true);
+        }
         match &self.modulation {
             None => {}
             Some(Modulation::Raster(raster)) => recipe["modulate"] = json!(raster.to_string()),

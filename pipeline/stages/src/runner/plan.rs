@@ -66,7 +66,7 @@ fn difference(old: &Ingredients, new: &Ingredients) -> String {
         reasons.push(format!("changed: {}", changes.join(", ")));
     }
     if old.packing != new.packing {
-        reasons.push("its file is packed in another way".to_owned());
+        reasons.push("its raster is packed in another way, or has another file beside it".to_owned());
     }
     if old.stream != new.stream {
         reasons.push("the seed or the id changed".to_owned());

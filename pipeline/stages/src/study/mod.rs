@@ -89,6 +89,7 @@ fn read_head(root: &Map<String, Value>, text: &StudyText) -> Result<StudyHead, S
         check_url(head.url.as_deref()),
         check_doi(head.doi.as_deref()),
         check_split(head.split.as_ref()),
+        check_creators(&head),
         check_organizations(&head),
         check_epoch(&head),
     ];
@@ -170,7 +171,7 @@ fn check_date(date: &str) -> Result<(), ParameterError> {
         let leap = year % 4 == 0 && (year % 100 != 0 || year % 400 == 0);
         let days = [31, if leap { 29 } else { 28 }, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31];
         let last = *days.get((month as usize).checked_sub(1)?)?;
-        (1..=last).contains(&day).then_some(())
+        (year > 0 && (1..=last).contains(&day)).then_some(())
     };
     if shape && day_exists().is_some() {
         return Ok(());
@@ -236,6 +237,21 @@ fn check_epoch(head: &StudyHead) -> Result<(), ParameterError> {
     Err(ParameterError::new("epoch_ns", format!("is {}; {rule}", head.epoch_ns)))
 }
 
+/// Creators have names, and each is named once.
+fn check_creators(head: &StudyHead) -> Result<(), ParameterError> {
+    let plain = |name: &String| name.split(',').map(str::trim).collect::<Vec<_>>().join(", ").to_lowercase();
+    let names: Vec<String> = head.creators.iter().map(plain).collect();
+    for (k, name) in names.iter().enumerate() {
+        let wrong = match () {
+            () if name.trim_matches([',', ' ']).is_empty() => "is empty; a creator has a name",
+            () if names[..k].contains(name) => "names a creator twice",
+            () => continue,
+        };
+        return Err(ParameterError::new(format!("creators.{k}"), wrong.to_owned()));
+    }
+    Ok(())
+}
+
 /// Organisations are among the creators.
 fn check_organizations(head: &StudyHead) -> Result<(), ParameterError> {
     match head.organizations.iter().find(|name| !head.creators.contains(name)) {
@@ -246,12 +262,13 @@ fn check_organizations(head: &StudyHead) -> Result<(), ParameterError> {
     }
 }
 
-/// DOIs are `10.`, four to nine digits, `/`, and a suffix (the pattern of the Citation File Format).
+/// DOIs are `10.`, four to nine digits, at most one more part of digits, `/`, and a suffix (the pattern of the Citation File Format).
 fn check_doi(doi: Option<&str>) -> Result<(), ParameterError> {
     let right = |doi: &str| {
         let (registrant, suffix) = doi.strip_prefix("10.")?.split_once('/')?;
-        let parts = registrant.split_once('.').map_or(registrant, |(first, _)| first);
-        let digits = (4..=9).contains(&parts.len()) && registrant.bytes().all(|b| b.is_ascii_digit() || b == b'.');
+        let (first, more) = registrant.split_once('.').map_or((registrant, None), |(first, more)| (first, Some(more)));
+        let is_number = |part: &str| !part.is_empty() && part.bytes().all(|b| b.is_ascii_digit());
+        let digits = (4..=9).contains(&first.len()) && is_number(first) && more.is_none_or(is_number);
         let plain = !suffix.is_empty() && suffix.bytes().all(|b| b.is_ascii_alphanumeric() || b"._;()/:-".contains(&b));
         (digits && plain).then_some(())
     };
@@ -299,6 +316,11 @@ mod tests {
             let (message, span) = refusal(text);
             assert!(message.contains(words) && span == place, "{message:?} at {span:?}");
         };
+        at(&HEAD.replace("2024-02-29", "0000-01-01"), "YYYY-MM-DD", "\"0000-01-01\"");
+        at(&format!("{HEAD}doi = \"10.1234.5.6/x\"\n"), "plain DOI", "\"10.1234.5.6/x\"");
+        at(&format!("{HEAD}doi = \"10.1234./x\"\n"), "plain DOI", "\"10.1234./x\"");
+        at(&format!("{HEAD}creators = [\"A\", \" , \"]\n"), "is empty", "\" , \"");
+        at(&format!("{HEAD}creators = [\"Doe, Jane\", \"Doe,Jane\"]\n"), "twice", "\"Doe,Jane\"");
         at(&HEAD.replace("02-29", "02-30"), "YYYY-MM-DD", "\"2024-02-30\"");
         at(&HEAD.replace("2024-02-29", "2024-€2-29"), "YYYY-MM-DD", "\"2024-€2-29\"");
         at(&HEAD.replace("seed", "sead"), "unknown key `sead`", "sead");

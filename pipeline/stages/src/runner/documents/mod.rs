@@ -42,8 +42,29 @@ const FOLDERS: [(&str, &str); 9] = [
 const ORGANIZATION: &str = "Organization";
 /// Names under which dataset hubs know licences, where they are not the SPDX identifier in lower case.
 const HUB_NAMES: [(&str, &str); 3] = [("PDDL-1.0", "pddl"), ("ODC-By-1.0", "odc-by"), ("ODbL-1.0", "odbl")];
-/// Starts of identifiers that dataset hubs know in lower case.
-const HUB_FAMILIES: [&str; 4] = ["CC-BY-", "CC0-", "MIT", "Apache-"];
+/// Identifiers that dataset hubs know in lower case.
+const HUB_IDENTIFIERS: [&str; 20] = [
+    "Apache-2.0",
+    "MIT",
+    "CC0-1.0",
+    "CC-BY-2.0",
+    "CC-BY-2.5",
+    "CC-BY-3.0",
+    "CC-BY-4.0",
+    "CC-BY-SA-3.0",
+    "CC-BY-SA-4.0",
+    "CC-BY-NC-2.0",
+    "CC-BY-NC-3.0",
+    "CC-BY-NC-4.0",
+    "CC-BY-ND-4.0",
+    "CC-BY-NC-ND-3.0",
+    "CC-BY-NC-ND-4.0",
+    "CC-BY-NC-SA-2.0",
+    "CC-BY-NC-SA-3.0",
+    "CC-BY-NC-SA-4.0",
+    "GPL-3.0",
+    "LGPL-3.0",
+];
 
 impl<'a> Described<'a> {
     /// Files of a table, in order.
@@ -72,7 +93,7 @@ impl<'a> Described<'a> {
 /// `README.md`: a dataset card, whose head lets hubs show the tables.
 pub fn readme(described: &Described<'_>) -> String {
     let head = described.head;
-    let mut text = format!("{}# {}\n\n", card(described), head.title);
+    let mut text = format!("{}# {}\n\n", card(described), folded(&head.title));
     if !head.description.is_empty() {
         let _ = writeln!(text, "{}\n", head.description);
     }
@@ -136,7 +157,7 @@ fn card(described: &Described<'_>) -> String {
 fn hub_license(license: &str) -> String {
     let of_hub = |id: &str| {
         let known = HUB_NAMES.iter().find(|(spdx, _)| *spdx == id).map(|(_, name)| (*name).to_owned());
-        known.or_else(|| HUB_FAMILIES.iter().any(|f| id.starts_with(f)).then(|| id.to_lowercase()))
+        known.or_else(|| HUB_IDENTIFIERS.contains(&id).then(|| id.to_lowercase()))
     };
     match license::identifier(license).and_then(of_hub) {
         Some(name) => format!("license: {name}\n"),
@@ -166,7 +187,7 @@ fn citation_line(head: &StudyHead) -> String {
     let version = head.version.as_ref().map_or_else(String::new, |v| format!(", version {v}"));
     let page = page(head).map_or_else(String::new, |page| format!(", {page}"));
     let year = head.date.get(..4).unwrap_or_default();
-    format!("{} ({year}): {}{version}{page}", authors(head), head.title)
+    folded(&format!("{} ({year}): {}{version}{page}", authors(head), head.title))
 }
 
 fn authors(head: &StudyHead) -> String {
@@ -176,7 +197,7 @@ fn authors(head: &StudyHead) -> String {
 /// Measured data with what their makers ask for.
 fn sources_section(sources: &[Source]) -> String {
     let mut text = String::from(
-        "\n## Sources\n\nMeasured data keep their own terms; `manifest.json` says which files come from which (`sources`).\n\n",
+        "\n## Sources\n\nMeasured data keep their own terms; `manifest.json` says which rasters, fits and recordings come from which (`sources`).\n\n",
     );
     sources.iter().for_each(|source| text.push_str(&format!("- {}\n", sentence(source))));
     text
@@ -188,7 +209,7 @@ fn sentence(source: &Source) -> String {
     let attribution = attribution.as_ref().map_or_else(String::new, |who| format!(" {who}."));
     let license = license.as_ref().map_or_else(|| " No licence stated.".to_owned(), |l| format!(" Licence: {l}."));
     let citation = citation.as_ref().map_or_else(String::new, |c| format!(" Cite as: {c}"));
-    format!("`{id}`:{attribution}{license}{citation}")
+    folded(&format!("`{id}`:{attribution}{license}{citation}"))
 }
 
 /// `CITATION.cff`, in the Citation File Format 1.2.0.
@@ -246,15 +267,16 @@ fn author((name, kind): (&str, &str)) -> String {
 pub fn license(described: &Described<'_>) -> String {
     let (head, sources) = (described.head, described.sources);
     let version = head.version.as_ref().map_or_else(String::new, |v| format!(", version {v}"));
-    let what = format!("{}{version} ({}) by {}", head.title, head.date, authors(head));
+    let what = folded(&format!("{}{version} ({}) by {}", head.title, head.date, authors(head)));
+    let license = license::identifier(&head.license).unwrap_or_else(|| head.license.trim());
     let mut text = match license::is_listed(&head.license) {
         true => format!(
             "SPDX-License-Identifier: {0}\n\n{what} is licensed under {0}. Its text is found by that identifier in the SPDX licence list.\n",
-            head.license,
+            license,
         ),
         false => format!(
             "{what} is licensed under:\n\n{}\n\nThe SPDX licence list does not have it; its terms are to be had from the creators.\n",
-            head.license
+            license
         ),
     };
     if let Some(page) = page(head) {
@@ -269,7 +291,16 @@ pub fn license(described: &Described<'_>) -> String {
     text
 }
 
-/// A YAML string in double quotes; JSON's quoting is a part of YAML's.
+/// A YAML string in double quotes: JSON's, with what YAML does not take as it is, or takes for the end of a line, by its number.
 fn quoted(text: &str) -> String {
-    serde_json::Value::String(text.to_owned()).to_string()
+    let escaped =
+        |c: char| matches!(c, '\u{7f}'..='\u{9f}' | '\u{2028}' | '\u{2029}' | '\u{feff}' | '\u{fffe}' | '\u{ffff}');
+    let json = serde_json::Value::String(text.to_owned()).to_string();
+    let one = |c: char| if escaped(c) { format!("\\u{:04x}", u32::from(c)) } else { c.to_string() };
+    json.chars().map(one).collect()
+}
+
+/// On one line: words of a study in a text whose lines mean something.
+fn folded(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
 }

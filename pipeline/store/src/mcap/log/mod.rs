@@ -69,6 +69,12 @@ pub fn read_log(path: &Path) -> Result<Log, McapError> {
     let mut gathered = Gathered::default();
     for file in bag_files(path)? {
         read_file(&file, &mut gathered)?;
+        if let Some(broken) = &mut gathered.log.broken {
+            // What follows a gap of unknown length is no part of the drive.
+            let name = file.file_name().unwrap_or_default().to_string_lossy();
+            *broken = format!("{name}: {broken}");
+            break;
+        }
         gathered.next_file();
     }
     Ok(gathered.log)
