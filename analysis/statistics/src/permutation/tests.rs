@@ -12,6 +12,36 @@ fn stream(purpose: &str) -> Stream {
     Streams::for_seed(1, "permutation-test").stream(purpose)
 }
 
+/// Two independent groups and any statistic of both, large when they differ.
+fn two_groups(
+    first: &[f64],
+    second: &[f64],
+    draws: usize,
+    stream: &mut Stream,
+    statistic: impl Fn(&[f64], &[f64]) -> f64,
+) -> Option<Permutation> {
+    let values = [first, second].concat();
+    let labels = labels_of(&[first.len(), second.len()]);
+    within_blocks(&labels, &[values.len()], draws, stream, |labels| {
+        let of = |group| values.iter().zip(labels).filter(|v| *v.1 == group).map(|v| *v.0).collect::<Vec<_>>();
+        statistic(&of(0), &of(1))
+    })
+}
+
+/// Paired groups and any statistic of the differences within blocks, large when the groups differ: signs are flipped.
+fn paired(
+    differences: &[f64],
+    draws: usize,
+    stream: &mut Stream,
+    statistic: impl Fn(&[f64]) -> f64,
+) -> Option<Permutation> {
+    let labels: Vec<usize> = differences.iter().flat_map(|_| [0, 1]).collect();
+    within_blocks(&labels, &vec![2; differences.len()], draws, stream, |labels| {
+        let flipped = differences.iter().zip(labels.chunks(2)).map(|(d, l)| if l[0] == 0 { *d } else { -d });
+        statistic(&flipped.collect::<Vec<_>>())
+    })
+}
+
 fn difference_of_means(a: &[f64], b: &[f64]) -> f64 {
     (sums::mean(a) - sums::mean(b)).abs()
 }
