@@ -24,7 +24,7 @@ fn streams() -> Streams {
 
 fn bench_generator(bencher: Bencher, kind: &str, params: Value) {
     let generator = sastrugi_terrain::prepare(kind, &params).expect("the bench's own parameters are valid");
-    bencher.counter(ItemsCount::new(CELLS)).bench(|| generator.generate(&streams()));
+    bencher.counter(ItemsCount::new(CELLS)).bench(|| generator.generate(&streams(), &[]));
 }
 
 /// The floor: scalar complex transform of 2048^2 points (rustfft, no SIMD), along rows, transposed, along rows again.
@@ -92,5 +92,5 @@ fn describe_1009(bencher: Bencher) {
 
 fn terrain() -> Grid {
     let generator = sastrugi_terrain::prepare("multifractal", &Value::Null).expect("defaults are valid");
-    generator.generate(&streams()).expect("defaults give a surface")
+    generator.generate(&streams(), &[]).expect("defaults give a surface").heights
 }

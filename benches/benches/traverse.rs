@@ -51,7 +51,7 @@ impl Course {
     fn new(fractal_dimension: f64) -> Self {
         let params = json!({ "high": { "fractal_dimension": fractal_dimension } });
         let generator = sastrugi_terrain::prepare("multifractal", &params).expect("valid parameters");
-        let dem = generator.generate(&Streams::for_seed(1, "terrain")).expect("a surface").as_stored();
+        let dem = generator.generate(&Streams::for_seed(1, "terrain"), &[]).expect("a surface").heights.as_stored();
         let (vehicle, settings) = TraverseParameters::default().prepare().expect("valid parameters");
         let raw = MissionParameters { count: MISSIONS, ..MissionParameters::default() };
         let rules = MissionSettings::try_from(raw).expect("valid parameters");

@@ -62,7 +62,7 @@ const SECTIONS: [Section; 7] = [
 ];
 
 /// Endings that files of the release have beside an id.
-const RESERVED: [&str; 5] = [".raw", ".metric", ".background", ".residual", ".mask"];
+const RESERVED: [&str; 5] = ["raw", "metric", "background", "residual", "mask"];
 
 /// Names of the sections that are arrays of tables.
 pub fn section_names() -> Vec<&'static str> {
@@ -195,9 +195,10 @@ impl Builder<'_> {
     /// # Errors
     /// When it is taken.
     pub fn claim(&mut self, entry: &Entry<'_>, section: &'static str, id: &str) -> Result<(), StudyError> {
-        if let Some(ending) = RESERVED.into_iter().find(|ending| id.ends_with(ending)) {
+        let ending = id.rsplit_once('.').map_or("", |(_, ending)| ending);
+        if RESERVED.contains(&ending) || sastrugi_terrain::MAP_NAMES.contains(&ending) {
             return Err(
-                entry.error("id", format!("the id \"{id}\" ends in {ending}, which names files of the release"))
+                entry.error("id", format!("the id \"{id}\" ends in .{ending}, which names files of the release"))
             );
         }
         match self.ids.insert(id.to_owned(), section) {
@@ -266,6 +267,14 @@ impl Builder<'_> {
         };
         self.heightfields.insert(id.to_owned(), field);
         self.node(entry, node)
+    }
+
+    /// The heightfield that a key names.
+    ///
+    /// # Errors
+    /// An id that no earlier heightfield has.
+    pub fn surface(&self, entry: &Entry<'_>, key: &str, id: &str) -> Result<&Heightfield, StudyError> {
+        self.heightfields.get(id).ok_or_else(|| unknown_id(entry, key, id, self.heightfields.keys()))
     }
 
     /// What a fit file says of its source: the measured file, or the generated heightfield's path in the release.

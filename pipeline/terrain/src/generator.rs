@@ -21,16 +21,61 @@ pub trait Generator: Send + Sync {
     /// Sentences that a reader of the result should know, such as a size that was rounded down.
     fn notes(&self) -> Vec<String>;
 
-    /// The heightfield, m.
+    /// The surfaces that it stands on, as its parameters name them.
+    fn bases(&self) -> Vec<Base> {
+        Vec::new()
+    }
+
+    /// The heightfield, with what belongs to it. `bases` are the surfaces of [`Self::bases`], in that order.
     ///
     /// # Errors
     /// A [`TerrainError`] where the parameters are possible one by one but give no usable surface together.
-    fn generate(&self, streams: &Streams) -> Result<Grid, TerrainError>;
+    fn generate(&self, streams: &Streams, bases: &[Grid]) -> Result<Terrain, TerrainError>;
 
     /// The heights as 16-bit levels, for generators that define them.
     fn levels(&self, _heights: &Grid) -> Option<Levels> {
         None
     }
+}
+
+/// A surface that a generator stands on.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Base {
+    /// Dotted path of the parameter that names it.
+    pub key: String,
+    /// Its name: an id in a study, a file on the command line.
+    pub name: String,
+}
+
+/// Names of every map: with them, and a dot before them, no id ends.
+pub const MAP_NAMES: [&str; 5] = ["albedo", "class", "rms-measured", "rms-predicted", "rock-potential"];
+
+/// A heightfield, and what else its generator knows of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Terrain {
+    /// Heights, m.
+    pub heights: Grid,
+    /// Rasters on the same cells.
+    pub maps: Vec<Map>,
+    /// Sentences that only making it could tell, such as figures that were measured on the way.
+    pub notes: Vec<String>,
+}
+
+impl From<Grid> for Terrain {
+    fn from(heights: Grid) -> Self {
+        Self { heights, maps: Vec::new(), notes: Vec::new() }
+    }
+}
+
+/// A raster beside the heights, on the same cells.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Map {
+    /// What it shows, one of [`MAP_NAMES`]; its file is called `<id>.<name>.tif`.
+    pub name: &'static str,
+    /// Unit of the values, `1` for plain numbers; words for the codes of classes.
+    pub unit: &'static str,
+    /// The values.
+    pub values: Grid,
 }
 
 /// Heights as 16-bit levels, as in a greyscale PNG: `height_m = (level - zero_level) * metres_per_level`.
@@ -57,6 +102,14 @@ pub enum TerrainError {
         relief_m: f64,
         /// Sum of all wave amplitudes, m.
         amplitude_m: f64,
+    },
+    /// A surface that the generator stands on does not serve.
+    #[error("use \"{base}\": it {reason}")]
+    Base {
+        /// Its name in the parameters.
+        base: String,
+        /// What is wrong, and what would be right.
+        reason: String,
     },
     /// A filtered layer or the product of layers is the same everywhere.
     #[error("find relief in {part}: it is flat after filtering; choose a smaller sigma or a larger size")]

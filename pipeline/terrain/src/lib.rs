@@ -10,5 +10,5 @@ pub mod registry;
 pub mod size;
 pub mod weierstrass_mandelbrot;
 
-pub use generator::{Generator, Levels, TerrainError};
+pub use generator::{Base, Generator, Levels, MAP_NAMES, Map, Terrain, TerrainError};
 pub use registry::{kinds, prepare};

@@ -1,20 +1,20 @@
 //! Stage `terrain`: one generated heightfield.
 
-use super::dem::HEIGHTS;
+use super::dem::{HEIGHTS, input_error};
 use super::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work, raster_options, raster_packing};
 use crate::registry::{BuildError, Builder, Heightfield};
 use crate::revision::Room;
 use crate::runner::graph::Node;
-use crate::study::Entry;
 use crate::study::entry::Expanded;
+use crate::study::{Entry, StudyError};
 use sastrugi_numeric::{Grid, Streams};
 use sastrugi_schemas::study::{GeoTiff, TerrainItem};
 use sastrugi_store::atomic::Target;
 use sastrugi_store::dem::{self, Crs};
 use sastrugi_store::digest;
-use sastrugi_terrain::Generator;
+use sastrugi_terrain::{Generator, Terrain};
 use serde_json::{Value, json};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Name of the stage.
 pub const STAGE: &str = "terrain";
@@ -22,6 +22,10 @@ pub const STAGE: &str = "terrain";
 struct TerrainJob {
     id: String,
     generator: Box<dyn Generator>,
+    /// Items of the surfaces that the generator stands on.
+    bases: Vec<ItemRef>,
+    /// Cells of those.
+    base_cells: u64,
     streams: Streams,
     png16: bool,
     geotiff: GeoTiff,
@@ -43,6 +47,7 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
         for one in expanded {
             builder.claim(&entry, STAGE, &one.id)?;
             let generator = sastrugi_terrain::prepare(&item.kind, &one.params).map_err(|e| entry.refuse(e))?;
+            let (bases, base_cells) = bases(builder, &entry, generator.as_ref())?;
             let shared = builder.is_paired().then(|| common(one.replicate));
             let streams = builder.streams(STAGE, shared.as_ref().unwrap_or(&one.id), item.seed, one.replicate);
             let field = Heightfield {
@@ -59,10 +64,12 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
                 geometry: Some(generator.geometry()),
             };
             let geotiff = builder.study.head.geotiff;
-            let job = TerrainJob { id: one.id.clone(), generator, streams, png16: item.png16, geotiff };
+            let parents = bases.clone().into_iter().collect::<BTreeSet<_>>().into_iter().collect();
+            let id = one.id.clone();
+            let job = TerrainJob { id, generator, bases, base_cells, streams, png16: item.png16, geotiff };
             let node = Node {
                 item: field.item.clone(),
-                parents: Vec::new(),
+                parents,
                 inputs: Vec::new(),
                 stream: field.stream.clone(),
                 job: Box::new(job),
@@ -72,6 +79,22 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
         }
     }
     Ok(())
+}
+
+/// The items of the surfaces that a generator stands on, and how many cells they have together.
+fn bases(
+    builder: &Builder<'_>,
+    entry: &Entry<'_>,
+    generator: &dyn Generator,
+) -> Result<(Vec<ItemRef>, u64), StudyError> {
+    let mut items = Vec::new();
+    let mut cells = 0;
+    for base in generator.bases() {
+        let field = builder.surface(entry, &base.key, &base.name)?;
+        cells += field.cells;
+        items.push(field.item.clone());
+    }
+    Ok((items, cells))
 }
 
 /// Word of the random streams that replicate `replicate` (from 0) shares with that of other items when they are paired.
@@ -110,7 +133,7 @@ impl Job for TerrainJob {
     }
 
     fn memory_bytes(&self) -> u64 {
-        self.generator.memory_bytes()
+        self.generator.memory_bytes() + 8 * self.base_cells
     }
 
     fn estimate(&self) -> Estimate {
@@ -119,32 +142,55 @@ impl Job for TerrainJob {
     }
 
     fn run(&self, work: &Work<'_>) -> Result<Outcome, JobError> {
-        let heights = generate(self.generator.as_ref(), &self.streams)?;
-        dem::write(&work.output(HEIGHTS), &heights, &Crs::default(), &raster_options(self.geotiff))
-            .map_err(JobError::new)?;
-        let id = &self.id;
-        let content = digest::heights(&heights);
-        let mut products = vec![Product::released(HEIGHTS, format!("terrain/{id}.tif"), Some(content))];
+        let (bases, crs) = self.read_bases(work)?;
+        let made = generate(self.generator.as_ref(), &self.streams, &bases)?;
+        let mut products = vec![self.write(work, HEIGHTS, "", &made.heights, &crs)?];
+        for map in &made.maps {
+            let (file, ending) = (format!("{}.tif", map.name), format!(".{}", map.name));
+            products.push(self.write(work, &file, &ending, &map.values, &crs)?);
+        }
         let mut notes = self.generator.notes();
+        notes.extend(made.notes);
         if self.png16 {
-            let note = write_png16(self.generator.as_ref(), &heights, &work.output("heights.png"))?;
-            products.push(Product::released("heights.png", format!("terrain/{id}.png"), None));
+            let note = write_png16(self.generator.as_ref(), &made.heights, &work.output("heights.png"))?;
+            products.push(Product::released("heights.png", format!("terrain/{}.png", self.id), None));
             notes.push(note);
         }
         Ok(Outcome { products, notes, ..Outcome::default() })
     }
 }
 
-/// A generator's heights, checked.
+impl TerrainJob {
+    /// The surfaces that the generator stands on, and the coordinate system of the first.
+    fn read_bases(&self, work: &Work<'_>) -> Result<(Vec<Grid>, Crs), JobError> {
+        let mut grids = Vec::new();
+        let mut crs = None;
+        for base in &self.bases {
+            let read = dem::read(&work.parent(base, HEIGHTS)?).map_err(|e| input_error(&e))?;
+            crs.get_or_insert(read.info.crs);
+            grids.push(read.grid);
+        }
+        Ok((grids, crs.unwrap_or_default()))
+    }
+
+    /// Writes a raster that is released as `terrain/<id><ending>.tif`.
+    fn write(&self, work: &Work<'_>, file: &str, ending: &str, values: &Grid, crs: &Crs) -> Result<Product, JobError> {
+        dem::write(&work.output(file), values, crs, &raster_options(self.geotiff)).map_err(JobError::new)?;
+        let content = digest::heights(values);
+        Ok(Product::released(file, format!("terrain/{}{ending}.tif", self.id), Some(content)))
+    }
+}
+
+/// What a generator makes, checked.
 ///
 /// # Errors
-/// When the generator has no result, or one that is not finite everywhere (a bug).
-pub fn generate(generator: &dyn Generator, streams: &Streams) -> Result<Grid, JobError> {
-    let heights = generator.generate(streams).map_err(|e| JobError::new(format!("failed to {e}")))?;
-    if heights.finite_count() != heights.values.len() {
+/// When the generator has no result, or heights that are not finite everywhere (a bug).
+pub fn generate(generator: &dyn Generator, streams: &Streams, bases: &[Grid]) -> Result<Terrain, JobError> {
+    let made = generator.generate(streams, bases).map_err(|e| JobError::new(format!("failed to {e}")))?;
+    if made.heights.finite_count() != made.heights.values.len() {
         return Err(JobError::new("internal error: the generator left cells without a finite height"));
     }
-    Ok(heights)
+    Ok(made)
 }
 
 /// Writes heights as 16-bit levels: the generator's own where it has them, else from lowest to highest. Returns how to read

@@ -226,8 +226,7 @@ fn check_purpose(entry: &Entry<'_>, item: &TextureItem, params: &Value) -> Resul
 
 /// A heightfield that the item names, with its number of cells.
 fn heightfield(builder: &Builder<'_>, entry: &Entry<'_>, key: &str, id: &str) -> Result<(ItemRef, u64), StudyError> {
-    let field = builder.heightfields.get(id);
-    let field = field.ok_or_else(|| unknown_id(entry, key, id, builder.heightfields.keys()))?;
+    let field = builder.surface(entry, key, id)?;
     Ok((field.item.clone(), field.cells))
 }
 

@@ -3,9 +3,10 @@
 use super::parameters;
 use crate::error::Error;
 use crate::jobs::terrain::{STAGE, generate, write_png16};
-use sastrugi_numeric::Streams;
+use sastrugi_numeric::{Grid, Streams};
 use sastrugi_store::dem::{self, Crs, Format, WriteOptions};
-use serde_json::{Value, json};
+use sastrugi_terrain::Generator;
+use serde_json::{Map, Value, json};
 use std::path::Path;
 
 /// What to generate.
@@ -37,14 +38,21 @@ pub fn terrain(request: &Request<'_>) -> Result<Value, Error> {
     let seed = request.seed.or(seed).unwrap_or(0);
     super::check_output(request.output)?;
     let streams = Streams::for_seed(seed, STAGE);
-    let heights = generate(generator.as_ref(), &streams)?;
+    let (bases, crs) = read_bases(generator.as_ref())?;
+    let made = generate(generator.as_ref(), &streams, &bases)?;
     let mut notes = generator.notes();
+    notes.extend(made.notes);
     if Format::of_name(request.output) == Some(Format::Png) {
-        notes.push(write_png16(generator.as_ref(), &heights, request.output)?);
+        notes.push(write_png16(generator.as_ref(), &made.heights, request.output)?);
     } else {
-        let lost =
-            dem::write(request.output, &heights, &Crs::default(), &request.options).map_err(super::write_error)?;
+        let lost = dem::write(request.output, &made.heights, &crs, &request.options).map_err(super::write_error)?;
         notes.extend(lost);
+    }
+    let mut maps = Map::new();
+    for map in &made.maps {
+        let path = request.output.with_extension(format!("{}.tif", map.name));
+        dem::write(&path, &map.values, &crs, &request.options).map_err(super::write_error)?;
+        maps.insert(map.name.to_owned(), json!({ "file": path.display().to_string(), "unit": map.unit }));
     }
     Ok(json!({
         "file": request.output.display().to_string(),
@@ -52,9 +60,23 @@ pub fn terrain(request: &Request<'_>) -> Result<Value, Error> {
         "seed": seed,
         "stream": streams.label(),
         "parameters": generator.parameters(),
-        "grid": super::describe_grid(&heights),
+        "grid": super::describe_grid(&made.heights),
+        "maps": maps,
         "notes": notes,
     }))
+}
+
+/// The files that a generator stands on, in metres, and the coordinate system of the first.
+fn read_bases(generator: &dyn Generator) -> Result<(Vec<Grid>, Crs), Error> {
+    let mut grids = Vec::new();
+    let mut crs = None;
+    for base in generator.bases() {
+        let read = super::read(Path::new(&base.name), &super::Reading::default())?.dem;
+        crs.get_or_insert(read.info.crs);
+        // As an item of a study reads it.
+        grids.push(read.grid.as_stored());
+    }
+    Ok((grids, crs.unwrap_or_default()))
 }
 
 /// Kind, parameters and seed of a specification.

@@ -25,7 +25,7 @@ mod tests;
 
 pub use params::{Multifractal, RawLayer, RawMultifractal, Scaling};
 
-use crate::generator::{Generator, Levels, TerrainError};
+use crate::generator::{Generator, Levels, Terrain, TerrainError};
 use params::Layer;
 use sastrugi_numeric::filters::gaussian_low_pass;
 use sastrugi_numeric::{Geometry, Grid, Streams, ops};
@@ -42,7 +42,7 @@ const LEVELS_ABOVE_ZERO: f64 = 32767.0;
 impl Layer {
     /// The layer, filtered, without mean, largest absolute value 1.
     fn generate(&self, streams: &Streams) -> Result<Grid, TerrainError> {
-        let surface = self.surface.generate(&streams.child(self.name))?;
+        let surface = self.surface.surface(&streams.child(self.name))?;
         let level = ops::without_mean(&gaussian_low_pass(&surface, self.sigma_px));
         unit_range(level, self.name)
     }
@@ -64,6 +64,12 @@ impl Multifractal {
         let [low, mid, high] = &self.layers;
         let product = ops::multiply(&low.generate(streams)?, &mid.generate(streams)?);
         unit_range(ops::multiply(&product, &high.generate(streams)?), "the product of the layers")
+    }
+
+    /// The surface, m.
+    fn surface(&self, streams: &Streams) -> Result<Grid, TerrainError> {
+        let metres_per_level = self.metres_per_level();
+        Ok(self.scaled(&self.product(streams)?).map(|level| level.round() * metres_per_level))
     }
 
     /// The product in levels above [`ZERO_LEVEL`], not yet rounded.
@@ -98,9 +104,8 @@ impl Generator for Multifractal {
         self.layers[2].surface.notes()
     }
 
-    fn generate(&self, streams: &Streams) -> Result<Grid, TerrainError> {
-        let metres_per_level = self.metres_per_level();
-        Ok(self.scaled(&self.product(streams)?).map(|level| level.round() * metres_per_level))
+    fn generate(&self, streams: &Streams, _bases: &[Grid]) -> Result<Terrain, TerrainError> {
+        self.surface(streams).map(Terrain::from)
     }
 
     fn levels(&self, heights: &Grid) -> Option<Levels> {

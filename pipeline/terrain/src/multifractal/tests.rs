@@ -38,14 +38,14 @@ fn stat_the_product_varies_and_its_factors_do_not() {
     let figures = |grid: &Grid| [tile_variation(&moore_gradient(grid), 2.5), increment_flatness(grid)];
     let of_seed = |seed: u64| -> [[f64; 2]; 4] {
         let layers = m.layers.each_ref().map(|layer| figures(&layer.generate(&seeded(seed)).unwrap()));
-        [figures(&m.generate(&seeded(seed)).unwrap()), layers[0], layers[1], layers[2]]
+        [figures(&m.surface(&seeded(seed)).unwrap()), layers[0], layers[1], layers[2]]
     };
     let all: Vec<[[f64; 2]; 4]> = (0..16).into_par_iter().map(of_seed).collect();
     let median_of = |part: usize| medians(&all.iter().map(|a| a[part]).collect::<Vec<_>>());
     let [variation, flatness] = median_of(0);
     let factors = [median_of(1), median_of(2), median_of(3)];
     eprintln!("product {variation:.2}, {flatness:.1}; factors {factors:.2?}");
-    for dem in [m.generate(&seeded(0)), m.layers[2].generate(&seeded(0))] {
+    for dem in [m.surface(&seeded(0)), m.layers[2].generate(&seeded(0))] {
         eprintln!("{:.3?}", scaling_exponents(&dem.unwrap()).unwrap().map(|e| (e.zeta, e.standard_error)));
     }
     assert!(variation >= 0.6 && flatness >= 10.0);
@@ -59,7 +59,7 @@ fn val_rounding_to_levels_keeps_the_shares() {
     let m = Multifractal::try_from(RawMultifractal::default()).unwrap();
     for seed in 0..2 {
         let smooth = m.scaled(&m.product(&seeded(seed)).unwrap()).map(|level| level * m.metres_per_level());
-        let (before, after) = (percent(shares_of(&smooth)), percent(shares_of(&m.generate(&seeded(seed)).unwrap())));
+        let (before, after) = (percent(shares_of(&smooth)), percent(shares_of(&m.surface(&seeded(seed)).unwrap())));
         for k in 0..3 {
             assert!((before[k] - after[k]).abs() < 0.05, "seed {seed}: {before:?} {after:?}");
         }
@@ -70,7 +70,7 @@ fn val_rounding_to_levels_keeps_the_shares() {
 fn val_levels_return_the_heights() {
     for scaling in ["symmetric", "min_max"] {
         let generator = multifractal(json!({"size_px": [120, 90], "scaling": scaling}));
-        let heights = generator.generate(&seeded(1)).unwrap();
+        let heights = generator.generate(&seeded(1), &[]).unwrap().heights;
         // Also from single precision, as a release stores them.
         let levels = generator.levels(&heights.as_stored()).unwrap();
         assert!((levels.metres_per_level * 65536.0 - 3.84).abs() < 1e-12);
@@ -86,9 +86,9 @@ fn val_levels_return_the_heights() {
 /// The range of the layers and G cancel: only the shape of each layer matters.
 #[test]
 fn prop_elevation_scale_has_no_effect() {
-    let one = multifractal(json!({"size_px": [100, 80]})).generate(&seeded(1)).unwrap();
+    let one = multifractal(json!({"size_px": [100, 80]})).generate(&seeded(1), &[]).unwrap().heights;
     let other = multifractal(json!({"size_px": [100, 80], "high": {"elevation_scale_m": 1e-3}}));
-    let worst = ops::max_abs(&ops::combine(&one, &other.generate(&seeded(1)).unwrap(), |a, b| a - b));
+    let worst = ops::max_abs(&ops::combine(&one, &other.generate(&seeded(1), &[]).unwrap().heights, |a, b| a - b));
     // Rounding may move a height by one level.
     assert!(worst < 6e-5, "{worst}");
 }
@@ -98,7 +98,7 @@ fn prop_same_bits_on_any_number_of_threads() {
     let generator = multifractal(json!({"size_px": [150, 110]}));
     let [one, two, eight] = [1, 2, 8].map(|threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| generator.generate(&seeded(1)).unwrap())
+        pool.install(|| generator.generate(&seeded(1), &[]).unwrap().heights)
     });
     assert!(one == two && one == eight);
 }
@@ -109,7 +109,7 @@ fn prop_same_bits_on_any_number_of_threads() {
 #[test]
 fn val_levels_of_an_independent_program() {
     let generator = multifractal(json!({"size_px": [60, 50]}));
-    let levels = generator.levels(&generator.generate(&seeded(1)).unwrap()).unwrap();
+    let levels = generator.levels(&generator.generate(&seeded(1), &[]).unwrap().heights).unwrap();
     let places = [0, 611, 1222, 1833, 2444, 2999];
     assert_eq!(places.map(|k: usize| levels.grid.values[k]), [36387, 32483, 33255, 32862, 39714, 64769]);
 }
@@ -150,7 +150,7 @@ fn shares_by_dimension(params: &Value, seeds: usize) -> [Vec<[f64; 3]>; 3] {
         let generator = multifractal(params);
         let of_seed = |k: usize| {
             let streams = Streams::for_item(1, "terrain", &format!("d{dimension}-{k:04}"));
-            percent(shares_of(&generator.generate(&streams).unwrap()))
+            percent(shares_of(&generator.generate(&streams, &[]).unwrap().heights))
         };
         (0..seeds).into_par_iter().map(of_seed).collect()
     })

@@ -33,7 +33,7 @@ pub use params::{
     RawWeierstrassMandelbrot, WeierstrassMandelbrot,
 };
 
-use crate::generator::{Generator, TerrainError};
+use crate::generator::{Generator, Terrain, TerrainError};
 use plane_waves::PlaneWave;
 use sastrugi_numeric::fft::Complex64;
 use sastrugi_numeric::{Geometry, Grid, Streams, sums};
@@ -95,6 +95,21 @@ impl WeierstrassMandelbrot {
     fn heights(&self, phases: &[f64]) -> Grid {
         plane_waves::sum_on_grid(&self.waves(phases), self.size.geometry())
     }
+
+    /// The surface, m.
+    ///
+    /// # Errors
+    /// A relief that drowns in rounding errors.
+    pub(crate) fn surface(&self, streams: &Streams) -> Result<Grid, TerrainError> {
+        let heights = self.heights(&self.phases(streams));
+        let relief_m = heights.range().map_or(0.0, |(low, high)| high - low);
+        let amplitude_m = self.amplitude_sum_m();
+        if relief_m > RELIEF_SHARE_MIN * amplitude_m {
+            Ok(heights)
+        } else {
+            Err(TerrainError::NoRelief { relief_m, amplitude_m })
+        }
+    }
 }
 
 impl Generator for WeierstrassMandelbrot {
@@ -127,14 +142,7 @@ impl Generator for WeierstrassMandelbrot {
         self.size.note().into_iter().chain(dropped).collect()
     }
 
-    fn generate(&self, streams: &Streams) -> Result<Grid, TerrainError> {
-        let heights = self.heights(&self.phases(streams));
-        let relief_m = heights.range().map_or(0.0, |(low, high)| high - low);
-        let amplitude_m = self.amplitude_sum_m();
-        if relief_m > RELIEF_SHARE_MIN * amplitude_m {
-            Ok(heights)
-        } else {
-            Err(TerrainError::NoRelief { relief_m, amplitude_m })
-        }
+    fn generate(&self, streams: &Streams, _bases: &[Grid]) -> Result<Terrain, TerrainError> {
+        self.surface(streams).map(Terrain::from)
     }
 }

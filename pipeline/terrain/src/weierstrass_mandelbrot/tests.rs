@@ -161,7 +161,7 @@ fn val_amplitudes_follow_the_power_law() {
     for dimension in [2.1, 2.5, 2.9] {
         let s = surface(json!({"size_px": [SIDE, SIDE], "cell_m": 0.1, "sampling_length_m": 25.6, "ridges": 2,
             "frequencies": 6, "frequency_ratio": 2.0, "fractal_dimension": dimension, "elevation_scale_m": 1e-3}));
-        let spectrum = RealFft2::new(SIDE, SIDE).forward(&s.generate(&streams()).unwrap().values);
+        let spectrum = RealFft2::new(SIDE, SIDE).forward(&s.surface(&streams()).unwrap().values);
         let modes = (SIDE * SIDE) as f64;
         let scale = 25.6 * libm::pow(1e-3 / 25.6, dimension - 2.0) * (libm::log(2.0) / 2.0).sqrt();
         for n in 1..=6 {
@@ -179,7 +179,7 @@ fn val_amplitudes_follow_the_power_law() {
 fn prop_the_south_west_post_is_at_height_zero() {
     for mode in ["band_limited", "paper"] {
         let s = surface(json!({"size_px": [65, 33], "mode": mode}));
-        let heights = s.generate(&streams()).unwrap();
+        let heights = s.surface(&streams()).unwrap();
         assert!(heights.at(32, 0).abs() < 1e-11 * s.amplitude_sum_m());
     }
 }
@@ -208,7 +208,7 @@ fn prop_same_bits_on_any_number_of_threads() {
     let s = surface(json!({"size_px": [150, 70]}));
     let [one, two, eight] = [1, 2, 8].map(|threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| s.generate(&streams()).unwrap())
+        pool.install(|| s.surface(&streams()).unwrap())
     });
     assert!(one == two && one == eight);
 }
@@ -217,7 +217,7 @@ fn prop_same_bits_on_any_number_of_threads() {
 /// message why released terrains change.
 #[test]
 fn gold_heights_are_frozen() {
-    let heights = surface(json!({"size_px": [40, 30]})).generate(&streams()).unwrap();
+    let heights = surface(json!({"size_px": [40, 30]})).surface(&streams()).unwrap();
     let bits = [0, 617, 1199].map(|k: usize| heights.values[k].to_bits());
     assert_eq!(bits, GOLD);
 }
@@ -272,7 +272,7 @@ fn val_not_finite_parameters_are_refused() {
 #[test]
 fn val_relief_below_rounding_is_an_error() {
     let s = surface(json!({"size_px": [20, 20], "sampling_length_m": 1e12, "frequencies": 3}));
-    assert!(matches!(s.generate(&streams()), Err(TerrainError::NoRelief { .. })));
+    assert!(matches!(s.surface(&streams()), Err(TerrainError::NoRelief { .. })));
 }
 
 proptest! {
@@ -291,7 +291,7 @@ proptest! {
                 fractal_dimension: dimension, sampling_length_m: power(length_log), elevation_scale_m: power(scale_log),
                 phase_max_rad: 6.0, mode,
             };
-            let made = WeierstrassMandelbrot::try_from(raw).ok().and_then(|s| s.generate(&streams()).ok());
+            let made = WeierstrassMandelbrot::try_from(raw).ok().and_then(|s| s.surface(&streams()).ok());
             if let Some(heights) = made {
                 prop_assert_eq!([heights.cols() as u32, heights.rows() as u32], px);
                 prop_assert_eq!(heights.finite_count(), heights.values.len());
