@@ -8,6 +8,7 @@ pub mod generator;
 pub mod multifractal;
 pub mod registry;
 pub mod size;
+pub mod spheroids;
 pub mod weierstrass_mandelbrot;
 
 pub use generator::{Base, Generator, Levels, MAP_NAMES, Map, Terrain, TerrainError};

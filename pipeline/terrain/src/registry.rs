@@ -2,6 +2,7 @@
 
 use crate::generator::Generator;
 use crate::multifractal::{Multifractal, RawMultifractal};
+use crate::spheroids::{RawSpheroids, Spheroids};
 use crate::weierstrass_mandelbrot::{RawWeierstrassMandelbrot, WeierstrassMandelbrot};
 use sastrugi_schemas::kind::{read_parameters, schema_of};
 use sastrugi_schemas::{Kind, ParameterError};
@@ -19,7 +20,7 @@ struct Entry {
     prepare: fn(&Value) -> Result<Box<dyn Generator>, ParameterError>,
 }
 
-const ENTRIES: [Entry; 2] = [
+const ENTRIES: &[Entry] = &[
     Entry {
         kind: crate::weierstrass_mandelbrot::KIND,
         summary: "monofractal sum of ridged plane waves, one fractal dimension everywhere",
@@ -33,6 +34,13 @@ const ENTRIES: [Entry; 2] = [
         source: "Majhor and Bos, section 2.1 and Table 1",
         parameters: schema_of::<RawMultifractal>,
         prepare: prepare_as::<RawMultifractal, Multifractal>,
+    },
+    Entry {
+        kind: crate::spheroids::KIND,
+        summary: "hills as upper halves of random spheroids, from plain to very rough",
+        source: "Bayrak (2008), Algorithm 10",
+        parameters: schema_of::<RawSpheroids>,
+        prepare: prepare_as::<RawSpheroids, Spheroids>,
     },
 ];
 
