@@ -19,6 +19,7 @@ mod profiles;
 mod spectrum;
 mod structure;
 mod summary;
+pub mod trace_moments;
 
 pub use agreement::{Statistic, unfitted_statistics};
 pub use areal::{ArealFigures, areal_figures};

@@ -48,7 +48,7 @@ pub struct Base {
 }
 
 /// Names of every map: with them, and a dot before them, no id ends.
-pub const MAP_NAMES: [&str; 5] = ["albedo", "class", "rms-measured", "rms-predicted", "rock-potential"];
+pub const MAP_NAMES: [&str; 6] = ["albedo", "class", "flux", "rms-measured", "rms-predicted", "rock-potential"];
 
 /// A heightfield, and what else its generator knows of it.
 #[derive(Clone, Debug, PartialEq)]
@@ -102,6 +102,16 @@ pub enum TerrainError {
         relief_m: f64,
         /// Sum of all wave amplitudes, m.
         amplitude_m: f64,
+    },
+    /// A figure that cannot be worked with.
+    #[error("make {part}: their {figure} is {value:e}; choose less extreme parameters")]
+    Unrepresentable {
+        /// Which values.
+        part: &'static str,
+        /// Name of the figure.
+        figure: &'static str,
+        /// The figure.
+        value: f64,
     },
     /// A surface that the generator stands on does not serve.
     #[error("use \"{base}\": it {reason}")]

@@ -4,6 +4,7 @@
 //! origin. Generators count posts from the south-west: post `i` east and `j` north stands for the surface point
 //! `(i cell, j cell)` of the generator's formula, and lies in column `i` and row `rows - 1 - j`.
 
+pub mod cascade;
 pub mod generator;
 pub mod multifractal;
 pub mod registry;

@@ -1,5 +1,6 @@
 //! The list of generators.
 
+use crate::cascade::{Cascade, RawCascade};
 use crate::generator::Generator;
 use crate::multifractal::{Multifractal, RawMultifractal};
 use crate::spheroids::{RawSpheroids, Spheroids};
@@ -34,6 +35,13 @@ const ENTRIES: &[Entry] = &[
         source: "Majhor and Bos, section 2.1 and Table 1",
         parameters: schema_of::<RawMultifractal>,
         prepare: prepare_as::<RawMultifractal, Multifractal>,
+    },
+    Entry {
+        kind: crate::cascade::KIND,
+        summary: "true multifractal: fractionally integrated log-normal cascade with known K(q) and zeta(q)",
+        source: "Schertzer and Lovejoy (1987); Gagnon, Lovejoy and Schertzer (2006)",
+        parameters: schema_of::<RawCascade>,
+        prepare: prepare_as::<RawCascade, Cascade>,
     },
     Entry {
         kind: crate::spheroids::KIND,
@@ -76,8 +84,15 @@ where
     Raw: Default + Serialize + DeserializeOwned + JsonSchema,
     Checked: TryFrom<Raw, Error = ParameterError> + Generator + 'static,
 {
-    let raw: Raw = read_parameters(&over_defaults::<Raw>(params)?)?;
-    Ok(Box::new(Checked::try_from(raw)?))
+    Ok(Box::new(Checked::try_from(read::<Raw>(params)?)?))
+}
+
+/// Raw parameters: the given ones over the defaults.
+pub(crate) fn read<Raw>(params: &Value) -> Result<Raw, ParameterError>
+where
+    Raw: Default + Serialize + DeserializeOwned,
+{
+    read_parameters(&over_defaults::<Raw>(params)?)
 }
 
 /// The defaults with the given parameters laid over them, table by table: naming one parameter of a layer leaves the

@@ -1,0 +1,96 @@
+//! Parameters of the cascade.
+
+use crate::size::Size;
+use sastrugi_numeric::fft::smooth_length;
+use sastrugi_schemas::ParameterError;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Cells when no size is given.
+const DEFAULT_SIZE_PX: [u32; 2] = [512, 512];
+/// Most cells of the surface that the heights are cut from.
+const REPEATED_CELLS_MAX: u64 = 1 << 29;
+
+/// True multifractal: fractionally integrated log-normal cascade.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct RawCascade {
+    /// Size east and north, m; in place of `size_px`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub size_m: Option<[f64; 2]>,
+    /// Cells east and north; 512 x 512 when no size is given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub size_px: Option<[u32; 2]>,
+    /// Side of a cell, m.
+    pub cell_m: f64,
+    /// Codimension C1 of the mean flux, 0 to 1: how patchy the roughness is (Gagnon et al., 2006: 0.12 for topography); 0 is a
+    /// flux without patches and has no relief.
+    pub codimension: f64,
+    /// Exponent H of the mean increment, 0 to 1 (Gagnon et al., 2006: 0.66).
+    pub hurst_exponent: f64,
+    /// Outer scale L where the cascade starts, m; the shorter side when absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub outer_scale_m: Option<f64>,
+    /// Standard deviation of the heights, m.
+    pub rms_height_m: f64,
+}
+
+impl Default for RawCascade {
+    fn default() -> Self {
+        Self {
+            size_m: None,
+            size_px: None,
+            cell_m: 0.05,
+            codimension: 0.12,
+            hurst_exponent: 0.66,
+            outer_scale_m: None,
+            rms_height_m: 0.2,
+        }
+    }
+}
+
+/// Checked parameters of the cascade.
+#[derive(Clone, Debug)]
+pub struct Cascade {
+    pub(super) raw: RawCascade,
+    pub(super) size: Size,
+    pub(super) outer_scale_m: f64,
+    /// Rows and columns of the surface that repeats.
+    pub(super) shape: [usize; 2],
+}
+
+impl TryFrom<RawCascade> for Cascade {
+    type Error = ParameterError;
+
+    fn try_from(raw: RawCascade) -> Result<Self, ParameterError> {
+        let size = Size::check(raw.size_m, raw.size_px, raw.cell_m, DEFAULT_SIZE_PX)?;
+        ParameterError::between("codimension", raw.codimension, 0.0, 1.0)?;
+        ParameterError::between("hurst_exponent", raw.hurst_exponent, 0.0, 1.0)?;
+        ParameterError::positive("rms_height_m", raw.rms_height_m)?;
+        let [width, height] = size.geometry().size();
+        let outer_scale_m = ParameterError::positive("outer_scale_m", raw.outer_scale_m.unwrap_or(width.min(height)))?;
+        let outer_px = outer_scale_m / size.cell_m;
+        if outer_px < 3.0 {
+            let message = format!("is {outer_scale_m}; it must be at least three cells of {} m", size.cell_m);
+            return Err(ParameterError::new("outer_scale_m", message));
+        }
+        let shape = repeated_shape(&size, outer_px).ok_or_else(|| {
+            let message = format!(
+                "is {outer_scale_m}, {outer_px:.0} cells beyond {} x {}; that needs more memory than \
+                                   2^29 cells; choose a smaller scale or larger cells",
+                size.cols(),
+                size.rows()
+            );
+            ParameterError::new("outer_scale_m", message)
+        })?;
+        let raw = RawCascade { size_m: None, size_px: Some(size.px), outer_scale_m: Some(outer_scale_m), ..raw };
+        Ok(Self { raw, size, outer_scale_m, shape })
+    }
+}
+
+/// An outer scale wider than the surface, so that its opposite edges have nothing to do with each other.
+fn repeated_shape(size: &Size, outer_px: f64) -> Option<[usize; 2]> {
+    let sides = [size.rows(), size.cols()].map(|side| side as f64 + outer_px.ceil());
+    let possible = sides[0] * sides[1] <= REPEATED_CELLS_MAX as f64;
+    possible.then(|| sides.map(|side| smooth_length(side as usize)))
+}
