@@ -103,6 +103,12 @@ pub enum TerrainError {
         /// Sum of all wave amplitudes, m.
         amplitude_m: f64,
     },
+    /// Nothing that could be scaled, or driven over.
+    #[error("find relief in {part}: the height is the same everywhere")]
+    Level {
+        /// What was made.
+        part: &'static str,
+    },
     /// A figure that cannot be worked with.
     #[error("make {part}: their {figure} is {value:e}; choose less extreme parameters")]
     Unrepresentable {

@@ -5,6 +5,7 @@
 //! `(i cell, j cell)` of the generator's formula, and lies in column `i` and row `rows - 1 - j`.
 
 pub mod cascade;
+pub mod compose;
 pub mod generator;
 pub mod multifractal;
 pub mod registry;

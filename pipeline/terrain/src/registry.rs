@@ -1,6 +1,7 @@
 //! The list of generators.
 
 use crate::cascade::{Cascade, RawCascade};
+use crate::compose::{Compose, RawCompose};
 use crate::generator::Generator;
 use crate::multifractal::{Multifractal, RawMultifractal};
 use crate::spheroids::{RawSpheroids, Spheroids};
@@ -44,6 +45,13 @@ const ENTRIES: &[Entry] = &[
         prepare: prepare_as::<RawCascade, Cascade>,
     },
     Entry {
+        kind: crate::compose::KIND,
+        summary: "other generators and surfaces joined by an ordered list: sum, product, blend, mask, clip, scale to relief",
+        source: "ours",
+        parameters: schema_of::<RawCompose>,
+        prepare: prepare_as::<RawCompose, Compose>,
+    },
+    Entry {
         kind: crate::spheroids::KIND,
         summary: "hills as upper halves of random spheroids, from plain to very rough",
         source: "Bayrak (2008), Algorithm 10",
@@ -77,6 +85,11 @@ pub fn prepare(kind: &str, params: &Value) -> Result<Box<dyn Generator>, Paramet
             Err(ParameterError::new("kind", message))
         }
     }
+}
+
+/// True where a generator has that parameter.
+pub(crate) fn has_parameter(kind: &str, name: &str) -> bool {
+    ENTRIES.iter().any(|e| e.kind == kind && (e.parameters)()["properties"].get(name).is_some())
 }
 
 fn prepare_as<Raw, Checked>(params: &Value) -> Result<Box<dyn Generator>, ParameterError>

@@ -1,0 +1,203 @@
+//! Surfaces joined by an ordered list of processes.
+//!
+//! # What
+//! Heights start at 0 m everywhere; each process changes what the ones before it left. With z the heights so far, o the operand (another
+//! generator on the same cells, or another surface of the study) times `factor`, and w the weight (0 to 1) of `region`, 1 without one:
+//!
+//! | operation | result |
+//! |---|---|
+//! | `add` | `z + w o` |
+//! | `multiply` | `z (1 - w + w o)` |
+//! | `blend` | `(1 - w) z + w o`: the operand in place of z |
+//! | `mask` | `w z + (1 - w) outside_m` |
+//! | `clip` | z between `low_m` and `high_m` |
+//! | `scale_to_relief` | z about its mean, scaled so that highest less lowest is `relief_m` |
+//!
+//! A region is another generator or surface m: w rises as `3 t^2 - 2 t^3`, `t = (m - from) / (to - from)` kept to 0 to 1; `from` above
+//! `to` turns it round.
+//!
+//! Generators draw from streams of their own, named by the number of the process. Surfaces of the study are taken at the centres of the
+//! cells (bilinear) and must reach there. Maps of generators (`class`, `albedo` ...) go on; of two with one name the later stays.
+//!
+//! # Cost
+//! The generators', one after the other; three grids more.
+
+mod params;
+#[cfg(test)]
+mod tests;
+
+pub use params::{Compose, Operation, RawCompose, RawProcess, RawRegion};
+
+use crate::generator::{Base, Generator, Map, Terrain, TerrainError};
+use params::{Operand, Process, Region, Step};
+use sastrugi_numeric::{Geometry, Grid, Streams, Surface, ops, sums};
+use serde_json::Value;
+
+/// Name in the registry.
+pub const KIND: &str = "compose";
+
+impl Operand {
+    fn bases(&self) -> Vec<Base> {
+        match self {
+            Self::Surface(base) => vec![base.clone()],
+            Self::Generator { generator, key } => {
+                let within = |b: Base| Base { key: format!("{key}.{}", b.key), ..b };
+                generator.bases().into_iter().map(within).collect()
+            }
+        }
+    }
+
+    fn memory_bytes(&self) -> u64 {
+        match self {
+            Self::Surface(_) => 0,
+            Self::Generator { generator, .. } => generator.memory_bytes(),
+        }
+    }
+
+    /// The values on the cells of `geometry`; takes its bases off the front of `bases`.
+    fn values(&self, geometry: &Geometry, streams: &Streams, bases: &mut &[Grid]) -> Result<Terrain, TerrainError> {
+        let (own, rest) = bases.split_at(self.bases().len().min(bases.len()));
+        *bases = rest;
+        match (self, own) {
+            (Self::Generator { generator, .. }, own) => generator.generate(streams, own),
+            (Self::Surface(base), [surface]) => sampled(base, surface, geometry).map(Terrain::from),
+            (Self::Surface(base), _) => {
+                Err(TerrainError::Base { base: base.name.clone(), reason: "is not there".to_owned() })
+            }
+        }
+    }
+}
+
+/// A surface at the centres of other cells.
+fn sampled(base: &Base, surface: &Grid, geometry: &Geometry) -> Result<Grid, TerrainError> {
+    let at = |k: usize| {
+        let (x, y) = (geometry.x(k % geometry.cols), geometry.y(k / geometry.cols));
+        surface.height(x, y).ok_or_else(|| {
+            let reason = format!("has no height at x = {x} m, y = {y} m; it must reach all centres of the cells");
+            TerrainError::Base { base: base.name.clone(), reason }
+        })
+    };
+    Ok(Grid::new(*geometry, (0..geometry.len()).map(at).collect::<Result<_, _>>()?))
+}
+
+impl Region {
+    /// The weight of a value of the region's surface.
+    fn weight(&self, value: f64) -> f64 {
+        let t = ((value - self.from) / (self.to - self.from)).clamp(0.0, 1.0);
+        t * t * (3.0 - 2.0 * t)
+    }
+}
+
+/// What a process makes of the heights so far.
+struct Running<'a> {
+    geometry: Geometry,
+    streams: Streams,
+    bases: &'a [Grid],
+    maps: Vec<Map>,
+    notes: Vec<String>,
+}
+
+impl Running<'_> {
+    /// An operand's heights; its maps and notes go on.
+    fn operand(&mut self, operand: &Operand, streams: &Streams) -> Result<Grid, TerrainError> {
+        let made = operand.values(&self.geometry, streams, &mut self.bases)?;
+        self.maps.retain(|map| made.maps.iter().all(|new| new.name != map.name));
+        self.maps.extend(made.maps);
+        self.notes.extend(made.notes);
+        Ok(made.heights)
+    }
+
+    /// The weights of a region, 1 everywhere without one.
+    fn weights(&mut self, region: Option<&Region>, streams: &Streams) -> Result<Grid, TerrainError> {
+        match region {
+            None => Ok(Grid::filled(self.geometry, 1.0)),
+            Some(region) => {
+                let made = region.operand.values(&self.geometry, &streams.child("region"), &mut self.bases)?;
+                Ok(made.heights.map(|v| region.weight(v)))
+            }
+        }
+    }
+
+    fn apply(&mut self, z: Grid, number: usize, process: &Process) -> Result<Grid, TerrainError> {
+        let streams = self.streams.child(&format!("process-{number}"));
+        match &process.step {
+            Step::Clip { low_m, high_m } => Ok(z.map(|v| v.clamp(*low_m, *high_m))),
+            Step::ScaleToRelief { relief_m } => scaled_to_relief(&z, *relief_m),
+            Step::Mask { region, outside_m } => {
+                let weights = self.weights(Some(region), &streams)?;
+                Ok(ops::combine(&z, &weights, |z, w| w * z + (1.0 - w) * outside_m))
+            }
+            Step::Join { join, operand, factor, region } => {
+                let operand = self.operand(operand, &streams)?.map(|v| v * factor);
+                let weights = self.weights(region.as_ref(), &streams)?;
+                Ok(join.of(z, &operand, &weights))
+            }
+        }
+    }
+}
+
+impl params::Join {
+    fn of(self, z: Grid, operand: &Grid, weights: &Grid) -> Grid {
+        match self {
+            Self::Add => ops::add(&z, &ops::multiply(weights, operand)),
+            Self::Multiply => {
+                let factors = ops::combine(weights, operand, |w, o| 1.0 - w + w * o);
+                ops::multiply(&z, &factors)
+            }
+            Self::Blend => {
+                let kept = ops::combine(&z, weights, |z, w| (1.0 - w) * z);
+                ops::add(&kept, &ops::multiply(weights, operand))
+            }
+        }
+    }
+}
+
+fn scaled_to_relief(z: &Grid, relief_m: f64) -> Result<Grid, TerrainError> {
+    let (low, high) = z.range().unwrap_or((0.0, 0.0));
+    let mean = sums::mean(&z.values);
+    let scale = relief_m / (high - low);
+    if scale.is_finite() { Ok(z.map(|v| mean + (v - mean) * scale)) } else { Err(FLAT) }
+}
+
+/// A composition whose heights are all the same.
+const FLAT: TerrainError = TerrainError::Level { part: "the processes so far" };
+
+impl Generator for Compose {
+    fn kind(&self) -> &'static str {
+        KIND
+    }
+
+    fn geometry(&self) -> Geometry {
+        self.geometry
+    }
+
+    fn parameters(&self) -> Value {
+        self.parameters.clone()
+    }
+
+    fn memory_bytes(&self) -> u64 {
+        let most = self.processes.iter().flat_map(Process::operands).map(Operand::memory_bytes).max();
+        most.unwrap_or(0) + 3 * 8 * self.geometry.len() as u64
+    }
+
+    fn notes(&self) -> Vec<String> {
+        self.notes.clone()
+    }
+
+    fn bases(&self) -> Vec<Base> {
+        self.processes.iter().flat_map(Process::operands).flat_map(Operand::bases).collect()
+    }
+
+    fn generate(&self, streams: &Streams, bases: &[Grid]) -> Result<Terrain, TerrainError> {
+        let geometry = self.geometry;
+        let mut running = Running { geometry, streams: streams.clone(), bases, maps: Vec::new(), notes: Vec::new() };
+        let mut heights = Grid::filled(geometry, 0.0);
+        for (k, process) in self.processes.iter().enumerate() {
+            heights = running.apply(heights, k + 1, process)?;
+        }
+        match heights.range() {
+            Some((low, high)) if high > low => Ok(Terrain { heights, maps: running.maps, notes: running.notes }),
+            _ => Err(FLAT),
+        }
+    }
+}

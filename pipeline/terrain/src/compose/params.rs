@@ -1,0 +1,387 @@
+//! Parameters of a composition.
+
+use crate::generator::{Base, Generator};
+use crate::size::Size;
+use sastrugi_numeric::Geometry;
+use sastrugi_schemas::ParameterError;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value, json};
+
+/// Cells when no size is given.
+const DEFAULT_SIZE_PX: [u32; 2] = [512, 512];
+/// Most processes of one surface.
+const PROCESSES_MAX: usize = 64;
+/// Keys that a generator of a process takes from the whole.
+const COMMON: [&str; 4] = ["size_m", "size_px", "cell_m", "origin_m"];
+
+/// Surfaces joined by an ordered list of processes.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct RawCompose {
+    /// Size east and north, m; in place of `size_px`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub size_m: Option<[f64; 2]>,
+    /// Cells east and north; 512 x 512 when no size is given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub size_px: Option<[u32; 2]>,
+    /// Side of a cell, m.
+    pub cell_m: f64,
+    /// South-west corner, m: where surfaces of the study are taken, in their coordinates.
+    pub origin_m: [f64; 2],
+    /// The processes, in their order. By default hills with a rough surface on them.
+    pub processes: Vec<RawProcess>,
+}
+
+impl Default for RawCompose {
+    fn default() -> Self {
+        let add = |kind: &str, parameters: Value| RawProcess {
+            kind: Some(kind.to_owned()),
+            parameters: parameters.as_object().cloned().unwrap_or_default(),
+            ..RawProcess::default()
+        };
+        let hills = add("spheroids", json!({ "preset": "rough", "major_max_px": 60, "minor_max_px": 20 }));
+        let rough = add("weierstrass_mandelbrot", json!({ "fractal_dimension": 2.3, "sampling_length_m": 25.0 }));
+        let scale = |relief_m| RawProcess {
+            operation: Operation::ScaleToRelief,
+            relief_m: Some(relief_m),
+            ..RawProcess::default()
+        };
+        let processes = vec![hills, RawProcess { factor: 2.0, ..rough }, scale(3.0)];
+        Self { size_m: None, size_px: None, cell_m: 0.1, origin_m: [0.0; 2], processes }
+    }
+}
+
+/// What a process does.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Operation {
+    /// The operand is added.
+    #[default]
+    Add,
+    /// Heights are multiplied with the operand.
+    Multiply,
+    /// The operand takes the place of the heights, where the region says so.
+    Blend,
+    /// Heights stay inside of the region and become `outside_m` elsewhere.
+    Mask,
+    /// Heights are kept between two bounds.
+    Clip,
+    /// Heights are scaled to a relief.
+    ScaleToRelief,
+}
+
+/// One process.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct RawProcess {
+    /// What it does; `add` when absent.
+    pub operation: Operation,
+    /// Generator of the operand (see `sastrugi kinds`).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub kind: Option<String>,
+    /// Parameters of that generator but for size, cell and origin, which are those of the whole.
+    #[serde(skip_serializing_if = "Map::is_empty")]
+    pub parameters: Map<String, Value>,
+    /// In place of `kind`: id of a DEM or an earlier terrain of the study.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub of: Option<String>,
+    /// Factor of the operand; 1 when absent.
+    #[serde(skip_serializing_if = "is_one")]
+    pub factor: f64,
+    /// Where the process counts; everywhere when absent. For `mask`, what it masks by.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub region: Option<RawRegion>,
+    /// For `mask`: heights outside of the region, m; 0 when absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub outside_m: Option<f64>,
+    /// For `clip`: lowest height, m; none when absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub low_m: Option<f64>,
+    /// For `clip`: highest height, m; none when absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub high_m: Option<f64>,
+    /// For `scale_to_relief`: highest less lowest height, m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub relief_m: Option<f64>,
+}
+
+impl Default for RawProcess {
+    fn default() -> Self {
+        Self {
+            operation: Operation::Add,
+            kind: None,
+            parameters: Map::new(),
+            of: None,
+            factor: 1.0,
+            region: None,
+            outside_m: None,
+            low_m: None,
+            high_m: None,
+            relief_m: None,
+        }
+    }
+}
+
+fn is_one(factor: &f64) -> bool {
+    *factor == 1.0
+}
+
+/// Where a process counts, by the values of a surface.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawRegion {
+    /// Generator of that surface.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub kind: Option<String>,
+    /// Its parameters, as in a process.
+    #[serde(default, skip_serializing_if = "Map::is_empty")]
+    pub parameters: Map<String, Value>,
+    /// In place of `kind`: id of a DEM or an earlier terrain of the study.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub of: Option<String>,
+    /// Value where the weight begins to rise from 0.
+    pub from: f64,
+    /// Value where the weight reaches 1.
+    pub to: f64,
+}
+
+/// What a process or a region works with.
+pub(super) enum Operand {
+    /// A generator on the same cells, and the key of its parameters.
+    Generator { generator: Box<dyn Generator>, key: String },
+    /// Another surface.
+    Surface(Base),
+}
+
+/// A checked region.
+pub(super) struct Region {
+    pub(super) operand: Operand,
+    pub(super) from: f64,
+    pub(super) to: f64,
+}
+
+/// How an operand joins the heights.
+#[derive(Clone, Copy)]
+pub(super) enum Join {
+    Add,
+    Multiply,
+    Blend,
+}
+
+/// What a process does.
+pub(super) enum Step {
+    Join { join: Join, operand: Operand, factor: f64, region: Option<Region> },
+    Mask { region: Region, outside_m: f64 },
+    Clip { low_m: f64, high_m: f64 },
+    ScaleToRelief { relief_m: f64 },
+}
+
+/// A checked process.
+pub(super) struct Process {
+    pub(super) step: Step,
+}
+
+impl Process {
+    /// Operand and region, in the order in which they are made.
+    pub(super) fn operands(&self) -> Vec<&Operand> {
+        match &self.step {
+            Step::Join { operand, region, .. } => {
+                std::iter::once(operand).chain(region.as_ref().map(|r| &r.operand)).collect()
+            }
+            Step::Mask { region, .. } => vec![&region.operand],
+            Step::Clip { .. } | Step::ScaleToRelief { .. } => Vec::new(),
+        }
+    }
+}
+
+/// Checked parameters of a composition.
+pub struct Compose {
+    pub(super) geometry: Geometry,
+    pub(super) processes: Vec<Process>,
+    pub(super) parameters: Value,
+    pub(super) notes: Vec<String>,
+}
+
+impl TryFrom<RawCompose> for Compose {
+    type Error = ParameterError;
+
+    fn try_from(raw: RawCompose) -> Result<Self, ParameterError> {
+        let size = Size::check(raw.size_m, raw.size_px, raw.cell_m, DEFAULT_SIZE_PX)?;
+        if !raw.origin_m.iter().all(|o| o.is_finite()) {
+            return Err(ParameterError::new("origin_m", "must be two finite numbers"));
+        }
+        check_count(&raw.processes)?;
+        let whole = Whole { size, origin_m: raw.origin_m };
+        let mut processes = Vec::new();
+        for (k, process) in raw.processes.iter().enumerate() {
+            let key = format!("processes.{k}");
+            let step = whole.step(&key, process).map_err(|e| e.within(&key))?;
+            processes.push(Process { step });
+        }
+        let geometry = Geometry { origin: raw.origin_m, ..size.geometry() };
+        let raw = RawCompose { size_m: None, size_px: Some(size.px), ..raw };
+        let mut parameters = serde_json::to_value(&raw).unwrap_or_default();
+        fill_in(&mut parameters, &processes);
+        Ok(Self { geometry, processes, parameters, notes: size.note().into_iter().collect() })
+    }
+}
+
+/// The whole that every process is part of.
+struct Whole {
+    size: Size,
+    origin_m: [f64; 2],
+}
+
+impl Whole {
+    fn step(&self, at: &str, raw: &RawProcess) -> Result<Step, ParameterError> {
+        refuse_foreign_keys(raw)?;
+        let region = raw.region.as_ref().map(|region| self.region(at, region).map_err(|e| e.within("region")));
+        let region = region.transpose()?;
+        match (raw.operation, region) {
+            (Operation::Add, region) => self.join(at, Join::Add, raw, region),
+            (Operation::Multiply, region) => self.join(at, Join::Multiply, raw, region),
+            (Operation::Blend, region) => self.join(at, Join::Blend, raw, region),
+            (Operation::Mask, Some(region)) => {
+                Ok(Step::Mask { region, outside_m: finite("outside_m", raw.outside_m.unwrap_or(0.0))? })
+            }
+            (Operation::Mask, None) => {
+                Err(ParameterError::new("region", "is missing; `mask` needs to know where heights stay"))
+            }
+            (Operation::Clip, _) => clip(raw),
+            (Operation::ScaleToRelief, _) => {
+                let relief_m = raw.relief_m.ok_or_else(|| {
+                    ParameterError::new("relief_m", "is missing; `scale_to_relief` needs highest less lowest height, m")
+                })?;
+                Ok(Step::ScaleToRelief { relief_m: ParameterError::positive("relief_m", relief_m)? })
+            }
+        }
+    }
+
+    fn join(&self, at: &str, join: Join, raw: &RawProcess, region: Option<Region>) -> Result<Step, ParameterError> {
+        let operand = self.operand(at, raw.kind.as_deref(), &raw.parameters, raw.of.as_deref())?;
+        let factor = finite("factor", raw.factor)?;
+        Ok(Step::Join { join, operand, factor, region })
+    }
+
+    fn region(&self, at: &str, raw: &RawRegion) -> Result<Region, ParameterError> {
+        let at = format!("{at}.region");
+        let operand = self.operand(&at, raw.kind.as_deref(), &raw.parameters, raw.of.as_deref())?;
+        let (from, to) = (finite("from", raw.from)?, finite("to", raw.to)?);
+        if from == to {
+            return Err(ParameterError::new("to", format!("is {to}, as `from`; the weight rises between two values")));
+        }
+        Ok(Region { operand, from, to })
+    }
+
+    fn operand(
+        &self,
+        at: &str,
+        kind: Option<&str>,
+        parameters: &Map<String, Value>,
+        of: Option<&str>,
+    ) -> Result<Operand, ParameterError> {
+        match (kind, of) {
+            (Some(kind), None) => {
+                let generator = self.generator(kind, parameters)?;
+                Ok(Operand::Generator { generator, key: format!("{at}.parameters") })
+            }
+            (None, Some(_)) if !parameters.is_empty() => {
+                Err(ParameterError::new("parameters", "belong to a `kind`; a surface named by `of` has none"))
+            }
+            (None, Some(id)) => Ok(Operand::Surface(Base { key: format!("{at}.of"), name: id.to_owned() })),
+            (None, None) => Err(ParameterError::new("kind", "is missing; name a generator, or a surface by `of`")),
+            (Some(_), Some(_)) => Err(ParameterError::new("of", "stands beside `kind`; give one of them")),
+        }
+    }
+
+    /// A generator on the cells of the whole.
+    fn generator(&self, kind: &str, parameters: &Map<String, Value>) -> Result<Box<dyn Generator>, ParameterError> {
+        if let Some(key) = COMMON.into_iter().find(|key| parameters.contains_key(*key)) {
+            let message = "is that of the whole surface; leave it out here";
+            return Err(ParameterError::new(key, message).within("parameters"));
+        }
+        let mut all = parameters.clone();
+        all.insert("size_px".to_owned(), json!(self.size.px));
+        all.insert("cell_m".to_owned(), json!(self.size.cell_m));
+        if crate::registry::has_parameter(kind, "origin_m") {
+            all.insert("origin_m".to_owned(), json!(self.origin_m));
+        }
+        crate::prepare(kind, &Value::Object(all)).map_err(|e| match e.key.as_str() {
+            "kind" => e,
+            _ => e.within("parameters"),
+        })
+    }
+}
+
+fn check_count(processes: &[RawProcess]) -> Result<(), ParameterError> {
+    let refuse = |message: String| Err(ParameterError::new("processes", message));
+    match processes.first().map(|p| p.operation) {
+        None => refuse("is empty; it needs at least one process".to_owned()),
+        Some(Operation::Add | Operation::Blend) if processes.len() <= PROCESSES_MAX => Ok(()),
+        Some(Operation::Add | Operation::Blend) => {
+            refuse(format!("holds {}; the most is {PROCESSES_MAX}", processes.len()))
+        }
+        Some(_) => {
+            refuse("begins with heights of 0 m everywhere, so that the first must be `add` or `blend`".to_owned())
+        }
+    }
+}
+
+/// Refuses keys of other operations, which would be without effect.
+fn refuse_foreign_keys(raw: &RawProcess) -> Result<(), ParameterError> {
+    let joins = matches!(raw.operation, Operation::Add | Operation::Multiply | Operation::Blend);
+    let masks = raw.operation == Operation::Mask;
+    let given = [
+        ("kind", raw.kind.is_some(), joins),
+        ("parameters", !raw.parameters.is_empty(), joins),
+        ("of", raw.of.is_some(), joins),
+        ("factor", !is_one(&raw.factor), joins),
+        ("region", raw.region.is_some(), joins || masks),
+        ("outside_m", raw.outside_m.is_some(), masks),
+        ("low_m", raw.low_m.is_some(), raw.operation == Operation::Clip),
+        ("high_m", raw.high_m.is_some(), raw.operation == Operation::Clip),
+        ("relief_m", raw.relief_m.is_some(), raw.operation == Operation::ScaleToRelief),
+    ];
+    match given.into_iter().find(|(_, given, taken)| *given && !*taken) {
+        Some((key, ..)) => {
+            let operation = json!(raw.operation);
+            let operation = operation.as_str().unwrap_or_default();
+            Err(ParameterError::new(key, format!("has no place in the operation `{operation}`")))
+        }
+        None => Ok(()),
+    }
+}
+
+fn clip(raw: &RawProcess) -> Result<Step, ParameterError> {
+    let low_m = raw.low_m.map_or(Ok(f64::NEG_INFINITY), |v| finite("low_m", v))?;
+    let high_m = raw.high_m.map_or(Ok(f64::INFINITY), |v| finite("high_m", v))?;
+    if raw.low_m.is_none() && raw.high_m.is_none() {
+        return Err(ParameterError::new("low_m", "is missing, and `high_m` as well; `clip` needs one of them"));
+    }
+    if low_m < high_m {
+        Ok(Step::Clip { low_m, high_m })
+    } else {
+        Err(ParameterError::new("low_m", format!("is {low_m}; it must lie below `high_m`, {high_m}")))
+    }
+}
+
+fn finite(key: &str, value: f64) -> Result<f64, ParameterError> {
+    if value.is_finite() { Ok(value) } else { Err(ParameterError::new(key, format!("is {value}; it must be finite"))) }
+}
+
+/// Writes the full checked parameters of the generators into the raw ones.
+fn fill_in(parameters: &mut Value, processes: &[Process]) {
+    for operand in processes.iter().flat_map(Process::operands) {
+        let Operand::Generator { generator, key } = operand else { continue };
+        let pointer = format!("/{}", key.replace('.', "/"));
+        let Some((parent, _)) = pointer.rsplit_once('/') else { continue };
+        if let Some(process) = parameters.pointer_mut(parent) {
+            let mut own = generator.parameters();
+            if let Some(own) = own.as_object_mut() {
+                own.retain(|key, _| !COMMON.contains(&key.as_str()));
+            }
+            process["parameters"] = own;
+        }
+    }
+}

@@ -1,0 +1,164 @@
+use super::*;
+use proptest::prelude::*;
+use serde_json::json;
+
+fn prepared(processes: Value) -> Box<dyn Generator> {
+    crate::prepare(KIND, &json!({"size_px": [30, 20], "cell_m": 0.5, "processes": processes})).unwrap()
+}
+
+fn streams() -> Streams {
+    Streams::for_seed(1, "terrain")
+}
+
+fn made(processes: Value, bases: &[Grid]) -> Terrain {
+    prepared(processes).generate(&streams(), bases).unwrap()
+}
+
+/// A ramp that rises by 1 a metre to the east.
+fn ramp() -> Grid {
+    let g = Geometry::square(40, 40, 0.5);
+    Grid::new(g, (0..g.len()).map(|k| g.x(k % 40)).collect())
+}
+
+fn hills(process: u32) -> Grid {
+    let generator = crate::prepare("spheroids", &json!({"size_px": [30, 20], "cell_m": 0.5})).unwrap();
+    generator.generate(&streams().child(&format!("process-{process}")), &[]).unwrap().heights
+}
+
+#[test]
+fn val_operations_are_those_of_the_table() {
+    let o = |z: &[f64]| Grid::new(Geometry::square(1, z.len(), 1.0), z.to_vec());
+    let (z, operand, w) = (o(&[1.0, 2.0, 3.0]), o(&[10.0, 20.0, 30.0]), o(&[0.0, 0.5, 1.0]));
+    let joined = |join: params::Join| join.of(z.clone(), &operand, &w).values;
+    assert_eq!(joined(params::Join::Add), [1.0, 12.0, 33.0]);
+    assert_eq!(joined(params::Join::Multiply), [1.0, 21.0, 90.0]);
+    assert_eq!(joined(params::Join::Blend), [1.0, 11.0, 30.0]);
+    assert_eq!(scaled_to_relief(&z, 4.0).unwrap().values, [0.0, 2.0, 4.0]);
+    assert!(scaled_to_relief(&o(&[2.0, 2.0]), 4.0).is_err());
+}
+
+#[test]
+fn val_regions_rise_smoothly_between_their_values() {
+    let operand = || Operand::Surface(Base { key: String::new(), name: String::new() });
+    let region = |from, to| Region { operand: operand(), from, to };
+    let weights = [1.0, 2.0, 2.5, 3.0, 4.0].map(|v| region(2.0, 3.0).weight(v));
+    assert_eq!(weights, [0.0, 0.0, 0.5, 1.0, 1.0]);
+    assert_eq!(region(3.0, 2.0).weight(2.25), 1.0 - region(2.0, 3.0).weight(2.25));
+}
+
+/// Processes change what the ones before them left, each with streams of its own.
+#[test]
+fn val_processes_run_in_their_order() {
+    let two = made(json!([{"kind": "spheroids"}, {"kind": "spheroids", "factor": 0.5}]), &[]).heights;
+    let expected = ops::combine(&hills(1), &hills(2), |a, b| a + b * 0.5);
+    assert_eq!(two.values, expected.values);
+    let first = made(json!([{"kind": "spheroids"}, {"operation": "clip", "high_m": 9.0}, {"of": "ramp"}]), &[ramp()]);
+    let last = made(json!([{"kind": "spheroids"}, {"of": "ramp"}, {"operation": "clip", "high_m": 9.0}]), &[ramp()]);
+
+    assert!(first.heights.row(0)[29] >= 14.75 && last.heights.range().unwrap().1 == 9.0);
+    let scaled = made(json!([{"of": "ramp"}, {"operation": "scale_to_relief", "relief_m": 3.0}]), &[ramp()]).heights;
+    let (low, high) = scaled.range().unwrap();
+    assert!((high - low - 3.0).abs() < 1e-12 && (0.5 * (low + high) - 7.5).abs() < 1e-12);
+}
+
+/// West of 4 m the ramp, east of 6 m hills, between them both; a mask leaves -1 m in the west.
+#[test]
+fn val_blends_and_masks_follow_their_region() {
+    let region = json!({"of": "ramp", "from": 4.0, "to": 6.0});
+    let blend = json!([{"of": "ramp"}, {"operation": "blend", "kind": "spheroids", "region": region}]);
+    let heights = made(blend, &[ramp(), ramp()]).heights;
+    let hills = hills(2);
+    for k in 0..600 {
+        let x = heights.geometry.x(k % 30);
+        let expected = if x < 4.0 { x } else { hills.values[k] };
+        assert!((4.0..6.0).contains(&x) || (heights.values[k] - expected).abs() < 1e-12, "{x}");
+    }
+    let mask = json!([{"kind": "spheroids"}, {"operation": "mask", "outside_m": -1.0, "region": region}]);
+    let heights = made(mask, &[ramp()]).heights;
+    assert!((0..600).all(|k| heights.geometry.x(k % 30) > 4.0 || heights.values[k] == -1.0));
+}
+
+#[test]
+fn val_surfaces_must_reach_the_cells() {
+    let small = Grid::filled(Geometry::square(10, 10, 0.5), 1.0);
+    let error = prepared(json!([{"of": "small"}])).generate(&streams(), &[small]).unwrap_err();
+    assert!(error.to_string().contains("\"small\"") && error.to_string().contains("x = 0.25 m, y = 9.75 m"), "{error}");
+    let error = prepared(json!([{"of": "small"}])).generate(&streams(), &[]).unwrap_err();
+    assert!(error.to_string().contains("is not there"));
+    let flat = Grid::filled(Geometry::square(40, 40, 0.5), 1.0);
+    let error = prepared(json!([{"of": "flat"}])).generate(&streams(), &[flat]).unwrap_err();
+    assert!(error.to_string().contains("same everywhere"), "{error}");
+}
+
+#[test]
+fn val_bases_stand_in_the_order_of_the_processes() {
+    let region = json!({"of": "b", "from": 0.0, "to": 1.0});
+    let generator = prepared(json!([{"of": "a", "region": region}, {"kind": "spheroids"}, {"of": "c"}]));
+    let bases: Vec<(String, String)> = generator.bases().into_iter().map(|b| (b.key, b.name)).collect();
+    let expected = [("processes.0.of", "a"), ("processes.0.region.of", "b"), ("processes.2.of", "c")];
+    assert_eq!(bases, expected.map(|(k, n)| (k.to_owned(), n.to_owned())));
+}
+
+#[test]
+fn val_maps_of_generators_go_on() {
+    let maps = |processes| made(processes, &[]).maps;
+    let one = maps(json!([{"kind": "cascade"}, {"kind": "spheroids"}]));
+    assert_eq!(one.iter().map(|m| m.name).collect::<Vec<_>>(), ["flux"]);
+    let two = maps(json!([{"kind": "cascade"}, {"kind": "cascade"}]));
+    assert_eq!(two.len(), 1);
+    assert_ne!(one[0].values, two[0].values);
+}
+
+#[test]
+fn val_impossible_processes_are_refused() {
+    let refused = |processes: Value| {
+        let params = json!({"size_px": [30, 20], "processes": processes});
+        let error = crate::prepare(KIND, &params).err().unwrap();
+        (error.key, error.message)
+    };
+    for (processes, key, word) in [
+        (json!([]), "processes", "empty"),
+        (json!([{"operation": "multiply", "kind": "spheroids"}]), "processes", "first"),
+        (json!([{}]), "processes.0.kind", "missing"),
+        (json!([{"kind": "sphere"}]), "processes.0.kind", "known ones"),
+        (json!([{"kind": "spheroids", "of": "a"}]), "processes.0.of", "one of them"),
+        (json!([{"of": "a", "parameters": {"preset": "plain"}}]), "processes.0.parameters", "belong"),
+        (json!([{"kind": "spheroids", "parameters": {"cell_m": 1.0}}]), "processes.0.parameters.cell_m", "whole"),
+        (json!([{"kind": "spheroids", "parameters": {"spheroids": 0}}]), "processes.0.parameters.spheroids", "between"),
+        (json!([{"kind": "spheroids", "relief_m": 1.0}]), "processes.0.relief_m", "`add`"),
+        (json!([{"of": "a"}, {"operation": "mask"}]), "processes.1.region", "missing"),
+        (json!([{"of": "a"}, {"operation": "clip"}]), "processes.1.low_m", "missing"),
+        (json!([{"of": "a"}, {"operation": "clip", "low_m": 2.0, "high_m": 1.0}]), "processes.1.low_m", "below"),
+        (json!([{"of": "a"}, {"operation": "scale_to_relief"}]), "processes.1.relief_m", "missing"),
+        (json!([{"of": "a", "region": {"of": "b", "from": 1.0, "to": 1.0}}]), "processes.0.region.to", "two values"),
+        (json!([{"of": "a", "region": {"from": 1.0, "to": 2.0}}]), "processes.0.region.kind", "missing"),
+    ] {
+        let (found, message) = refused(processes.clone());
+        assert!(found == key && message.contains(word), "{processes}: {found} {message}");
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+    /// Whatever the list, it is refused, fails with a reason, or gives finite heights that are not flat.
+    #[test]
+    fn prop_any_list_is_made_or_refused(words in proptest::collection::vec((0usize..6, 0usize..3, -3.0f64..3.0), 0..6)) {
+        let operations = ["add", "multiply", "blend", "mask", "clip", "scale_to_relief"];
+        let process = |(operation, what, number): (usize, usize, f64)| {
+            let mut process = json!({"operation": operations[operation]});
+            match what {
+                0 => process["kind"] = json!("spheroids"),
+                1 => process["region"] = json!({"kind": "spheroids", "from": 0.0, "to": number}),
+                _ => process["relief_m"] = json!(number),
+            }
+            process
+        };
+        let processes: Vec<Value> = words.into_iter().map(process).collect();
+        let generator = crate::prepare(KIND, &json!({"size_px": [9, 8], "processes": processes}));
+        let made = generator.ok().and_then(|g| g.generate(&streams(), &[]).ok());
+        if let Some(made) = made {
+            let (low, high) = made.heights.range().unwrap();
+            prop_assert!(made.heights.finite_count() == 72 && high > low);
+        }
+    }
+}
