@@ -51,6 +51,11 @@ fn val_studies_are_refused_with_the_line() {
     study_refused("missions = \"short\"", "missions = \"short\"\nvehicle = \"tank\"", &["tank", "husky_a200"]);
     study_refused("missions = \"short\"", "missions = \"short\"\nimu_rate_hz = 7", &["imu_rate_hz", "divide"]);
     study_refused("missions = \"short\"", "missions = \"short\"\nstep_rate_hz = 100", &["step_rate_hz", "unstable"]);
+    study_refused(
+        "size_px = [320, 300]",
+        "size_px = [320, 300]\ncell_m = 0.9",
+        &["cells of 0.9 m", "wheelbase", "missions"],
+    );
     study_refused("[[fit]]", "[[fitt]]", &["unknown section `fitt`"]);
     study_refused("date = \"2026-01-01\"", "date = \"yesterday\"", &["YYYY-MM-DD"]);
 }

@@ -165,6 +165,28 @@ fn val_conversions_keep_the_heights() {
     assert!(path.join("e.obj").exists() && path.join("f.png").exists());
 }
 
+/// A DEM of 90 x 70 cells as a picture of 30 x 24 pixels; what cannot be drawn is refused.
+#[test]
+fn val_hillshade_draws_a_dem() {
+    let folder = area();
+    let path = folder.path();
+    ok(path, &["terrain", "multifractal", "--set", "size_px=[90,70]", "-o", "a.tif"]);
+    let drawn = ok_json(path, &["hillshade", "a.tif", "--pixels", "30", "-o", "a.png"]);
+    assert_eq!((drawn["pixels"][0].as_u64(), drawn["pixels"][1].as_u64()), (Some(30), Some(24)));
+    let bytes = std::fs::read(path.join("a.png")).unwrap();
+    assert!(bytes.starts_with(b"\x89PNG") && bytes[16..24] == [0, 0, 0, 30, 0, 0, 0, 24]);
+    for (arguments, code) in [
+        (["a.tif", "-o", "a.jpg", "--quiet"], 2),
+        (["a.tif", "-o", "b.png", "--pixels=0"], 2),
+        (["a.tif", "-o", "b.png", "--exaggeration=-1"], 2),
+        (["none.tif", "-o", "b.png", "--quiet"], 65),
+    ] {
+        let called = sastrugi_in(path, &[&["hillshade"][..], &arguments].concat());
+        assert!(called.code == code && !called.stderr.contains("panicked"), "{arguments:?} {}", called.stderr);
+        assert!(!path.join("b.png").exists());
+    }
+}
+
 #[test]
 fn val_traverse_makes_a_release_of_its_own() {
     let folder = area();

@@ -109,6 +109,10 @@ pub enum Verb {
         after_help = "Examples:\n  sastrugi convert N44W072.hgt tile.tif\n  sastrugi convert scan.laz scan.tif --cell 0.05 --fill 2"
     )]
     Convert(Convert),
+    /// Draw a DEM: heights in colours, under a light from the north-west, as PNG.
+    #[command(after_help = "Examples:\n  sastrugi hillshade terrain.tif -o terrain.png\n  \
+        sastrugi hillshade site.tif --pixels 400 --exaggeration 5 -o site.png")]
+    Hillshade(Hillshade),
     /// Say what a file or a release is.
     #[command(after_help = "Example:\n  sastrugi info terrain.tif")]
     Info(Info),
@@ -133,6 +137,7 @@ impl Verb {
             Self::Fit(args) => Some(&args.output),
             Self::Texture(args) => Some(&args.output),
             Self::Convert(args) => Some(&args.output),
+            Self::Hillshade(args) => Some(&args.output),
             Self::Pack(args) => Some(&args.output),
             Self::Roughness(args) => args.classes.as_deref(),
             Self::Analyze(args) => args.output.as_deref(),
@@ -379,6 +384,25 @@ pub struct Roughness {
     /// Any setting of `[roughness]` (see `schema`), `name=value`.
     #[arg(long = "set", value_name = "K=V")]
     pub set: Vec<String>,
+    /// How the DEM is read.
+    #[command(flatten)]
+    pub reading: Reading,
+}
+
+/// `hillshade`.
+#[derive(Debug, Args)]
+pub struct Hillshade {
+    /// DEM.
+    pub dem: PathBuf,
+    /// Picture to write (.png).
+    #[arg(short, long, value_name = "PNG")]
+    pub output: PathBuf,
+    /// Most pixels along a side; a DEM with more cells is thinned by means over whole cells.
+    #[arg(long, value_name = "N", default_value_t = 1024)]
+    pub pixels: u32,
+    /// Factor on the slopes before shading; by the rms slope when absent (1 from 0.25 on).
+    #[arg(long, value_name = "K", allow_negative_numbers = true)]
+    pub exaggeration: Option<f64>,
     /// How the DEM is read.
     #[command(flatten)]
     pub reading: Reading,

@@ -10,8 +10,6 @@ use sastrugi_schemas::Cell;
 
 /// Width of a map among several, px.
 pub const MAP_WIDTH: f64 = 320.0;
-/// Root mean square slope at which relief is not exaggerated any further.
-const STEEP_ENOUGH: f64 = 0.5;
 
 /// How a relief is drawn, the same for all maps that are compared.
 #[derive(Clone, Copy, Debug)]
@@ -33,12 +31,6 @@ pub struct Words {
     pub title: String,
     /// What to mind.
     pub caption: String,
-}
-
-/// The round factor that makes slopes of that root mean square well visible.
-pub fn exaggeration(rms_slope: f64) -> f64 {
-    let factors = [50.0, 20.0, 10.0, 5.0, 2.0];
-    factors.into_iter().find(|f| f * rms_slope <= STEEP_ENOUGH).unwrap_or(1.0)
 }
 
 /// How the factor is named in a caption; empty for none.
@@ -149,17 +141,4 @@ fn numbers(path: &str, grid: &Grid, (low, high): (f64, f64)) -> Numbers {
         number(high),
     ]);
     numbers
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn val_exaggeration_is_round() {
-        assert_eq!(exaggeration(0.4), 1.0);
-        assert_eq!(exaggeration(0.2), 2.0);
-        assert_eq!(exaggeration(0.01), 50.0);
-        assert_eq!(exaggeration(f64::NAN), 1.0);
-    }
 }

@@ -10,6 +10,15 @@ use sastrugi_numeric::Grid;
 /// Unit vector to the light: azimuth 315 degrees (north-west), altitude 45 degrees.
 pub const LIGHT: [f64; 3] = [-0.5, 0.5, std::f64::consts::FRAC_1_SQRT_2];
 
+/// Root mean square slope at which relief is not exaggerated any further.
+const STEEP_ENOUGH: f64 = 0.5;
+
+/// The round factor that makes slopes of that root mean square well visible.
+pub fn exaggeration(rms_slope: f64) -> f64 {
+    let factors = [50.0, 20.0, 10.0, 5.0, 2.0];
+    factors.into_iter().find(|f| f * rms_slope <= STEEP_ENOUGH).unwrap_or(1.0)
+}
+
 /// Brightness in 0..1 of every cell; NaN where there is no data.
 pub fn hillshade(grid: &Grid, exaggeration: f64) -> Grid {
     let cells = (0..grid.rows()).flat_map(|r| (0..grid.cols()).map(move |c| (r, c)));
@@ -82,5 +91,13 @@ mod tests {
         assert_eq!(shade.finite_count(), grid.finite_count());
         let line = Grid::filled(Geometry::square(1, 5, 1.0), 3.0);
         assert!(hillshade(&line, 1.0).values.iter().all(|v| (v - LIGHT[2]).abs() < 1e-15));
+    }
+
+    #[test]
+    fn val_exaggeration_is_round() {
+        assert_eq!(exaggeration(0.4), 1.0);
+        assert_eq!(exaggeration(0.2), 2.0);
+        assert_eq!(exaggeration(0.01), 50.0);
+        assert_eq!(exaggeration(f64::NAN), 1.0);
     }
 }

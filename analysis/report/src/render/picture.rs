@@ -23,19 +23,37 @@ pub struct Picture {
 /// Shades of the relief under classes.
 const SHADES: usize = 63;
 
-/// Heights coloured over `range` and shaded.
+/// Heights coloured over `range` and shaded, at most `most` pixels along a side.
+///
+/// # Errors
+/// When the picture cannot be encoded.
 pub fn relief(grid: &Grid, range: (f64, f64), exaggeration: f64, most: usize) -> Result<Picture, ReportError> {
     let thin = thinned(grid, most);
-    let shade = hillshade(&thin, exaggeration);
+    Ok(placed(grid, data_uri(&shaded(&thin, range, exaggeration)?), [thin.cols(), thin.rows()]))
+}
+
+/// As [`relief`], between the lowest and the highest height: the bytes of a PNG file, and its columns and rows.
+///
+/// # Errors
+/// When the picture cannot be encoded.
+pub fn relief_png(grid: &Grid, exaggeration: f64, most: usize) -> Result<(Vec<u8>, [usize; 2]), ReportError> {
+    let thin = thinned(grid, most);
+    let range = thin.range().unwrap_or((0.0, 0.0));
+    Ok((shaded(&thin, range, exaggeration)?, [thin.cols(), thin.rows()]))
+}
+
+fn shaded(thin: &Grid, range: (f64, f64), exaggeration: f64) -> Result<Vec<u8>, ReportError> {
+    let shade = hillshade(thin, exaggeration);
     let map = colour::heights();
-    rgb(grid, &thin, |i| lit(colour::pick(&map, share(thin.values[i], range)), shade.values[i]))
+    rgb(thin, |i| lit(colour::pick(&map, share(thin.values[i], range)), shade.values[i]))
 }
 
 /// Deviations coloured over `[-limit, limit]`, not shaded.
 pub fn deviations(grid: &Grid, limit: f64, most: usize) -> Result<Picture, ReportError> {
     let thin = thinned(grid, most);
     let map = colour::deviations();
-    rgb(grid, &thin, |i| colour::pick(&map, share(thin.values[i], (-limit, limit))))
+    let png = rgb(&thin, |i| colour::pick(&map, share(thin.values[i], (-limit, limit))))?;
+    Ok(placed(grid, data_uri(&png), [thin.cols(), thin.rows()]))
 }
 
 /// Classes in pale shades of their colours, over the relief.
@@ -53,8 +71,8 @@ pub fn classes(
     let pixels: Vec<u8> =
         thin_codes.values.iter().enumerate().map(|(i, &code)| palette_index(code, level(i))).collect();
     let [cols, rows] = [thin_codes.cols(), thin_codes.rows()];
-    let data_uri = encode(cols, rows, &pixels, Some(class_palette()))?;
-    Ok(placed(codes, data_uri, [cols, rows]))
+    let png = encode(cols, rows, &pixels, Some(class_palette()))?;
+    Ok(placed(codes, data_uri(&png), [cols, rows]))
 }
 
 /// Codes in their colours, by majority; a code without one as no data.
@@ -62,8 +80,8 @@ pub fn codes(codes: &Grid<u8>, colours: &[(u8, Rgb)], most: usize) -> Result<Pic
     let thin = thin::block_majority(codes, thin::step(codes.rows(), codes.cols(), most));
     let colour = |code: &u8| colours.iter().find(|(c, _)| c == code).map_or(colour::NO_DATA, |(_, colour)| *colour);
     let bytes: Vec<u8> = thin.values.iter().flat_map(colour).collect();
-    let data_uri = encode(thin.cols(), thin.rows(), &bytes, None)?;
-    Ok(placed(codes, data_uri, [thin.cols(), thin.rows()]))
+    let png = encode(thin.cols(), thin.rows(), &bytes, None)?;
+    Ok(placed(codes, data_uri(&png), [thin.cols(), thin.rows()]))
 }
 
 /// Colour of a class on maps and in their legends.
@@ -108,11 +126,10 @@ fn palette_index(code: u8, shade: f64) -> u8 {
     RoughnessClass::from_code(code).map_or(0, |class| (1 + class as usize * SHADES + level) as u8)
 }
 
-fn rgb(full: &Grid, thin: &Grid, paint: impl Fn(usize) -> Rgb) -> Result<Picture, ReportError> {
+fn rgb(thin: &Grid, paint: impl Fn(usize) -> Rgb) -> Result<Vec<u8>, ReportError> {
     let colour = |(i, v): (usize, &f64)| if v.is_finite() { paint(i) } else { colour::NO_DATA };
     let bytes: Vec<u8> = thin.values.iter().enumerate().flat_map(colour).collect();
-    let data_uri = encode(thin.cols(), thin.rows(), &bytes, None)?;
-    Ok(placed(full, data_uri, [thin.cols(), thin.rows()]))
+    encode(thin.cols(), thin.rows(), &bytes, None)
 }
 
 fn placed<T>(full: &Grid<T>, data_uri: String, pixels: [usize; 2]) -> Picture {
@@ -120,7 +137,7 @@ fn placed<T>(full: &Grid<T>, data_uri: String, pixels: [usize; 2]) -> Picture {
 }
 
 /// PNG (RGB, or indexed where a palette is given) as a data URI.
-fn encode(cols: usize, rows: usize, bytes: &[u8], palette: Option<Vec<u8>>) -> Result<String, ReportError> {
+fn encode(cols: usize, rows: usize, bytes: &[u8], palette: Option<Vec<u8>>) -> Result<Vec<u8>, ReportError> {
     let size = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
     let mut file = Vec::new();
     let mut encoder = png::Encoder::new(&mut file, size(cols), size(rows));
@@ -133,7 +150,11 @@ fn encode(cols: usize, rows: usize, bytes: &[u8], palette: Option<Vec<u8>>) -> R
     let mut writer = encoder.write_header()?;
     writer.write_image_data(bytes)?;
     writer.finish()?;
-    Ok(format!("data:image/png;base64,{}", base64::engine::general_purpose::STANDARD.encode(file)))
+    Ok(file)
+}
+
+fn data_uri(png: &[u8]) -> String {
+    format!("data:image/png;base64,{}", base64::engine::general_purpose::STANDARD.encode(png))
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use crate::Verdict;
 use crate::args::{self, Common, Convert, Info};
 use crate::failure::{Code, Failure};
 use crate::output::{columns, print};
-use sastrugi_stages::verbs::{Read, Reading, describe_grid, numbers, read_as_it_is, transects};
+use sastrugi_stages::verbs::{self, Read, Reading, describe_grid, numbers, read_as_it_is, transects};
 use sastrugi_store::dem::{self, Dem, DemError};
 use sastrugi_store::mcap;
 use sastrugi_store::release::Release;
@@ -37,6 +37,18 @@ pub fn convert(args: &Convert, common: &Common) -> Verdict {
     let mut text = format!("{}: {} x {} cells", args.output.display(), grid.rows(), grid.cols());
     notes.iter().for_each(|note| text.push_str(&format!("\n  note: {note}")));
     let result = json!({ "file": args.output, "grid": describe_grid(&grid), "notes": notes });
+    print(common.json, &result, &text)?;
+    Ok(Code::Done)
+}
+
+/// `hillshade`.
+pub fn hillshade(args: &args::Hillshade, common: &Common) -> Verdict {
+    let read = verbs::read(&args.dem, &reading(&args.reading)?)?;
+    let result = verbs::hillshade::hillshade(&read, &args.output, args.pixels, args.exaggeration)?;
+    let [cols, rows] = [&result["pixels"][0], &result["pixels"][1]];
+    let mut text =
+        format!("{}: {cols} x {rows} pixels, slopes times {}", args.output.display(), result["exaggeration"]);
+    read.notes.iter().for_each(|note| text.push_str(&format!("\n  note: {note}")));
     print(common.json, &result, &text)?;
     Ok(Code::Done)
 }

@@ -35,6 +35,7 @@ pub fn dispatch(arguments: &Arguments) -> Verdict {
         Verb::Analyze(args) => analyze::analyze(args, common),
         Verb::Compare(args) => compare::compare(args, common),
         Verb::Convert(args) => files::convert(args, common),
+        Verb::Hillshade(args) => files::hillshade(args, common),
         Verb::Info(args) => files::info(args, common),
         Verb::Kinds(args) => lists::kinds(args, common),
         Verb::Schema(args) => lists::schema(args, common),

@@ -72,6 +72,18 @@ pub struct Ground {
     warnings: Vec<String>,
 }
 
+/// Refuses cells, m, that are larger than a vehicle: what it would feel is not there.
+///
+/// # Errors
+/// [`GroundError::CellTooLarge`].
+pub fn check_scale(cell_m: f64, vehicle: &Vehicle) -> Result<(), GroundError> {
+    let wheelbase_m = vehicle.wheelbase_m();
+    if cell_m <= wheelbase_m {
+        return Ok(());
+    }
+    Err(GroundError::CellTooLarge { cell_m, wheelbase_m, vehicle: vehicle.name().to_owned() })
+}
+
 /// Most cells from a vehicle's centre to its farthest contact point.
 const EXTENT_MAX_CELLS: f64 = 1000.0;
 
@@ -89,10 +101,7 @@ impl Ground {
         if geometry.rows < 2 || geometry.cols < 2 {
             return Err(GroundError::TooSmall { rows: geometry.rows, cols: geometry.cols });
         }
-        if coarse_m > vehicle.wheelbase_m() {
-            let wheelbase_m = vehicle.wheelbase_m();
-            return Err(GroundError::CellTooLarge { cell_m: coarse_m, wheelbase_m, vehicle: name() });
-        }
+        check_scale(coarse_m, vehicle)?;
         let few_cells = fine_m * EXTENT_MAX_CELLS >= vehicle.extent_m();
         if !few_cells {
             return Err(GroundError::CellTooSmall { cell_m: fine_m, limit: EXTENT_MAX_CELLS, vehicle: name() });

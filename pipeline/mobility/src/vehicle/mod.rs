@@ -41,7 +41,7 @@ mod tests;
 mod traverse;
 mod vector;
 
-pub use ground::{Ground, GroundError};
+pub use ground::{Ground, GroundError, check_scale};
 pub use model::Vehicle;
 pub use params::{
     AckermannParameters, BellyParameters, ChassisParameters, DriveParameters, IndependentParameters,

@@ -1,9 +1,9 @@
 //! Stage `traverse`: all missions of one terrain driven and recorded.
 
-use super::dem::{HEIGHTS, input_error};
+use super::dem::{self as measured, HEIGHTS, input_error};
 use super::missions::{self, Lines};
 use super::{Estimate, ItemRef, Job, JobError, Outcome, Product, Rows, Work, roughness};
-use crate::registry::{BuildError, Builder, unknown_id};
+use crate::registry::{BuildError, Builder, Heightfield, unknown_id};
 use crate::revision::Room;
 use crate::runner::graph::Node;
 use crate::study::entry::joined;
@@ -13,7 +13,8 @@ use sastrugi_mobility::metrics::{Differentiator, MissionLabels, mission_row, rep
 use sastrugi_mobility::missions::{Difficulty, Mission, ReplicateParameters, ReplicateSettings};
 use sastrugi_mobility::registry::{Number, numbers, stated};
 use sastrugi_mobility::vehicle::{
-    Ground, SurfaceLayers, SurfaceMap, TraverseError, TraverseParameters, TraverseSettings, Vehicle, drive,
+    Ground, GroundError, SurfaceLayers, SurfaceMap, TraverseError, TraverseParameters, TraverseSettings, Vehicle,
+    check_scale, drive,
 };
 use sastrugi_numeric::{Grid, Streams};
 use sastrugi_schemas::kind::{read_parameters, schema_of};
@@ -158,6 +159,15 @@ fn raster(
     field.map(|f| Some(f.item.clone())).ok_or_else(|| unknown_id(entry, key, id, builder.heightfields.keys()))
 }
 
+/// Refuses a terrain whose cells are known to be larger than the vehicle. A measured DEM is judged when it is read: its file may
+/// state them in degrees.
+fn check_scales(field: &Heightfield, vehicle: &Vehicle) -> Result<(), GroundError> {
+    match field.cell_m.filter(|_| field.item.stage != measured::STAGE) {
+        Some(cell_m) => check_scale(cell_m, vehicle),
+        None => Ok(()),
+    }
+}
+
 /// Adds the run over one terrain.
 fn add_one(
     builder: &mut Builder<'_>,
@@ -168,6 +178,8 @@ fn add_one(
 ) -> Result<(), StudyError> {
     let terrain = lines.heightfield.clone();
     let Some(field) = builder.heightfields.get(&terrain) else { return Ok(()) };
+    check_scales(field, &drive.vehicle)
+        .map_err(|e| entry.error("missions", format!("\"{terrain}\": failed to {e}")))?;
     // Named by the table, not by the swept part, so that every value of a sweep has the same starts.
     let streams = builder.streams(STAGE, &format!("{traverse}@{}", lines.word), None, 0);
     let stream = (drive.starts.count() > 1).then(|| streams.label());

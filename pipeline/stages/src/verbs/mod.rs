@@ -3,6 +3,7 @@
 pub mod analyze;
 pub mod compare;
 pub mod fit;
+pub mod hillshade;
 pub mod parameters;
 mod reading;
 pub mod releases;

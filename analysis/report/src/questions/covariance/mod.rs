@@ -8,13 +8,14 @@ mod verdict;
 
 use super::Question;
 use super::curves::HEIGHT;
-use super::relief::{Style, Words, deviations, exaggeration, exaggeration_words, limit_m, relief};
+use super::relief::{Style, Words, deviations, exaggeration_words, limit_m, relief};
 use super::sql::quoted;
 use crate::ReportError;
 use crate::content::{Block, Figure, Numbers, TableBlock, number, slug, text};
 use crate::data::Data;
 use crate::render::axis::Axis;
 use crate::render::chart::{Mark, Plot, WIDTH};
+use crate::render::hillshade::exaggeration;
 use crate::render::number as set;
 use crate::render::svg::{Paint, Stroke, Symbol};
 use sastrugi_schemas::tables::{CovarianceRow, FitRow};

@@ -5,7 +5,8 @@ use super::{GROUPS_WITH_THREE, by_slope, median};
 use crate::ReportError;
 use crate::content::{Figure, slug};
 use crate::data::{Data, Group};
-use crate::questions::relief::{Style, Words, exaggeration, exaggeration_words, middle_range, relief};
+use crate::questions::relief::{Style, Words, exaggeration_words, middle_range, relief};
+use crate::render::hillshade::exaggeration;
 use crate::render::number as set;
 use sastrugi_schemas::tables::TerrainRow;
 

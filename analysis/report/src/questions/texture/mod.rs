@@ -8,14 +8,13 @@ mod figures;
 
 use super::Question;
 use super::curves::{self, Curve};
-use super::relief::{
-    Style, Words, deviations, exaggeration, exaggeration_words, limit_m, middle_range, relief, relief_of,
-};
+use super::relief::{Style, Words, deviations, exaggeration_words, limit_m, middle_range, relief, relief_of};
 use super::sql::quoted;
 use crate::ReportError;
 use crate::content::{Block, Figure, Numbers, TableBlock, slug};
 use crate::data::{self, Data};
 use crate::render::chart::Plot;
+use crate::render::hillshade::exaggeration;
 use crate::render::svg::{Paint, Stroke};
 use crate::render::{number as set, thin};
 use sastrugi_numeric::Grid;

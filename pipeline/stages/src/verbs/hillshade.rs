@@ -1,0 +1,43 @@
+//! `hillshade`: a picture of a DEM.
+
+use super::Read;
+use crate::error::Error;
+use sastrugi_report::render::hillshade::exaggeration;
+use sastrugi_report::render::picture;
+use sastrugi_roughness::rms_slope;
+use sastrugi_schemas::ParameterError;
+use sastrugi_store::atomic;
+use serde_json::{Value, json};
+use std::path::Path;
+
+/// Most pixels along a side of a picture.
+const PIXELS_MAX: u32 = 16384;
+
+/// Draws a DEM in metres, at most `pixels` along a side; slopes are exaggerated by `factor`, or by what makes them well visible. Returns
+/// what was drawn.
+///
+/// # Errors
+/// Numbers out of range, or a file that cannot be written.
+pub fn hillshade(read: &Read, output: &Path, pixels: u32, factor: Option<f64>) -> Result<Value, Error> {
+    super::check_output(output)?;
+    if !output.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("png")) {
+        return Err(Error::Usage(format!("{}: the picture is a PNG; name it .png", output.display())));
+    }
+    if !(1..=PIXELS_MAX).contains(&pixels) {
+        return Err(Error::Usage(format!("`--pixels` is {pixels}; it must lie between 1 and {PIXELS_MAX}")));
+    }
+    let grid = &read.dem.grid;
+    let factor = match factor {
+        Some(factor) => ParameterError::positive("--exaggeration", factor)?,
+        None => exaggeration(rms_slope(grid)),
+    };
+    let (png, [cols, rows]) = picture::relief_png(grid, factor, pixels as usize).map_err(Error::failed)?;
+    atomic::write(output, &png).map_err(|e| Error::failed(format!("{}: {e}", output.display())))?;
+    Ok(json!({
+        "file": output.display().to_string(),
+        "pixels": [cols, rows],
+        "exaggeration": factor,
+        "grid": super::describe_grid(grid),
+        "notes": read.notes,
+    }))
+}
