@@ -144,9 +144,10 @@ def check_crate(release):
 
 
 def check_provenance(release, actions):
-    """What each action read and made, against the parents in the manifest."""
+    """What each action read and made, against the parents in the manifest: all that have a file, and nothing else."""
     artifacts = manifest(release)["artifacts"]
     stage_of = {artifact["path"]: artifact["stage"] for artifact in artifacts}
+    item_of = {a["path"]: f"{a['stage']}/{a['item']}" for a in artifacts if a.get("item")}
     ids = [entity["@id"] for entity in json.loads((release / "ro-crate-metadata.json").read_text())["@graph"]]
     expect(len(ids) == len(set(ids)), "ro-crate-metadata.json: two entities have one id")
 
@@ -154,18 +155,27 @@ def check_provenance(release, actions):
         entities = action[key]
         return [entity.id for entity in (entities if isinstance(entities, list) else [entities])]
 
+    def within(path, entity):
+        return path == entity or (entity[-1] == "/" and path.startswith(entity))
+
     def stages_in(entity):
-        return {stage for path, stage in stage_of.items() if path == entity or (entity[-1] == "/" and path.startswith(entity))}
+        return {stage for path, stage in stage_of.items() if within(path, entity)}
 
     for action in actions:
         stage = action["name"].removeprefix("stage ")
         for entity in linked(action, "result"):
             expect(stage in stages_in(entity), f"ro-crate-metadata.json: stage {stage} did not make {entity}")
+        read = linked(action, "object")
+        expect("study.toml" in read, f"ro-crate-metadata.json: stage {stage} does not name study.toml")
         if stage == "report":
             continue
         parts = set(stage.split("+"))
-        parents = {parent.split("/")[0] for a in artifacts if a["stage"] in parts for parent in a.get("parents", [])}
-        for entity in linked(action, "object"):
+        items = {parent for a in artifacts if a["stage"] in parts for parent in a.get("parents", [])}
+        files = {path for path, item in item_of.items() if item in items}
+        unnamed = sorted(path for path in files if not any(within(path, entity) for entity in read))
+        expect(not unnamed, f"ro-crate-metadata.json: stage {stage} does not name {unnamed}")
+        parents = {item.split("/")[0] for item in items}
+        for entity in read:
             fits = entity == "study.toml" or (stages_in(entity) & parents and not entity.startswith("tables/"))
             expect(fits, f"ro-crate-metadata.json: stage {stage} did not read {entity}")
 

@@ -146,14 +146,16 @@ const MANY_TERRAINS: &str = "[study]\nname = \"many\"\nseed = 7\ndate = \"2026-1
     [[missions]]\nid = \"m\"\nterrains = [\"t\"]\ncount = 1\nlength_m = 4.0\nborder_m = 1.5\n\n\
     [[traverse]]\nid = \"h\"\nmissions = \"m\"\ntimeout_s = 0.5\n";
 
-/// The small study with all that a release can say of itself: version and DOI, terms of its data, a split.
+/// The small study with all that a release can say of itself: version and DOI, terms of its data, a split, methods side by side.
 fn described_study() -> String {
     let head = "seed = 7\ntitle = \"Small: \\\"rough\\\" & smooth\"\nversion = \"1.0.0\"\ndoi = \"10.5281/zenodo.1234567\"\n\
         creators = [\"Person, A.\", \"A group\"]\norganizations = [\"A group\"]\nsplit = [0.4, 0.3, 0.3]\n";
     let dem =
         "id = \"site\"\nlicense = \"public domain\"\nattribution = \"NASA and USGS\"\ncitation = \"SRTM (2000)\"\n";
     let study = small_study().replace("seed = 7\n", head).replace("id = \"site\"\n", dem);
-    study.replace("count = 2\n", "count = 3\n").replace("group = \"b\"\n", "")
+    let methods = "[[texture]]\nid = \"side\"\nfit = \"naive\"\nmethods = [\"fft_ma\", \"gaussians\"]\nrealisations = 2\n\
+        size_m = [4500.0, 4500.0]\ncell_m = 90.0\n";
+    study.replace("count = 2\n", "count = 3\n").replace("group = \"b\"\n", "") + methods
 }
 
 /// Every measured DEM reads as rasterio (or numpy) reads it.

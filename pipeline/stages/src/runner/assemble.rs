@@ -22,7 +22,7 @@ use sastrugi_schemas::tables::{
 use sastrugi_store::mcap::VIEWER_LAYOUT;
 use sastrugi_store::release::{self, Head, Incoming, Release, ReleaseBuilder, ReleaseError};
 use serde_json::Value;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
 
@@ -212,39 +212,50 @@ fn damaged(folder: &Path, item: &ItemRef, file: &str) -> Error {
 }
 
 fn add_tables(builder: &mut ReleaseBuilder, contents: &Contents<'_>) -> Result<(), Error> {
-    add_table(builder, contents, &[roughness::STAGE], |rows| rows.terrains)?;
-    add_table(builder, contents, &[fit::STAGE], |rows| rows.fits)?;
-    add_table(builder, contents, &[fit::STAGE], |rows| rows.covariance)?;
-    add_table(builder, contents, &[fit::STAGE], |rows| rows.candidates)?;
-    add_table(builder, contents, &[fit::STAGE], |rows| rows.candidate_curves)?;
-    add_table(builder, contents, &[fit::STAGE], |rows| rows.likelihood_profile)?;
+    add_table(builder, contents, made_by(roughness::STAGE), |rows| rows.terrains)?;
+    add_table(builder, contents, made_by(fit::STAGE), |rows| rows.fits)?;
+    add_table(builder, contents, made_by(fit::STAGE), |rows| rows.covariance)?;
+    add_table(builder, contents, made_by(fit::STAGE), |rows| rows.candidates)?;
+    add_table(builder, contents, made_by(fit::STAGE), |rows| rows.candidate_curves)?;
+    add_table(builder, contents, made_by(fit::STAGE), |rows| rows.likelihood_profile)?;
     add_described(builder, contents)?;
-    add_table(builder, contents, &[scoreboard::STAGE], |rows| rows.scoreboard)?;
-    add_table(builder, contents, &[scoreboard::STAGE], |rows| rows.scoreboard_covariance)?;
+    add_scoreboard(builder, contents)?;
     add_missions(builder, contents)?;
     add_parameters(builder, contents)
 }
 
-/// One table, its rows taken item by item; the ids of items are the rows' first key.
+/// The tables of the scoreboard. Its stage leaves no other file that could say what the items were made from.
+fn add_scoreboard(builder: &mut ReleaseBuilder, contents: &Contents<'_>) -> Result<(), Error> {
+    let mut parents = BTreeSet::new();
+    for (_, folder) in contents.results(&[scoreboard::STAGE]) {
+        parents.extend(record(folder)?.ingredients.parents.into_keys());
+    }
+    let origin = Origin { parents: parents.into_iter().collect(), ..made_by(scoreboard::STAGE) };
+    add_table(builder, contents, origin.clone(), |rows| rows.scoreboard)?;
+    add_table(builder, contents, origin, |rows| rows.scoreboard_covariance)
+}
+
+/// One table, its rows taken item by item of the origin's stage; the ids of items are the rows' first key.
 fn add_table<R: Row>(
     builder: &mut ReleaseBuilder,
     contents: &Contents<'_>,
-    stages: &[&str],
+    origin: Origin,
     take: impl Fn(Rows) -> Vec<R>,
 ) -> Result<(), Error> {
-    let parts = contents.results(stages).into_iter().map(|(_, folder)| Ok(take(rows_of(contents, folder)?)));
-    write_parts(builder, parts, &stages.join("+"))
+    let results = contents.results(&[origin.stage.as_str()]);
+    let parts = results.into_iter().map(|(_, folder)| Ok(take(rows_of(contents, folder)?)));
+    write_parts(builder, parts, origin)
 }
 
 /// One table, written as its parts are read; the first part that cannot be read is the error.
 fn write_parts<R: Row>(
     builder: &mut ReleaseBuilder,
     mut parts: impl Iterator<Item = Result<Vec<R>, Error>>,
-    stage: &str,
+    origin: Origin,
 ) -> Result<(), Error> {
     let mut trouble = None;
     let rows = std::iter::from_fn(|| parts.next()?.map_err(|error| trouble = Some(error)).ok());
-    let written = builder.write_table("0000", rows.flatten(), made_by(stage));
+    let written = builder.write_table("0000", rows.flatten(), origin);
     match trouble {
         Some(error) => Err(error),
         None => written.map_err(release_error),
@@ -334,7 +345,7 @@ fn add_parameters(builder: &mut ReleaseBuilder, contents: &Contents<'_>) -> Resu
         rows.sort_by(|a, b| a.parameter.cmp(&b.parameter));
         Ok(rows)
     };
-    write_parts(builder, runs.into_values().map(sorted), traverse::STAGE)
+    write_parts(builder, runs.into_values().map(sorted), made_by(traverse::STAGE))
 }
 
 /// An error of a part of a table.

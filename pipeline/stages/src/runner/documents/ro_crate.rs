@@ -162,11 +162,12 @@ impl Stages {
         }
     }
 
-    /// The report shows tables and what was computed of rasters.
+    /// The report shows the study, tables and what was computed of rasters.
     fn add_report(&mut self, described: &Described<'_>) {
         let shown = |a: &&Artifact| a.path.starts_with("tables/") || a.path.ends_with(".tif");
         let derived = described.artifacts.iter().filter(|a| !original::only_copies(&a.origin.stage));
-        self.used.insert("report".to_owned(), derived.filter(shown).map(entity).collect());
+        let used = derived.filter(shown).map(entity).chain([STUDY.to_owned()]).collect();
+        self.used.insert("report".to_owned(), used);
         self.made.insert("report".to_owned(), BTreeSet::from(["report/".to_owned()]));
     }
 
