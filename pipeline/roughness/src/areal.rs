@@ -12,7 +12,7 @@
 //! | Sal, Str | length and aspect ratio of the autocorrelation's centre: [`crate::autocorrelation`] |
 //! | Std | direction of the texture: [`crate::SpectralMap::direction_deg`], over the band in which the slope of the spectrum is fitted |
 //!
-//! Beside them: the Hurst exponent ([`crate::hurst`]), the structure function and the profile spectra.
+//! Beside them: the Hurst exponent ([`crate::hurst`]), the structure exponents ([`crate::multifractality`]), the structure function and the profile spectra.
 //!
 //! Figures of two surfaces can be compared only where cell and band agree: a residual of a moving average has no structure
 //! beyond its window. Cost: three to seven transforms of the padded grid; about 100 bytes a cell.
@@ -20,6 +20,7 @@
 use crate::gradient::rms_slopes;
 use crate::hurst::{Hurst, hurst};
 use crate::lags::LagSums;
+use crate::multifractality::{ScalingExponent, scaling_exponents};
 use crate::plane::level;
 use crate::profiles::{ProfileBin, profile_spectra};
 use crate::spectrum::SpectralMap;
@@ -56,6 +57,8 @@ pub struct ArealFigures {
     pub direction_deg: f64,
     /// Hurst exponent; absent where the surface has no pairs enough.
     pub hurst: Option<Hurst>,
+    /// Structure exponents zeta(1) to zeta(4); absent where the surface is too small for them.
+    pub exponents: Option<[ScalingExponent; 4]>,
     /// Structure function.
     #[serde(skip)]
     pub structure: Vec<StructureBin>,
@@ -95,6 +98,7 @@ pub fn areal_figures(
         aspect_ratio: texture.aspect_ratio,
         direction_deg: if variance > 0.0 { map.map_or(f64::NAN, |m| m.direction_deg(band_cycles_m)) } else { f64::NAN },
         hurst: hurst(&surface, hurst_lags_m),
+        exponents: scaling_exponents(&surface),
         structure: structure_function(&lags, cell),
         profiles: profile_spectra(&surface),
     }

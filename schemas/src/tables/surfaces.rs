@@ -54,5 +54,21 @@ super::table! {
         hurst_lag_min_m: f64 ["m"],
         /// Longest lag used for the Hurst exponent.
         hurst_lag_max_m: f64 ["m"],
+        /// Structure exponent zeta(1): growth of the mean absolute increments with the lag (1 cell to an eighth of the shorter side); q H for a monofractal, concave in q for a multifractal.
+        zeta_1: f64 ["1"],
+        /// Jackknife standard error of zeta(1).
+        zeta_1_standard_error: f64 ["1"],
+        /// Structure exponent zeta(2): growth of the mean second power of absolute increments with the lag.
+        zeta_2: f64 ["1"],
+        /// Jackknife standard error of zeta(2).
+        zeta_2_standard_error: f64 ["1"],
+        /// Structure exponent zeta(3): growth of the mean third power of absolute increments with the lag.
+        zeta_3: f64 ["1"],
+        /// Jackknife standard error of zeta(3).
+        zeta_3_standard_error: f64 ["1"],
+        /// Structure exponent zeta(4): growth of the mean fourth power of absolute increments with the lag.
+        zeta_4: f64 ["1"],
+        /// Jackknife standard error of zeta(4).
+        zeta_4_standard_error: f64 ["1"],
     }
 }

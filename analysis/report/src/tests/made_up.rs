@@ -602,6 +602,14 @@ fn surface(data: &mut Data, id: &str, stage: &str, fit_id: Option<&str>, sq_m: f
         hurst_standard_error: 0.02,
         hurst_lag_min_m: 92.0,
         hurst_lag_max_m: 700.0,
+        zeta_1: 0.60,
+        zeta_1_standard_error: 0.02,
+        zeta_2: 1.15,
+        zeta_2_standard_error: 0.02,
+        zeta_3: 1.65,
+        zeta_3_standard_error: 0.02,
+        zeta_4: 2.10,
+        zeta_4_standard_error: 0.02,
     });
     for direction in ["all", "x", "y"] {
         for bin in 0..20 {

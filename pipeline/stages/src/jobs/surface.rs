@@ -3,6 +3,7 @@
 use super::Rows;
 use super::roughness::{height_rows, psd_rows};
 use sastrugi_numeric::Grid;
+use sastrugi_roughness::multifractality::ScalingExponent;
 use sastrugi_roughness::{
     ArealFigures, Direction, ProfileBin, SpectralMap, StructureBin, areal_figures, default_slope_band, histogram,
 };
@@ -57,6 +58,8 @@ fn row(surface: &Surface<'_>, areal: &ArealFigures) -> SurfaceRow {
     let geometry = &surface.grid.geometry;
     let cells = surface.grid.finite_count();
     let hurst = |f: fn(&sastrugi_roughness::Hurst) -> f64| areal.hurst.as_ref().map_or(f64::NAN, f);
+    let zeta =
+        |order: usize, f: fn(&ScalingExponent) -> f64| areal.exponents.as_ref().map_or(f64::NAN, |e| f(&e[order - 1]));
     SurfaceRow {
         surface_id: surface.id.to_owned(),
         stage: surface.stage.to_owned(),
@@ -82,6 +85,14 @@ fn row(surface: &Surface<'_>, areal: &ArealFigures) -> SurfaceRow {
         hurst_standard_error: hurst(|h| h.standard_error),
         hurst_lag_min_m: hurst(|h| h.lags_m[0]),
         hurst_lag_max_m: hurst(|h| h.lags_m[1]),
+        zeta_1: zeta(1, |e| e.zeta),
+        zeta_1_standard_error: zeta(1, |e| e.standard_error),
+        zeta_2: zeta(2, |e| e.zeta),
+        zeta_2_standard_error: zeta(2, |e| e.standard_error),
+        zeta_3: zeta(3, |e| e.zeta),
+        zeta_3_standard_error: zeta(3, |e| e.standard_error),
+        zeta_4: zeta(4, |e| e.zeta),
+        zeta_4_standard_error: zeta(4, |e| e.standard_error),
     }
 }
 

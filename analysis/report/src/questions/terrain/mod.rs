@@ -144,6 +144,10 @@ fn surfaces(data: &Data) -> TableBlock {
         "hurst_standard_error",
         "hurst_lag_min_m",
         "hurst_lag_max_m",
+        "zeta_1",
+        "zeta_1_standard_error",
+        "zeta_2",
+        "zeta_2_standard_error",
     ];
     let numbers = Numbers::select("", &data.surfaces, &names);
     TableBlock { id: "surfaces".into(), caption: "All surfaces (ISO 25178)".into(), numbers }
