@@ -19,6 +19,11 @@ pub fn odd_cells(window_m: f64, cell_m: f64) -> usize {
 
 /// Centred moving average over `window` = (columns, rows) cells, both odd; NaN where undefined.
 pub fn moving_average(dem: &Grid, window: [usize; 2]) -> Grid {
+    average(dem, window, FILLED_SHARE_MIN)
+}
+
+/// As [`moving_average`], where more than `filled_share_min` of the window holds data.
+pub(crate) fn average(dem: &Grid, window: [usize; 2], filled_share_min: f64) -> Grid {
     let (rows, cols) = (dem.rows(), dem.cols());
     let [half_cols, half_rows] = window.map(|w| w / 2);
     // Heights about their mean: running sums of a few metres lose less than those of a few thousand.
@@ -32,7 +37,7 @@ pub fn moving_average(dem: &Grid, window: [usize; 2]) -> Grid {
     let by_col = transposed(&totals, rows, cols);
     totals.par_chunks_mut(rows).zip(by_col.par_chunks(rows)).for_each(|(out, col)| running_sums(col, half_rows, out));
     let totals = transposed(&totals, cols, rows);
-    let filled_min = FILLED_SHARE_MIN * (window[0] as f64 * window[1] as f64);
+    let filled_min = filled_share_min * (window[0] as f64 * window[1] as f64);
     let average = |(&(sum, count), z): (&(f64, u32), &f64)| {
         let defined = z.is_finite() && f64::from(count) > filled_min;
         if defined { mean + sum / f64::from(count) } else { f64::NAN }
@@ -56,7 +61,7 @@ fn running_sums(values: &[(f64, u32)], half: usize, out: &mut [(f64, u32)]) {
 }
 
 /// The row-major `(rows, cols)` values with rows and columns exchanged.
-fn transposed<T: Copy + Send + Sync>(values: &[T], rows: usize, cols: usize) -> Vec<T> {
+pub(crate) fn transposed<T: Copy + Send + Sync>(values: &[T], rows: usize, cols: usize) -> Vec<T> {
     (0..cols).into_par_iter().flat_map_iter(|c| (0..rows).map(move |r| values[r * cols + c])).collect()
 }
 

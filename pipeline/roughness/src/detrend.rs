@@ -1,0 +1,395 @@
+//! What a vehicle feels of a surface: heights in a band of wavelengths.
+//!
+//! # What
+//! The roughness of Army practice is the RMS deviation of the heights from their local mean. What "local" means is the
+//! detrender's, and figures of different detrenders are not comparable:
+//! * [`Detrender::Band`]: wavelengths `lambda_min` to `lambda_max` of every profile along x and along y, by Fourier
+//!   transform. The reference: it keeps what it says and nothing else.
+//! * [`Detrender::MovingAverage`]: heights less their mean over `lambda_max` x `lambda_max` (the odd number of cells nearest
+//!   to it), [`crate::moving_average`].
+//! * [`Detrender::Exponential`]: profiles less their mean with weights `exp(-|d| / lambda_max)`.
+//!
+//! The latter two keep part of the longer waves. Of a profile with density `c f^-2` the moving average leaves `pi^2 / 6`
+//! times the variance of all wavelengths below its window.
+//!
+//! # Profiles, not the plane
+//! A band of the two-dimensional spectrum is another band: of an isotropic surface with profiles `c f^-2`, the waves of
+//! length `lambda_min` to `lambda_max` in their own direction have `pi / 2` times the variance that profiles show in that
+//! band. Wheels roll along profiles, and all formulas of profile densities (`sigma^2 = c (lambda_max - lambda_min)`, ISO 8608)
+//! are of profiles, so the band is theirs here.
+//!
+//! # Edges
+//! For `Band` a profile loses the parabola that has its end slopes (least squares over a quarter of `lambda_max`), and is
+//! continued at either end by its mirror image; the two continuations fade into one another over at least 8 `lambda_max`,
+//! to a length that transforms well. `lambda_max` at each end is left out of what `Band` and `Exponential` leave. Gaps part a
+//! profile into several; those shorter than 3 `lambda_max` are left out.
+//!
+//! # Source
+//! Vehicle band and local mean: *Terrain Roughness in MAVS* (documentation, Mississippi State University), which cites Durst et
+//! al. (2011), J. Terramechanics, PII S0022489810000522.
+
+use crate::band::{average, moving_average, odd_cells, transposed};
+use rayon::prelude::*;
+use sastrugi_numeric::fft::{Complex64, Transform, smooth_length};
+use sastrugi_numeric::{Grid, sums};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Wavelengths from `min_m` to `max_m`, both ends included.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct WaveBand {
+    min_m: f64,
+    max_m: f64,
+}
+
+/// Why a band of wavelengths is none, or not one of a surface.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum BandError {
+    /// Not positive, not finite, or not rising.
+    #[error("from {min_m} to {max_m} m is no band of wavelengths; it must rise, from above 0 to a finite length")]
+    Order {
+        /// Shortest wavelength, m.
+        min_m: f64,
+        /// Longest wavelength, m.
+        max_m: f64,
+    },
+    /// A length of a vehicle that is none.
+    #[error("a {name} of {value_m} m is none; it must be a finite number above 0")]
+    Vehicle {
+        /// `wheelbase` or `tyre radius`.
+        name: &'static str,
+        /// What was given, m.
+        value_m: f64,
+    },
+    /// Two cells do not hold the shortest wave.
+    #[error("waves of {min_m} m need cells of at most {limit_m} m, and these have {cell_m} m")]
+    Coarse {
+        /// Shortest wavelength, m.
+        min_m: f64,
+        /// Half of it, m.
+        limit_m: f64,
+        /// Larger side of a cell, m.
+        cell_m: f64,
+    },
+    /// No profile is long enough.
+    #[error(
+        "waves of up to {max_m} m need a surface of at least {needed_m} m along x or y, and this one has {side_m} m"
+    )]
+    Short {
+        /// Longest wavelength, m.
+        max_m: f64,
+        /// 4 times that, m.
+        needed_m: f64,
+        /// Longer side of the surface, m.
+        side_m: f64,
+    },
+}
+
+/// Length of a surface over the longest wave that is looked for.
+const LENGTHS_MIN: f64 = 4.0;
+
+impl WaveBand {
+    /// Wavelengths from `min_m` to `max_m`.
+    ///
+    /// # Errors
+    /// [`BandError::Order`].
+    pub fn new(min_m: f64, max_m: f64) -> Result<Self, BandError> {
+        let rises = min_m > 0.0 && max_m > min_m && max_m.is_finite();
+        if rises { Ok(Self { min_m, max_m }) } else { Err(BandError::Order { min_m, max_m }) }
+    }
+
+    /// What shakes a vehicle: wavelengths from its tyre radius to twice its wheelbase, m.
+    ///
+    /// # Errors
+    /// Lengths that are not finite and above 0, or a tyre radius of twice the wheelbase and more.
+    pub fn of_vehicle(wheelbase_m: f64, tyre_radius_m: f64) -> Result<Self, BandError> {
+        for (name, value_m) in [("wheelbase", wheelbase_m), ("tyre radius", tyre_radius_m)] {
+            if !(value_m > 0.0 && value_m.is_finite()) {
+                return Err(BandError::Vehicle { name, value_m });
+            }
+        }
+        Self::new(tyre_radius_m, 2.0 * wheelbase_m)
+    }
+
+    /// Shortest wavelength, m.
+    pub fn min_m(&self) -> f64 {
+        self.min_m
+    }
+
+    /// Longest wavelength, m.
+    pub fn max_m(&self) -> f64 {
+        self.max_m
+    }
+
+    /// The band as spatial frequencies, cycles/m.
+    pub fn frequencies(&self) -> [f64; 2] {
+        [1.0 / self.max_m, 1.0 / self.min_m]
+    }
+
+    /// Whether cells of `cell_m` hold the shortest wave.
+    ///
+    /// # Errors
+    /// [`BandError::Coarse`] when they are larger than half of it.
+    pub fn fits_cells(&self, cell_m: f64) -> Result<(), BandError> {
+        let limit_m = 0.5 * self.min_m;
+        // A cell of 0.165 m is half of 0.33 m, whatever the last bit says.
+        let fits = cell_m <= limit_m * (1.0 + 1e-9);
+        if fits { Ok(()) } else { Err(BandError::Coarse { min_m: self.min_m, limit_m, cell_m }) }
+    }
+
+    /// Whether a surface whose longer side is `side_m` has room for the longest wave.
+    ///
+    /// # Errors
+    /// [`BandError::Short`] when it is shorter than 4 of them.
+    pub fn fits_length(&self, side_m: f64) -> Result<(), BandError> {
+        let needed_m = LENGTHS_MIN * self.max_m;
+        let fits = side_m >= needed_m * (1.0 - 1e-9);
+        if fits { Ok(()) } else { Err(BandError::Short { max_m: self.max_m, needed_m, side_m }) }
+    }
+}
+
+/// How the local mean is taken off.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Detrender {
+    /// The band of wavelengths alone, profile by profile.
+    Band,
+    /// Less a mean over a square of the longest wavelength.
+    MovingAverage,
+    /// Less a mean of the profile with exponential weights.
+    Exponential,
+}
+
+impl Detrender {
+    /// Its name in files and messages.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Band => "band",
+            Self::MovingAverage => "moving_average",
+            Self::Exponential => "exponential",
+        }
+    }
+}
+
+/// Squared heights about the local mean, m2: along x and along y, or of the plane alone ([`Detrender::MovingAverage`]). NaN
+/// where undefined.
+#[derive(Clone, Debug)]
+pub struct Detrended {
+    squares: Vec<Grid>,
+    max_m: f64,
+}
+
+impl Detrended {
+    /// Takes the local mean off.
+    pub fn of(dem: &Grid, band: &WaveBand, detrender: Detrender) -> Self {
+        let squares = match detrender {
+            Detrender::MovingAverage => vec![above_average(dem, band.max_m)],
+            Detrender::Band | Detrender::Exponential => along_both(dem, band, detrender),
+        };
+        Self { squares: squares.into_iter().map(|left| left.map(|v| v * v)).collect(), max_m: band.max_m }
+    }
+
+    /// RMS along x and along y; NaN where no profile is long enough; one figure for both under a moving average.
+    pub fn rms_along_m(&self) -> Vec<f64> {
+        self.squares.iter().map(|s| sums::mean(&sums::finite(&s.values)).sqrt()).collect()
+    }
+
+    /// RMS over the profiles of both directions, or of the one that has any, m; NaN without any.
+    pub fn rms_m(&self) -> f64 {
+        let squares: Vec<f64> = self.rms_along_m().into_iter().filter(|r| r.is_finite()).map(|r| r * r).collect();
+        sums::mean(&squares).sqrt()
+    }
+
+    /// RMS in a window of three times the longest wavelength about every cell, m. NaN where the squares themselves are
+    /// undefined, and where less than a quarter of the window is defined.
+    pub fn rms_map(&self) -> Grid {
+        let mean = match &self.squares[..] {
+            [x, y] => sastrugi_numeric::ops::combine(x, y, mean_of_defined),
+            squares => squares[0].clone(),
+        };
+        let window = mean.geometry.cell.map(|c| odd_cells(WINDOW_LENGTHS * self.max_m, c));
+        // Running sums may leave a rounding error below zero.
+        average(&mean, window, WINDOW_SHARE_MIN).map(|square| if square < 0.0 { 0.0 } else { square.sqrt() })
+    }
+}
+
+/// Side of the windows of a map over the longest wavelength.
+const WINDOW_LENGTHS: f64 = 3.0;
+/// Share of such a window that must be defined: that of a corner, less what rounding takes.
+const WINDOW_SHARE_MIN: f64 = 0.24;
+
+fn mean_of_defined(a: f64, b: f64) -> f64 {
+    match (a.is_finite(), b.is_finite()) {
+        (true, true) => 0.5 * (a + b),
+        (true, false) => a,
+        _ => b,
+    }
+}
+
+fn above_average(dem: &Grid, window_m: f64) -> Grid {
+    let average = moving_average(dem, dem.geometry.cell.map(|c| odd_cells(window_m, c)));
+    sastrugi_numeric::ops::combine(dem, &average, |z, mean| z - mean)
+}
+
+/// What the detrender leaves of all profiles along x, and of all along y.
+fn along_both(dem: &Grid, band: &WaveBand, detrender: Detrender) -> Vec<Grid> {
+    let (rows, cols) = (dem.rows(), dem.cols());
+    let [dx, dy] = dem.geometry.cell;
+    let along_x = detrended(&dem.values, cols, dx, band, detrender);
+    let by_col = detrended(&transposed(&dem.values, rows, cols), rows, dy, band, detrender);
+    let along_y = transposed(&by_col, cols, rows);
+    [along_x, along_y].map(|values| Grid { geometry: dem.geometry, values }).into()
+}
+
+/// What is left of consecutive profiles of `n` cells.
+fn detrended(profiles: &[f64], n: usize, cell_m: f64, band: &WaveBand, detrender: Detrender) -> Vec<f64> {
+    let filter = Filter { cell_m, band: *band, detrender, trim: (band.max_m / cell_m).ceil() as usize };
+    let transforms = filter.transforms(profiles, n);
+    let mut left = vec![f64::NAN; profiles.len()];
+    left.par_chunks_mut(n).zip(profiles.par_chunks(n)).for_each(|(out, profile)| {
+        for [from, to] in runs(profile, filter.shortest()) {
+            filter.run(&profile[from..to], transforms.get(&(to - from)), &mut out[from..to]);
+        }
+    });
+    left
+}
+
+/// Runs of at least `shortest` cells with data: first cell, and the one behind the last.
+pub(crate) fn runs(profile: &[f64], shortest: usize) -> Vec<[usize; 2]> {
+    let mut runs = Vec::new();
+    let mut start = 0;
+    for (end, z) in profile.iter().chain([&f64::NAN]).enumerate() {
+        if !z.is_finite() {
+            if end - start >= shortest {
+                runs.push([start, end]);
+            }
+            start = end + 1;
+        }
+    }
+    runs
+}
+
+/// The detrending of profiles with one cell.
+struct Filter {
+    cell_m: f64,
+    band: WaveBand,
+    detrender: Detrender,
+    /// Cells left out at each end.
+    trim: usize,
+}
+
+impl Filter {
+    /// Fewest cells of a run.
+    fn shortest(&self) -> usize {
+        3 * self.trim
+    }
+
+    /// Transforms of the continued runs, by length of the run.
+    fn transforms(&self, profiles: &[f64], n: usize) -> BTreeMap<usize, Transform> {
+        if self.detrender != Detrender::Band {
+            return BTreeMap::new();
+        }
+        let lengths =
+            profiles.par_chunks(n).flat_map_iter(|p| runs(p, self.shortest()).into_iter().map(|[from, to]| to - from));
+        let mut lengths: Vec<usize> = lengths.collect();
+        lengths.sort_unstable();
+        lengths.dedup();
+        let transform = |len: usize| Transform::new(smooth_length(len + FADE_LENGTHS * self.trim));
+        lengths.into_par_iter().map(|len| (len, transform(len))).collect()
+    }
+
+    /// What is left of one run; its ends stay as they are.
+    fn run(&self, run: &[f64], transform: Option<&Transform>, out: &mut [f64]) {
+        let left = match transform {
+            Some(transform) => {
+                let reach = (SLOPE_LENGTHS * self.band.max_m / self.cell_m).ceil() as usize;
+                self.in_band(&without_parabola(run, reach), transform)
+            }
+            None => above_exponential_mean(run, libm::exp(-self.cell_m / self.band.max_m)),
+        };
+        let inner = self.trim..run.len() - self.trim;
+        out[inner.clone()].copy_from_slice(&left[inner]);
+    }
+
+    /// The band of the continued run.
+    fn in_band(&self, run: &[f64], transform: &Transform) -> Vec<f64> {
+        let (n, len) = (run.len(), transform.len());
+        let mut scratch = transform.scratch();
+        let beyond = (0..len - n).map(|k| continued(run, k, len - n));
+        let mut work: Vec<Complex64> = run.iter().copied().chain(beyond).map(|v| Complex64::new(v, 0.0)).collect();
+        transform.forward(&mut work, &mut scratch);
+        let [low, high] = self.band.frequencies().map(|f| f * len as f64 * self.cell_m);
+        for (k, v) in work.iter_mut().enumerate() {
+            let cycles = k.min(len - k) as f64;
+            if cycles < low || cycles > high {
+                *v = Complex64::default();
+            }
+        }
+        transform.inverse_unscaled(&mut work, &mut scratch);
+        work[..n].iter().map(|v| v.re / len as f64).collect()
+    }
+}
+
+/// Longest wavelengths from which the slope at an end is taken.
+const SLOPE_LENGTHS: f64 = 0.25;
+/// Longest wavelengths over which the continuations of both ends fade into one another.
+const FADE_LENGTHS: usize = 8;
+
+/// Cell `k` of `gap` cells between the end of a run and its beginning, one period on.
+fn continued(run: &[f64], k: usize, gap: usize) -> f64 {
+    let n = run.len();
+    let mirrored = |place: usize| {
+        let place = place % (2 * n);
+        run[place.min(2 * n - 1 - place)]
+    };
+    let (after, before) = (mirrored(n + k), mirrored(gap - 1 - k));
+    let t = (k as f64 + 0.5) / gap as f64;
+    let weight = t * t * t * (t * (t * 6.0 - 15.0) + 10.0);
+    after + weight * (before - after)
+}
+
+/// The profile less the parabola that has the slopes of the least-squares lines through its first and last `reach` cells.
+fn without_parabola(profile: &[f64], reach: usize) -> Vec<f64> {
+    let n = profile.len();
+    let reach = reach.clamp(2, n);
+    let (first, last) = (slope(&profile[..reach]), slope(&profile[n - reach..]));
+    let bend = 0.5 * (last - first) / (n - 1) as f64;
+    let level = |(k, z): (usize, &f64)| z - k as f64 * (first + bend * k as f64);
+    let level: Vec<f64> = profile.iter().enumerate().map(level).collect();
+    let mean = sums::mean(&level);
+    level.into_iter().map(|z| z - mean).collect()
+}
+
+/// Slope of the least-squares line, per cell.
+fn slope(profile: &[f64]) -> f64 {
+    let middle = 0.5 * (profile.len() - 1) as f64;
+    let mean = sums::mean(profile);
+    let (mut along, mut squares) = (0.0, 0.0);
+    for (k, z) in profile.iter().enumerate() {
+        let d = k as f64 - middle;
+        along += d * (z - mean);
+        squares += d * d;
+    }
+    along / squares
+}
+
+/// Profile less its mean with weights `ratio^|d|` over the cells of the profile.
+fn above_exponential_mean(profile: &[f64], ratio: f64) -> Vec<f64> {
+    let forward = decayed(profile.iter(), ratio);
+    let mut backward = decayed(profile.iter().rev(), ratio);
+    backward.reverse();
+    let mean = |((z, a), b): ((&f64, &[f64; 2]), &[f64; 2])| z - (a[0] + b[0] - z) / (a[1] + b[1] - 1.0);
+    profile.iter().zip(&forward).zip(&backward).map(mean).collect()
+}
+
+/// Sums `s_k = z_k + ratio s_(k-1)` of the values and of ones.
+fn decayed<'a>(values: impl Iterator<Item = &'a f64>, ratio: f64) -> Vec<[f64; 2]> {
+    let step = |so_far: &mut [f64; 2], z: &f64| {
+        *so_far = [z + ratio * so_far[0], 1.0 + ratio * so_far[1]];
+        Some(*so_far)
+    };
+    values.scan([0.0; 2], step).collect()
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,160 @@
+//! A power law through the density of profiles, and the road class that it stands for.
+//!
+//! $$ P(f) = c f^{-n} , \qquad \sigma^2 = \int_{1/\lambda_{max}}^{1/\lambda_{min}} P\,df
+//!    = \frac{c}{n - 1} \left( \lambda_{max}^{n-1} - \lambda_{min}^{n-1} \right) $$
+//! with the one-sided density P in m3 (twice that of [`crate::profile_spectra`]), f in cycles/m, and so c in m^(3 - n). For
+//! n = 2 (Van Deusen 1967, natural ground) c is a length and `sigma^2 = c (lambda_max - lambda_min)`; a c in feet is 0.3048 m
+//! for each foot.
+//!
+//! Fit: least squares of ln P on ln f over bands of an eighth of an octave, each with the same weight, along x and along y
+//! together.
+//!
+//! Class: ISO 8608:2016, Annex C, by P at 0.1 cycles/m.
+
+use crate::profiles::ProfileBin;
+use crate::structure::Direction;
+use sastrugi_numeric::sums;
+use serde::Serialize;
+
+/// Fewest bands of a fit.
+const BINS_MIN: usize = 4;
+/// Spatial frequency by which ISO 8608 sorts roads, cycles/m.
+const ISO_FREQUENCY_CYCLES_M: f64 = 0.1;
+/// Largest density of ISO class A at 0.1 cycles/m, m3; each further class ends at four times that of the one before.
+const ISO_CLASS_A_MAX_M3: f64 = 32e-6;
+
+/// `P(f) = c f^-n`, fitted.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct PowerLaw {
+    /// Density at 1 cycle/m, one-sided, m^(3 - n).
+    pub c: f64,
+    /// Exponent.
+    pub n: f64,
+    /// Share of the variance of ln P that the line explains.
+    pub r2: f64,
+    /// Standard error of `n` from the scatter of the bands about the line.
+    pub n_standard_error: f64,
+    /// Lowest and highest frequency of the bands in the fit, cycles/m.
+    pub frequencies_cycles_m: [f64; 2],
+}
+
+impl PowerLaw {
+    /// The law through the densities of `direction` between two frequencies; `None` with fewer than 4 bands of power there.
+    pub fn fit(bins: &[ProfileBin], direction: Direction, [low, high]: [f64; 2]) -> Option<Self> {
+        let inside = |b: &&ProfileBin| {
+            let taken = direction == Direction::All || b.direction == direction;
+            taken && b.frequency_cycles_m >= low && b.frequency_cycles_m <= high && b.psd_m3 > 0.0
+        };
+        let inside: Vec<&ProfileBin> = bins.iter().filter(inside).collect();
+        let x: Vec<f64> = inside.iter().map(|b| libm::log(b.frequency_cycles_m)).collect();
+        let y: Vec<f64> = inside.iter().map(|b| libm::log(2.0 * b.psd_m3)).collect();
+        if x.len() < BINS_MIN {
+            return None;
+        }
+        let (mean_x, mean_y) = (sums::mean(&x), sums::mean(&y));
+        let moment = |a: &[f64], mean_a: f64, b: &[f64], mean_b: f64| {
+            sums::sum(&a.iter().zip(b).map(|(a, b)| (a - mean_a) * (b - mean_b)).collect::<Vec<_>>())
+        };
+        let (xx, xy, yy) =
+            (moment(&x, mean_x, &x, mean_x), moment(&x, mean_x, &y, mean_y), moment(&y, mean_y, &y, mean_y));
+        let slope = xy / xx;
+        let left = (yy - slope * xy).max(0.0);
+        let ends = x.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], v| [a.min(*v), b.max(*v)]);
+        let law = Self {
+            c: libm::exp(mean_y - slope * mean_x),
+            n: -slope,
+            r2: 1.0 - left / yy,
+            n_standard_error: (left / (x.len() - 2) as f64 / xx).sqrt(),
+            frequencies_cycles_m: ends.map(libm::exp),
+        };
+        (xx > 0.0 && law.c.is_finite()).then_some(law)
+    }
+
+    /// One-sided density at a frequency in cycles/m, m3.
+    pub fn psd_m3(&self, frequency_cycles_m: f64) -> f64 {
+        self.c * libm::pow(frequency_cycles_m, -self.n)
+    }
+
+    /// Density by which roads are classed: at 0.1 cycles/m, m3.
+    pub fn iso_8608_psd_m3(&self) -> f64 {
+        self.psd_m3(ISO_FREQUENCY_CYCLES_M)
+    }
+
+    /// Variance of a profile in a band of wavelengths from `min_m` to `max_m`, m2.
+    pub fn variance_m2(&self, [min_m, max_m]: [f64; 2]) -> f64 {
+        let power = self.n - 1.0;
+        match power == 0.0 {
+            true => self.c * libm::log(max_m / min_m),
+            false => self.c * (libm::pow(max_m, power) - libm::pow(min_m, power)) / power,
+        }
+    }
+}
+
+/// Class of a road by its density at 0.1 cycles/m (m3): A, the smoothest, to H; `None` for what is no density.
+pub fn iso_8608_class(psd_m3: f64) -> Option<char> {
+    let bounds = std::iter::successors(Some(ISO_CLASS_A_MAX_M3), |bound| Some(4.0 * bound));
+    let known = psd_m3 > 0.0 && psd_m3.is_finite();
+    known.then(|| "ABCDEFG".chars().zip(bounds).find(|(_, bound)| psd_m3 < *bound).map_or('H', |(class, _)| class))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn bins(psd: impl Fn(f64) -> f64) -> Vec<ProfileBin> {
+        let bin = |k: u32, direction| {
+            let frequency_cycles_m = 0.05 * libm::exp2(f64::from(k) / 8.0);
+            ProfileBin { direction, frequency_cycles_m, psd_m3: 0.5 * psd(frequency_cycles_m), modes: 5 }
+        };
+        (0..40).flat_map(|k| [bin(k, Direction::X), bin(k, Direction::Y)]).collect()
+    }
+
+    #[test]
+    fn val_a_law_is_found_again() {
+        let law = PowerLaw::fit(&bins(|f| 3e-4 * libm::pow(f, -2.3)), Direction::All, [0.1, 1.0]).unwrap();
+        assert!((law.n - 2.3).abs() < 1e-12 && (law.c / 3e-4 - 1.0).abs() < 1e-12, "{law:?}");
+        assert!(law.r2 > 1.0 - 1e-12 && law.n_standard_error < 1e-6);
+        assert!(law.frequencies_cycles_m[0] >= 0.1 && law.frequencies_cycles_m[1] <= 1.0 + 1e-12);
+        assert!(PowerLaw::fit(&bins(|_| 0.0), Direction::All, [0.1, 1.0]).is_none());
+        assert!(PowerLaw::fit(&bins(|f| f), Direction::X, [0.1, 0.11]).is_none());
+    }
+
+    /// The integral by a fine trapezoid rule in ln f; and `c (lambda_max - lambda_min)` for n = 2.
+    #[test]
+    fn val_variance_is_the_integral_of_the_density() {
+        for n in [0.6, 1.0, 2.0, 3.0] {
+            let law = PowerLaw { c: 2e-4, n, r2: 1.0, n_standard_error: 0.0, frequencies_cycles_m: [0.1, 3.0] };
+            let [low, high] = [1.0 / 5.4, 1.0 / 0.33];
+            let step = libm::log(high / low) / 20_000.0;
+            let at = |k: usize| low * libm::exp(step * k as f64);
+            let term = |k: usize| 0.5 * step * (law.psd_m3(at(k)) * at(k) + law.psd_m3(at(k + 1)) * at(k + 1));
+            let integral: f64 = (0..20_000).map(term).sum();
+            assert!((law.variance_m2([0.33, 5.4]) / integral - 1.0).abs() < 1e-7, "{n}");
+        }
+        let law = PowerLaw { c: 2e-4, n: 2.0, r2: 1.0, n_standard_error: 0.0, frequencies_cycles_m: [0.1, 3.0] };
+        assert!((law.variance_m2([0.33, 5.4]) - 2e-4 * (5.4 - 0.33)).abs() < 1e-18);
+    }
+
+    /// A constant of 1 ft is one of 0.3048 m: the RMS in feet times 0.3048 is that in metres, to rounding.
+    #[test]
+    fn val_feet() {
+        const FOOT_M: f64 = 0.3048;
+        let law = |c| PowerLaw { c, n: 2.0, r2: 1.0, n_standard_error: 0.0, frequencies_cycles_m: [0.1, 3.0] };
+        let in_feet = law(1.0).variance_m2([1.0, 10.0]).sqrt();
+        let in_metres = law(FOOT_M).variance_m2([FOOT_M, 10.0 * FOOT_M]).sqrt();
+        assert!((in_metres / (in_feet * FOOT_M) - 1.0).abs() < 1e-12);
+    }
+
+    /// ISO 8608, Annex C: geometric means 16, 64, 256 ... 262 144 of the classes, in 1e-6 m3, and the bounds between them.
+    #[test]
+    fn val_iso_classes() {
+        let mut mean = 16e-6;
+        for class in "ABCDEFGH".chars() {
+            assert_eq!(iso_8608_class(mean), Some(class));
+            assert_eq!(iso_8608_class(1.99 * mean), Some(class));
+            mean *= 4.0;
+        }
+        assert_eq!(iso_8608_class(33e-6), Some('B'));
+        assert_eq!([0.0, -1.0, f64::NAN, f64::INFINITY].map(iso_8608_class), [None; 4]);
+    }
+}
