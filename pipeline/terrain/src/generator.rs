@@ -127,6 +127,24 @@ pub enum TerrainError {
         /// What is wrong, and what would be right.
         reason: String,
     },
+    /// Nothing in a band of wavelengths to scale.
+    #[error(
+        "measure roughness in wavelengths of {min_m} to {max_m} m: the surface has none there; choose another band"
+    )]
+    NoRoughness {
+        /// Shortest wavelength, m.
+        min_m: f64,
+        /// Longest wavelength, m.
+        max_m: f64,
+    },
+    /// A covariance that does not fit a torus of twice the surface.
+    #[error(
+        "embed the covariance: {share:.1e} of its spectrum is negative; choose a shorter correlation length or a larger size"
+    )]
+    Covariance {
+        /// Sizes of the negative eigenvalues over the sizes of all.
+        share: f64,
+    },
     /// A filtered layer or the product of layers is the same everywhere.
     #[error("find relief in {part}: it is flat after filtering; choose a smaller sigma or a larger size")]
     Flat {

@@ -7,6 +7,7 @@
 pub mod cascade;
 pub mod compose;
 pub mod generator;
+pub mod mavs;
 pub mod multifractal;
 pub mod registry;
 pub mod size;

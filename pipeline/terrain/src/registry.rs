@@ -3,6 +3,13 @@
 use crate::cascade::{Cascade, RawCascade};
 use crate::compose::{Compose, RawCompose};
 use crate::generator::Generator;
+use crate::mavs;
+use crate::mavs::gap::{Gap, RawGap};
+use crate::mavs::octaves::{RawVanDeusen, RawVariable, VanDeusen, Variable};
+use crate::mavs::ornstein_uhlenbeck::{Gaussian, OrnsteinUhlenbeck, RawGaussian, RawOrnsteinUhlenbeck};
+use crate::mavs::pothole::{Pothole, RawPothole};
+use crate::mavs::profile::{Profile, RawProfile};
+use crate::mavs::two_layers::{RawTwoLayers, TwoLayers};
 use crate::multifractal::{Multifractal, RawMultifractal};
 use crate::spheroids::{RawSpheroids, Spheroids};
 use crate::weierstrass_mandelbrot::{RawWeierstrassMandelbrot, WeierstrassMandelbrot};
@@ -57,6 +64,62 @@ const ENTRIES: &[Entry] = &[
         source: "Bayrak (2008), Algorithm 10",
         parameters: schema_of::<RawSpheroids>,
         prepare: prepare_as::<RawSpheroids, Spheroids>,
+    },
+    Entry {
+        kind: mavs::MAVS_PERLIN,
+        summary: "a rough layer of Perlin noise over a rolling one",
+        source: "Terrain Roughness in MAVS, Algorithm 1",
+        parameters: schema_of::<RawTwoLayers>,
+        prepare: prepare_as::<RawTwoLayers, TwoLayers>,
+    },
+    Entry {
+        kind: mavs::MAVS_GAUSSIAN,
+        summary: "a Gaussian field with a correlation length over rolling ground, or its published listing",
+        source: "Terrain Roughness in MAVS, Algorithm 2",
+        parameters: schema_of::<RawGaussian>,
+        prepare: prepare_as::<RawGaussian, Gaussian>,
+    },
+    Entry {
+        kind: mavs::MAVS_VARIABLE,
+        summary: "octaves of Perlin noise with the published amplitudes, profiles with density f^-3, under a field of scales",
+        source: "Terrain Roughness in MAVS, Algorithm 3",
+        parameters: schema_of::<RawVariable>,
+        prepare: prepare_as::<RawVariable, Variable>,
+    },
+    Entry {
+        kind: mavs::VAN_DEUSEN,
+        summary: "octaves of Perlin noise with a power law, natural ground with f^-2, scaled to a roughness in a vehicle's band",
+        source: "Terrain Roughness in MAVS, Algorithm 3, corrected; Van Deusen (1967)",
+        parameters: schema_of::<RawVanDeusen>,
+        prepare: prepare_as::<RawVanDeusen, VanDeusen>,
+    },
+    Entry {
+        kind: mavs::ORNSTEIN_UHLENBECK,
+        summary: "stationary Gaussian field, separable or isotropic, exponential or Gaussian covariance",
+        source: "Terrain Roughness in MAVS, Algorithm 2, corrected; Dietrich and Newsam (1997)",
+        parameters: schema_of::<RawOrnsteinUhlenbeck>,
+        prepare: prepare_as::<RawOrnsteinUhlenbeck, OrnsteinUhlenbeck>,
+    },
+    Entry {
+        kind: mavs::GAP,
+        summary: "a trench across level or rough ground",
+        source: "MAVS random_scene.cpp",
+        parameters: schema_of::<RawGap>,
+        prepare: prepare_as::<RawGap, Gap>,
+    },
+    Entry {
+        kind: mavs::POTHOLE,
+        summary: "round holes in level ground",
+        source: "MAVS random_scene.cpp",
+        parameters: schema_of::<RawPothole>,
+        prepare: prepare_as::<RawPothole, Pothole>,
+    },
+    Entry {
+        kind: mavs::MAVS_PROFILE,
+        summary: "one filtered Gaussian profile along x, the same for every y",
+        source: "MAVS profile_2d.cpp",
+        parameters: schema_of::<RawProfile>,
+        prepare: prepare_as::<RawProfile, Profile>,
     },
 ];
 

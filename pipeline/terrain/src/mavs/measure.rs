@@ -1,0 +1,178 @@
+//! The roughness that a vehicle meets: what is asked for, what is there, and where.
+
+use super::frame::Frame;
+use crate::generator::{Map, Terrain, TerrainError};
+use sastrugi_numeric::{Grid, ops};
+use sastrugi_roughness::{BandError, Detrended, Detrender, WaveBand};
+use sastrugi_schemas::ParameterError;
+use schemars::{JsonSchema, Schema};
+use serde::{Deserialize, Serialize};
+
+/// By which RMS a surface is scaled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Scaling {
+    /// The one that it has: the result is exact.
+    Measured,
+    /// The one that surfaces of these parameters have on average: the same factor for every surface, so that tiles join.
+    Expected,
+}
+
+/// Band of wavelengths in which roughness is measured, and what it is scaled to. With a band the maps `rms-measured` (RMS in
+/// windows of three times its longest wavelength) and, where the roughness varies by rule, `rms-predicted` stand beside
+/// the heights.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+#[schemars(transform = nothing_is_required)]
+pub struct RawRoughness {
+    /// Shortest and longest wavelength, m; or a vehicle.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub band_m: Option<[f64; 2]>,
+    /// Wheelbase of a vehicle, m (2.7 in the example of the MAVS documentation): waves up to twice as long count.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub wheelbase_m: Option<f64>,
+    /// Tyre radius of that vehicle, m (0.33): shorter waves do not count, and cells may have half of it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tyre_radius_m: Option<f64>,
+    /// True: cells that are too large for the shortest wave are noted instead of refused.
+    pub allow_coarse: bool,
+    /// RMS of the heights in the band to which the surface is scaled, m; usual values are 0.005 to 0.127.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rms_m: Option<f64>,
+    /// By which RMS it is scaled.
+    pub scaling: Scaling,
+}
+
+impl Default for RawRoughness {
+    fn default() -> Self {
+        Self {
+            band_m: None,
+            wheelbase_m: None,
+            tyre_radius_m: None,
+            allow_coarse: false,
+            rms_m: None,
+            scaling: Scaling::Measured,
+        }
+    }
+}
+
+/// A table may be given in part.
+fn nothing_is_required(schema: &mut Schema) {
+    schema.remove("required");
+}
+
+/// A checked band, and what is asked for in it.
+#[derive(Clone, Debug)]
+pub struct Roughness {
+    band: WaveBand,
+    rms_m: Option<f64>,
+    scaling: Scaling,
+    /// Cells are too large for its shortest wave.
+    coarse: Option<BandError>,
+}
+
+impl Roughness {
+    /// The band.
+    pub fn band(&self) -> WaveBand {
+        self.band
+    }
+
+    /// The RMS that is asked for, m.
+    pub fn rms_m(&self) -> Option<f64> {
+        self.rms_m
+    }
+
+    /// What is asked of a surface; `None` without a band.
+    ///
+    /// # Errors
+    /// At the key below `roughness`: a band that is none, a vehicle beside a band or with one of its lengths, cells too large,
+    /// a surface below four of the longest wave, an RMS without a band or not above 0.
+    pub fn check(raw: &RawRoughness, frame: &Frame) -> Result<Option<Self>, ParameterError> {
+        Self::of(raw, frame).map_err(|e| e.within("roughness"))
+    }
+
+    fn of(raw: &RawRoughness, frame: &Frame) -> Result<Option<Self>, ParameterError> {
+        if let Some(rms) = raw.rms_m {
+            ParameterError::positive("rms_m", rms)?;
+        }
+        let (key, band) = match (raw.band_m, raw.wheelbase_m, raw.tyre_radius_m) {
+            (None, None, None) if raw.rms_m.is_none() => return Ok(None),
+            (None, None, None) => {
+                return Err(ParameterError::new(
+                    "rms_m",
+                    "has no band; give `band_m`, or `wheelbase_m` and `tyre_radius_m`",
+                ));
+            }
+            (Some([min, max]), None, None) => ("band_m", WaveBand::new(min, max)),
+            (None, Some(wheelbase), Some(radius)) => ("wheelbase_m", WaveBand::of_vehicle(wheelbase, radius)),
+            (Some(_), ..) => return Err(ParameterError::new("band_m", "stands beside a vehicle; give one of them")),
+            (None, Some(_), None) => {
+                return Err(ParameterError::new("tyre_radius_m", "is missing beside `wheelbase_m`"));
+            }
+            (None, None, Some(_)) => {
+                return Err(ParameterError::new("wheelbase_m", "is missing beside `tyre_radius_m`"));
+            }
+        };
+        let refuse = |e: BandError| ParameterError::new(key, format!("is refused: {e}"));
+        let band = band.map_err(refuse)?;
+        band.fits_length(frame.sides_m()[1]).map_err(refuse)?;
+        let coarse = band.fits_cells(frame.size.cell_m).err();
+        match coarse {
+            Some(e) if !raw.allow_coarse => {
+                Err(ParameterError::new(key, format!("is refused: {e}; `allow_coarse = true` lets it pass")))
+            }
+            coarse => Ok(Some(Self { band, rms_m: raw.rms_m, scaling: raw.scaling, coarse })),
+        }
+    }
+}
+
+/// A surface before it is measured.
+pub struct Made<F> {
+    /// Heights without their field of scales.
+    pub plain: Grid,
+    /// By which they are multiplied, cell by cell.
+    pub scale: Option<Grid>,
+    /// Variance of profiles in a band that surfaces of these parameters have on average, scales included, m2.
+    pub expected_m2: F,
+}
+
+/// The finished terrain: scaled to what is asked for, with its maps.
+///
+/// # Errors
+/// When no roughness in the band is there to be scaled.
+pub fn finish<F: Fn(&WaveBand) -> f64>(made: Made<F>, asked: Option<&Roughness>) -> Result<Terrain, TerrainError> {
+    let Made { plain, scale, expected_m2 } = made;
+    let heights = scale.as_ref().map_or_else(|| plain.clone(), |scale| ops::multiply(&plain, scale));
+    let Some(asked) = asked else { return Ok(Terrain::from(heights)) };
+    let band = &asked.band;
+    let measure = |grid: &Grid| Detrended::of(grid, band, Detrender::Band);
+    let measured = measure(&heights);
+    let own_m = match asked.scaling {
+        Scaling::Measured => measured.rms_m(),
+        Scaling::Expected => expected_m2(band).sqrt(),
+    };
+    if !(own_m > 0.0 && own_m.is_finite()) {
+        return Err(TerrainError::NoRoughness { min_m: band.min_m(), max_m: band.max_m() });
+    }
+    let factor = asked.rms_m.map_or(1.0, |rms| rms / own_m);
+    let mut notes: Vec<String> = asked.coarse.iter().map(|e| format!("the band is not all there: {e}")).collect();
+    notes.push(format!(
+        "RMS of profiles in wavelengths of {} to {} m: {:.6} m (detrender band)",
+        band.min_m(),
+        band.max_m(),
+        factor * measured.rms_m()
+    ));
+    let map = |name, values: Grid| Map { name, unit: "m", values: values.map(|v| factor * v) };
+    let predicted = scale.map(|scale| {
+        let plain_rms_m = measure(&plain).rms_m();
+        map("rms-predicted", scale.map(|s| s * plain_rms_m))
+    });
+    let maps = predicted.into_iter().chain([map("rms-measured", measured.rms_map())]).collect();
+    Ok(Terrain { heights: heights.map(|z| factor * z), maps, notes })
+}
+
+/// Working memory of [`finish`] and of layers before it, bytes.
+pub fn memory_bytes(frame: &Frame, asked: Option<&Roughness>) -> u64 {
+    // Heights, scales and their product; with a band residuals of both directions, their transposes, and running sums.
+    (if asked.is_some() { 120 } else { 32 }) * frame.size.cells()
+}

@@ -1,0 +1,106 @@
+//! An isotropic field by circulant embedding.
+//!
+//! The covariance on a torus of at least twice the surface, and of 8 correlation lengths beyond it, has the eigenvalues
+//! `lambda = FFT(covariance)`. Modes with independent normal parts and mean square `M lambda` (M cells of the torus) give a
+//! field with that covariance exactly. Negative eigenvalues, which the cut at half the torus can leave, are set to 0; more
+//! than 1e-3 of all their sizes is an error.
+//!
+//! Modes are drawn column frequency by column frequency, from a stream each, so that they can be drawn side by side.
+//!
+//! Cost: two normal numbers a mode and an inverse real transform of the torus.
+
+use super::Covariance;
+use crate::generator::TerrainError;
+use crate::size::Size;
+use sastrugi_numeric::fft::{Complex64, RealFft2, even_spectrum, smooth_length};
+use sastrugi_numeric::{Geometry, Grid, Streams, sums};
+use std::f64::consts::FRAC_1_SQRT_2;
+
+/// Largest share of negative eigenvalues in the sum of all sizes.
+const NEGATIVE_SHARE_MAX: f64 = 1e-3;
+/// Correlation lengths of the torus beyond the surface.
+const MARGIN_LENGTHS: f64 = 8.0;
+
+/// Cells of the torus along an axis of `cells`.
+fn torus_length(cells: usize, cell_m: f64, length_m: f64) -> usize {
+    let margin = (MARGIN_LENGTHS * length_m / cell_m).ceil() as usize;
+    smooth_length((2 * cells).max(cells + margin))
+}
+
+/// Peak memory of [`field`] without its result, bytes.
+pub fn memory_bytes(size: &Size, length_m: f64) -> u64 {
+    let along = |cells| torus_length(cells, size.cell_m, length_m) as u64;
+    // A quarter of eigenvalues, a half spectrum that becomes the torus.
+    18 * along(size.rows()) * along(size.cols())
+}
+
+/// The field.
+///
+/// # Errors
+/// A covariance that does not fit the torus.
+pub fn field(
+    streams: &Streams,
+    geometry: Geometry,
+    rms_m: f64,
+    length_m: f64,
+    covariance: Covariance,
+) -> Result<Grid, TerrainError> {
+    let [rows, cols] = [geometry.rows, geometry.cols].map(|n| torus_length(n, geometry.cell[0], length_m));
+    let eigenvalues = eigenvalues([rows, cols], rms_m, length_m / geometry.cell[0], covariance);
+    let share = negative_share(&eigenvalues);
+    if share > NEGATIVE_SHARE_MAX {
+        return Err(TerrainError::Covariance { share });
+    }
+    let half_rows = rows / 2 + 1;
+    let modes = streams.child("modes");
+    let torus = RealFft2::new(rows, cols).inverse_of(|kx, column| {
+        let mut stream = modes.stream(&kx.to_string());
+        // Of a column that is its own opposite only the Hermitian half of what is drawn counts.
+        let gain = if kx == 0 || 2 * kx == cols { 1.0 } else { FRAC_1_SQRT_2 };
+        for (ky, mode) in column.iter_mut().enumerate() {
+            let eigenvalue = eigenvalues[kx * half_rows + ky.min(rows - ky)].max(0.0);
+            let size = gain * (eigenvalue * (rows * cols) as f64).sqrt();
+            *mode = Complex64::new(size * stream.normal(), size * stream.normal());
+        }
+    });
+    let kept = torus.chunks_exact(cols).take(geometry.rows).flat_map(|row| &row[..geometry.cols]);
+    Ok(Grid { geometry, values: kept.copied().collect() })
+}
+
+/// Eigenvalues of the covariance on the torus: a quarter of them, the others are the same.
+fn eigenvalues([rows, cols]: [usize; 2], rms_m: f64, length_cells: f64, covariance: Covariance) -> Vec<f64> {
+    even_spectrum([rows, cols], |row, line| {
+        for (col, v) in line.iter_mut().enumerate() {
+            let square = ((row * row + col * col) as f64) / (length_cells * length_cells);
+            let decay = match covariance {
+                Covariance::Exponential => square.sqrt(),
+                Covariance::Gaussian => square,
+            };
+            *v = rms_m * rms_m * libm::exp(-decay);
+        }
+    })
+}
+
+/// Sizes of the negative ones over the sizes of all.
+fn negative_share(eigenvalues: &[f64]) -> f64 {
+    let sizes = |kept: fn(f64) -> f64| sums::sum(&eigenvalues.iter().map(|v| kept(*v)).collect::<Vec<_>>());
+    sizes(|v| (-v).max(0.0)) / sizes(f64::abs)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The torus that is taken leaves hardly any negative eigenvalue; one without room for the covariance does.
+    #[test]
+    fn val_negative_eigenvalues() {
+        for covariance in [Covariance::Exponential, Covariance::Gaussian] {
+            for (cells, length) in [(30, 40.0), (100, 1.0), (64, 8.0)] {
+                let n = torus_length(cells, 1.0, length);
+                let share = negative_share(&eigenvalues([n, n], 0.05, length, covariance));
+                assert!(share <= NEGATIVE_SHARE_MAX, "{covariance:?} {cells} {length}: {share}");
+            }
+        }
+        assert!(negative_share(&eigenvalues([16, 16], 0.05, 20.0, Covariance::Gaussian)) > NEGATIVE_SHARE_MAX);
+    }
+}

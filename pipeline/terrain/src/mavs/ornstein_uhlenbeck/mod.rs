@@ -1,0 +1,174 @@
+//! Kinds `mavs_gaussian` and `ornstein_uhlenbeck`: a Gaussian field with a correlation length (Algorithm 2).
+//!
+//! # What
+//! A field of standard deviation s and correlation length a, over rolling ground `m_l P((x, y) / lambda_l)`:
+//! * `separable`: covariance `s^2 exp(-(|dx| + |dy|) / a)`, exact on the cells: first-order recursions along x, then along y
+//!   (`chains.rs`). Correlations are longest along the axes.
+//! * `isotropic`: covariance `s^2 exp(-d / a)` or `s^2 exp(-d^2 / a^2)`, by circulant embedding (`embedding.rs`).
+//!
+//! `mavs_gaussian` is `separable` without a choice; with `compat = true` it is the published listing (`listing.rs`).
+//!
+//! # Source
+//! Uhlenbeck and Ornstein, Phys. Rev. 36 (1930) 823; Dietrich and Newsam, SIAM J. Sci. Comput. 18 (1997) 1088, for the
+//! embedding.
+//!
+//! # Tiles
+//! These fields have no coordinates: two surfaces are two samples, whatever their place.
+
+mod chains;
+mod embedding;
+mod listing;
+mod params;
+
+pub use params::{Covariance, Gaussian, Mode, OrnsteinUhlenbeck, RawGaussian, RawOrnsteinUhlenbeck};
+
+use super::frame::Frame;
+use super::measure::{Made, Roughness, finish, memory_bytes};
+use super::perlin::{self, Layer, Perlin};
+use super::{MAVS_GAUSSIAN, ORNSTEIN_UHLENBECK};
+use crate::generator::{Generator, Terrain, TerrainError};
+use sastrugi_numeric::{Geometry, Grid, Streams, ops};
+use sastrugi_roughness::WaveBand;
+use serde_json::Value;
+use std::f64::consts::{FRAC_2_PI, PI, TAU};
+
+/// Rolling ground under a field.
+#[derive(Clone, Copy, Debug)]
+struct Rolling {
+    wavelength_m: f64,
+    amplitude_m: f64,
+}
+
+impl Rolling {
+    /// Adds the rolling ground of `layer`; nothing where there is none.
+    fn under(&self, field: Grid, frame: &Frame, layer: impl Fn(f64, f64) -> Layer) -> Grid {
+        if self.amplitude_m == 0.0 {
+            return field;
+        }
+        let ground = perlin::sum(&[layer(self.wavelength_m, self.amplitude_m)], frame);
+        ops::add(&field, &ground)
+    }
+
+    fn expected_m2(&self, band: &WaveBand) -> f64 {
+        let share = perlin::variance_between(band.frequencies().map(|f| f * self.wavelength_m));
+        self.amplitude_m * self.amplitude_m * share
+    }
+}
+
+/// Share of the variance of profiles with covariance `exp(-d / a)` between two frequencies in cycles over a.
+fn exponential_share([low, high]: [f64; 2]) -> f64 {
+    FRAC_2_PI * (libm::atan(TAU * high) - libm::atan(TAU * low))
+}
+
+/// The same for `exp(-d^2 / a^2)`.
+fn gaussian_share([low, high]: [f64; 2]) -> f64 {
+    libm::erf(PI * high) - libm::erf(PI * low)
+}
+
+/// The terrain of a field over rolling ground.
+fn finished(
+    plain: Grid,
+    expected_m2: impl Fn(&WaveBand) -> f64,
+    roughness: Option<&Roughness>,
+) -> Result<Terrain, TerrainError> {
+    finish(Made { plain, scale: None, expected_m2 }, roughness)
+}
+
+impl Generator for OrnsteinUhlenbeck {
+    fn kind(&self) -> &'static str {
+        ORNSTEIN_UHLENBECK
+    }
+
+    fn geometry(&self) -> Geometry {
+        self.frame.geometry()
+    }
+
+    fn parameters(&self) -> Value {
+        serde_json::to_value(&self.raw).unwrap_or_default()
+    }
+
+    fn memory_bytes(&self) -> u64 {
+        let torus = match self.raw.mode {
+            Mode::Separable => 0,
+            Mode::Isotropic => embedding::memory_bytes(&self.frame.size, self.raw.correlation_length_m),
+        };
+        memory_bytes(&self.frame, self.roughness.as_ref()) + torus
+    }
+
+    fn notes(&self) -> Vec<String> {
+        self.frame.size.note().into_iter().collect()
+    }
+
+    fn generate(&self, streams: &Streams, _bases: &[Grid]) -> Result<Terrain, TerrainError> {
+        let p = &self.raw;
+        let geometry = self.geometry();
+        let field = match p.mode {
+            Mode::Separable => chains::field(streams, geometry, p.rms_m, p.correlation_length_m),
+            Mode::Isotropic => embedding::field(streams, geometry, p.rms_m, p.correlation_length_m, p.covariance)?,
+        };
+        let layer = |wavelength, amplitude| Layer::draw(streams, "low", wavelength, amplitude);
+        let plain = self.rolling().under(field, &self.frame, layer);
+        let share = match p.covariance {
+            Covariance::Exponential => exponential_share,
+            Covariance::Gaussian => gaussian_share,
+        };
+        let expected_m2 = |band: &WaveBand| {
+            let own = p.rms_m * p.rms_m * share(band.frequencies().map(|f| f * p.correlation_length_m));
+            own + self.rolling().expected_m2(band)
+        };
+        finished(plain, expected_m2, self.roughness.as_ref())
+    }
+}
+
+impl Generator for Gaussian {
+    fn kind(&self) -> &'static str {
+        MAVS_GAUSSIAN
+    }
+
+    fn geometry(&self) -> Geometry {
+        self.frame.geometry()
+    }
+
+    fn parameters(&self) -> Value {
+        serde_json::to_value(&self.raw).unwrap_or_default()
+    }
+
+    fn memory_bytes(&self) -> u64 {
+        memory_bytes(&self.frame, self.roughness.as_ref())
+    }
+
+    fn notes(&self) -> Vec<String> {
+        let compat = self.raw.compat.then(|| {
+            format!(
+                "the published listing with its defects: neighbours correlate by exp(-2 a^2) = {:.2e} in place of \
+                 exp(-cell / a), and by still less from column to column; the south-west cell is 0; the lattice of the low \
+                 layer starts in the corner",
+                listing::ratio(self.raw.hi_len_m)
+            )
+        });
+        let mut notes: Vec<String> = self.frame.size.note().into_iter().chain(compat).collect();
+        notes.extend(self.replaced_cell_m.map(|cell| {
+            format!("as published, the cell of {cell} m is replaced by {} m without a word", self.frame.size.cell_m)
+        }));
+        notes
+    }
+
+    fn generate(&self, streams: &Streams, _bases: &[Grid]) -> Result<Terrain, TerrainError> {
+        let (p, geometry) = (&self.raw, self.geometry());
+        let plain = if p.compat {
+            let field = listing::field(streams, geometry, p.hi_mag_m, p.hi_len_m);
+            let noise = Perlin::draw(&mut streams.stream("lattice"));
+            let layer = |wavelength, amplitude| Layer::of(&noise, wavelength, amplitude);
+            self.rolling().under(field, &self.frame.at_origin(), layer)
+        } else {
+            let field = chains::field(streams, geometry, p.hi_mag_m, p.hi_len_m);
+            let layer = |wavelength, amplitude| Layer::draw(streams, "low", wavelength, amplitude);
+            self.rolling().under(field, &self.frame, layer)
+        };
+        let expected_m2 = |band: &WaveBand| {
+            let own = p.hi_mag_m * p.hi_mag_m * exponential_share(band.frequencies().map(|f| f * p.hi_len_m));
+            own + self.rolling().expected_m2(band)
+        };
+        finished(plain, expected_m2, self.roughness.as_ref())
+    }
+}

@@ -1,0 +1,230 @@
+//! Parameters of the Gaussian fields.
+
+use super::Rolling;
+use crate::mavs::frame::Frame;
+use crate::mavs::measure::{RawRoughness, Roughness};
+use crate::mavs::{DEFAULT_CELL_M, DEFAULT_HI_LEN_M, DEFAULT_HI_MAG_M, DEFAULT_LO_LEN_M, DEFAULT_SIZE_PX};
+use crate::size::Size;
+use sastrugi_schemas::ParameterError;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// How a field is made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Mode {
+    /// Covariance `s^2 exp(-(|dx| + |dy|) / a)`, by recursions.
+    Separable,
+    /// A covariance of the distance alone, by circulant embedding.
+    Isotropic,
+}
+
+/// Covariance of a field at the distance d, over its variance.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Covariance {
+    /// `exp(-d / a)`.
+    Exponential,
+    /// `exp(-d^2 / a^2)`; isotropic only.
+    Gaussian,
+}
+
+/// Gaussian field over Perlin noise, Algorithm 2.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct RawGaussian {
+    /// Size east and north, m; in place of `size_px`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub size_m: Option<[f64; 2]>,
+    /// Cells east and north; 666 x 666 when no size is given (100 m in the examples).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub size_px: Option<[u32; 2]>,
+    /// Side of a cell, m (examples).
+    pub cell_m: f64,
+    /// South-west corner in the world, m, whole cells. It places the rolling ground, not the field.
+    pub origin_m: [f64; 2],
+    /// RMS of the field, m (listings: 0.2 in one place, 0.1 in another; below 0.15 is advised).
+    pub hi_mag_m: f64,
+    /// Correlation length of the field, m (listing).
+    pub hi_len_m: f64,
+    /// Peak of the rolling ground, m (listings: 0 in one place, 10 in another).
+    pub lo_mag_m: f64,
+    /// Wavelength of the rolling ground, m (listing).
+    pub lo_len_m: f64,
+    /// True: the listing with its defects (a wrong correlation, and none from column to column). False: the separable field
+    /// that it is meant to be.
+    pub compat: bool,
+    /// Where roughness is measured, and what it is scaled to.
+    pub roughness: RawRoughness,
+}
+
+impl Default for RawGaussian {
+    fn default() -> Self {
+        Self {
+            size_m: None,
+            size_px: None,
+            cell_m: DEFAULT_CELL_M,
+            origin_m: [0.0; 2],
+            hi_mag_m: DEFAULT_HI_MAG_M,
+            hi_len_m: DEFAULT_HI_LEN_M,
+            lo_mag_m: 0.0,
+            lo_len_m: DEFAULT_LO_LEN_M,
+            compat: false,
+            roughness: RawRoughness::default(),
+        }
+    }
+}
+
+/// Ornstein-Uhlenbeck field with a chosen covariance, over Perlin noise.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct RawOrnsteinUhlenbeck {
+    /// Size east and north, m; in place of `size_px`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub size_m: Option<[f64; 2]>,
+    /// Cells east and north; 666 x 666 when no size is given (100 m in the examples).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub size_px: Option<[u32; 2]>,
+    /// Side of a cell, m (examples).
+    pub cell_m: f64,
+    /// South-west corner in the world, m, whole cells. It places the rolling ground, not the field.
+    pub origin_m: [f64; 2],
+    /// How the field is made.
+    pub mode: Mode,
+    /// Its covariance.
+    pub covariance: Covariance,
+    /// RMS of the field, m.
+    pub rms_m: f64,
+    /// Correlation length a, m (listing), at least a cell.
+    pub correlation_length_m: f64,
+    /// Peak of the rolling ground, m.
+    pub lo_mag_m: f64,
+    /// Wavelength of the rolling ground, m (listing).
+    pub lo_len_m: f64,
+    /// Where roughness is measured, and what it is scaled to.
+    pub roughness: RawRoughness,
+}
+
+impl Default for RawOrnsteinUhlenbeck {
+    fn default() -> Self {
+        Self {
+            size_m: None,
+            size_px: None,
+            cell_m: DEFAULT_CELL_M,
+            origin_m: [0.0; 2],
+            mode: Mode::Separable,
+            covariance: Covariance::Exponential,
+            rms_m: DEFAULT_HI_MAG_M,
+            correlation_length_m: DEFAULT_HI_LEN_M,
+            lo_mag_m: 0.0,
+            lo_len_m: DEFAULT_LO_LEN_M,
+            roughness: RawRoughness::default(),
+        }
+    }
+}
+
+/// Largest correlation length over a cell: the torus holds eight of them.
+const LENGTH_MAX_CELLS: f64 = 2000.0;
+
+/// Checked parameters of a field with a chosen covariance.
+#[derive(Clone, Debug)]
+pub struct OrnsteinUhlenbeck {
+    pub(super) raw: RawOrnsteinUhlenbeck,
+    pub(super) frame: Frame,
+    pub(super) roughness: Option<Roughness>,
+}
+
+impl TryFrom<RawOrnsteinUhlenbeck> for OrnsteinUhlenbeck {
+    type Error = ParameterError;
+
+    fn try_from(raw: RawOrnsteinUhlenbeck) -> Result<Self, ParameterError> {
+        let size = Size::check(raw.size_m, raw.size_px, raw.cell_m, DEFAULT_SIZE_PX)?;
+        let frame = Frame::check(size, raw.origin_m)?;
+        ParameterError::positive("rms_m", raw.rms_m)?;
+        resolved("correlation_length_m", raw.correlation_length_m, raw.cell_m)?;
+        if raw.mode == Mode::Isotropic && raw.correlation_length_m > LENGTH_MAX_CELLS * raw.cell_m {
+            let message = format!("is {} m; it must be at most 2000 cells", raw.correlation_length_m);
+            return Err(ParameterError::new("correlation_length_m", message));
+        }
+        if raw.mode == Mode::Separable && raw.covariance == Covariance::Gaussian {
+            let message = "is gaussian, which recursions do not have; use `mode = \"isotropic\"`";
+            return Err(ParameterError::new("covariance", message));
+        }
+        rolling(raw.lo_mag_m, raw.lo_len_m)?;
+        let roughness = Roughness::check(&raw.roughness, &frame)?;
+        let raw = RawOrnsteinUhlenbeck { size_m: None, size_px: Some(size.px), ..raw };
+        Ok(Self { raw, frame, roughness })
+    }
+}
+
+impl OrnsteinUhlenbeck {
+    pub(super) fn rolling(&self) -> Rolling {
+        Rolling { wavelength_m: self.raw.lo_len_m, amplitude_m: self.raw.lo_mag_m }
+    }
+}
+
+/// Checked parameters of Algorithm 2.
+#[derive(Clone, Debug)]
+pub struct Gaussian {
+    pub(super) raw: RawGaussian,
+    pub(super) frame: Frame,
+    pub(super) roughness: Option<Roughness>,
+    /// The cell that was asked for, where the listing takes a smaller one.
+    pub(super) replaced_cell_m: Option<f64>,
+}
+
+impl TryFrom<RawGaussian> for Gaussian {
+    type Error = ParameterError;
+
+    fn try_from(raw: RawGaussian) -> Result<Self, ParameterError> {
+        ParameterError::positive("hi_mag_m", raw.hi_mag_m)?;
+        ParameterError::positive("hi_len_m", raw.hi_len_m)?;
+        rolling(raw.lo_mag_m, raw.lo_len_m)?;
+        let mut size = Size::check(raw.size_m, raw.size_px, raw.cell_m, DEFAULT_SIZE_PX)?;
+        let mut replaced_cell_m = None;
+        if !raw.compat {
+            resolved("hi_len_m", raw.hi_len_m, raw.cell_m)?;
+        } else if raw.cell_m > 2.0 * raw.hi_len_m {
+            let message = format!("is {} m; it must be at most twice `hi_len_m`, {} m", raw.cell_m, 2.0 * raw.hi_len_m);
+            return Err(ParameterError::new("cell_m", message));
+        } else if let Some(cell_m) = smaller_cell_m(&size, raw.hi_len_m) {
+            replaced_cell_m = Some(raw.cell_m);
+            size = Size::check(Some(size.geometry().size()), None, cell_m, DEFAULT_SIZE_PX)?;
+        }
+        let frame = Frame::check(size, raw.origin_m)?;
+        let roughness = Roughness::check(&raw.roughness, &frame)?;
+        let raw = RawGaussian { size_m: None, size_px: Some(size.px), cell_m: size.cell_m, ..raw };
+        Ok(Self { raw, frame, roughness, replaced_cell_m })
+    }
+}
+
+impl Gaussian {
+    pub(super) fn rolling(&self) -> Rolling {
+        Rolling { wavelength_m: self.raw.lo_len_m, amplitude_m: self.raw.lo_mag_m }
+    }
+}
+
+/// The cell that the listing takes in place of a larger one: the shorter side of the surface's division into about twice the
+/// correlation length.
+fn smaller_cell_m(size: &Size, length_m: f64) -> Option<f64> {
+    let part = |side: f64| side / ((0.5 * side / length_m).floor() + 1.0);
+    let [x, y] = size.geometry().size().map(part);
+    let limit = x.min(y);
+    (limit < size.cell_m).then_some(limit)
+}
+
+/// A correlation length that cells can show.
+fn resolved(key: &str, length_m: f64, cell_m: f64) -> Result<(), ParameterError> {
+    ParameterError::positive(key, length_m)?;
+    if length_m >= cell_m {
+        Ok(())
+    } else {
+        Err(ParameterError::new(key, format!("is {length_m} m; it must be at least a cell, {cell_m} m")))
+    }
+}
+
+fn rolling(amplitude_m: f64, wavelength_m: f64) -> Result<(), ParameterError> {
+    ParameterError::not_negative("lo_mag_m", amplitude_m)?;
+    ParameterError::positive("lo_len_m", wavelength_m)?;
+    Ok(())
+}

@@ -1,0 +1,131 @@
+//! Kind `mavs_profile`: one Gaussian profile along x, the same for every y: a ride course.
+//!
+//! White noise of the standard deviation s is filtered with `exp(-x^2 / (2 a^2))`, scaled so that the squares of the weights
+//! sum to 1: the profile has the standard deviation s and the covariance `s^2 exp(-d^2 / (4 a^2))`, which falls to 1/e at 2 a.
+//! (The published gain `2 dx / (sqrt(pi) a)` gives another variance for every spacing: 4 dx / (sqrt(pi) a) s^2.) The noise is
+//! periodic over at least 200 a and the surface, of which the profile is the beginning.
+
+use super::{DEFAULT_CELL_M, DEFAULT_HI_LEN_M, DEFAULT_HI_MAG_M, DEFAULT_SIZE_PX, MAVS_PROFILE};
+use crate::generator::{Generator, Terrain, TerrainError};
+use crate::size::Size;
+use sastrugi_numeric::fft::{Complex64, Transform, smooth_length};
+use sastrugi_numeric::{Geometry, Grid, Streams};
+use sastrugi_schemas::ParameterError;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+/// Least period over the correlation length (listing).
+const PERIOD_LENGTHS: f64 = 200.0;
+/// Longest correlation length over a cell.
+const LENGTH_MAX_CELLS: f64 = 10_000.0;
+
+/// A ridged surface from one profile.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct RawProfile {
+    /// Size east and north, m; in place of `size_px`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub size_m: Option<[f64; 2]>,
+    /// Cells east and north; 666 x 666 when no size is given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub size_px: Option<[u32; 2]>,
+    /// Side of a cell, m.
+    pub cell_m: f64,
+    /// RMS of the heights, m.
+    pub rms_m: f64,
+    /// Length a of the filter, m, at least a cell (listing: two).
+    pub correlation_length_m: f64,
+}
+
+impl Default for RawProfile {
+    fn default() -> Self {
+        Self {
+            size_m: None,
+            size_px: None,
+            cell_m: DEFAULT_CELL_M,
+            rms_m: DEFAULT_HI_MAG_M,
+            correlation_length_m: DEFAULT_HI_LEN_M,
+        }
+    }
+}
+
+/// Checked parameters of a ridged surface.
+#[derive(Clone, Debug)]
+pub struct Profile {
+    raw: RawProfile,
+    size: Size,
+}
+
+impl TryFrom<RawProfile> for Profile {
+    type Error = ParameterError;
+
+    fn try_from(raw: RawProfile) -> Result<Self, ParameterError> {
+        let size = Size::check(raw.size_m, raw.size_px, raw.cell_m, DEFAULT_SIZE_PX)?;
+        ParameterError::positive("rms_m", raw.rms_m)?;
+        let cells = ParameterError::positive("correlation_length_m", raw.correlation_length_m)? / raw.cell_m;
+        if !(1.0..=LENGTH_MAX_CELLS).contains(&cells) {
+            let message = format!("is {cells} cells; it must be 1 to {LENGTH_MAX_CELLS} of them");
+            return Err(ParameterError::new("correlation_length_m", message));
+        }
+        let raw = RawProfile { size_m: None, size_px: Some(size.px), ..raw };
+        Ok(Self { raw, size })
+    }
+}
+
+impl Profile {
+    /// Heights along x, m.
+    fn heights(&self, streams: &Streams) -> Vec<f64> {
+        let (p, mut stream) = (&self.raw, streams.stream("profile"));
+        let length = p.correlation_length_m / p.cell_m;
+        let period = smooth_length(self.size.cols().max((PERIOD_LENGTHS * length).ceil() as usize));
+        let transform = Transform::new(period);
+        let mut scratch = transform.scratch();
+        let mut forward = |values: Vec<f64>| {
+            let mut spectrum: Vec<Complex64> = values.into_iter().map(|v| Complex64::new(v, 0.0)).collect();
+            transform.forward(&mut spectrum, &mut scratch);
+            spectrum
+        };
+        let weight = |k: usize| {
+            let d = k.min(period - k) as f64 / length;
+            libm::exp(-0.5 * d * d)
+        };
+        let weights: Vec<f64> = (0..period).map(weight).collect();
+        let norm = weights.iter().map(|w| w * w).sum::<f64>().sqrt();
+        let noise = forward((0..period).map(|_| stream.normal()).collect());
+        let filter = forward(weights);
+        let mut product: Vec<Complex64> = noise.iter().zip(&filter).map(|(n, f)| n * f.re).collect();
+        transform.inverse_unscaled(&mut product, &mut scratch);
+        let scale = p.rms_m / (norm * period as f64);
+        product[..self.size.cols()].iter().map(|v| v.re * scale).collect()
+    }
+}
+
+impl Generator for Profile {
+    fn kind(&self) -> &'static str {
+        MAVS_PROFILE
+    }
+
+    fn geometry(&self) -> Geometry {
+        self.size.geometry()
+    }
+
+    fn parameters(&self) -> Value {
+        serde_json::to_value(&self.raw).unwrap_or_default()
+    }
+
+    fn memory_bytes(&self) -> u64 {
+        let period = PERIOD_LENGTHS * self.raw.correlation_length_m / self.raw.cell_m;
+        8 * self.size.cells() + 64 * (period as u64 + u64::from(self.size.px[0]))
+    }
+
+    fn notes(&self) -> Vec<String> {
+        self.size.note().into_iter().collect()
+    }
+
+    fn generate(&self, streams: &Streams, _bases: &[Grid]) -> Result<Terrain, TerrainError> {
+        let profile = self.heights(streams);
+        let geometry = self.size.geometry();
+        Ok(Terrain::from(Grid { geometry, values: profile.repeat(geometry.rows) }))
+    }
+}

@@ -1,0 +1,503 @@
+//! The acceptance of the family, numbered as in its specification (section 8): 1 stands in `perlin/tests.rs`, 9 and 11 in the
+//! roughness room.
+
+use crate::generator::Terrain;
+use crate::registry::prepare;
+use sastrugi_numeric::{Geometry, Grid, Streams, ops, sums};
+use sastrugi_roughness::{Detrended, Detrender, PowerLaw, WaveBand, level, profile_spectra};
+use sastrugi_schemas::ParameterError;
+use serde_json::{Value, json};
+
+fn made(kind: &str, params: &Value, seed: u64) -> Terrain {
+    prepare(kind, params).unwrap().generate(&Streams::for_seed(seed, "mavs-test"), &[]).unwrap()
+}
+
+fn heights(kind: &str, params: &Value, seed: u64) -> Grid {
+    made(kind, params, seed).heights
+}
+
+fn rms(values: &[f64]) -> f64 {
+    sums::variance(values).sqrt()
+}
+
+/// Mean product of heights `lag` cells apart along x (east) or y (north), over the mean square.
+fn correlation(grid: &Grid, [east, north]: [usize; 2]) -> f64 {
+    let (rows, cols) = (grid.rows(), grid.cols());
+    let pairs = (north..rows).flat_map(|r| (0..cols - east).map(move |c| (r, c)));
+    let products: Vec<f64> = pairs.map(|(r, c)| grid.at(r, c) * grid.at(r - north, c + east)).collect();
+    let squares: Vec<f64> = grid.values.iter().map(|v| v * v).collect();
+    sums::mean(&products) / sums::mean(&squares)
+}
+
+fn mean_over(seeds: std::ops::Range<u64>, f: impl Fn(u64) -> f64) -> f64 {
+    sums::mean(&seeds.map(f).collect::<Vec<_>>())
+}
+
+/// Item 2: RMS 0.0996 to 5 % and 1/e at 3.55 m to 10 %. 24 surfaces of 400 m: by its permutation one scatters by 4 %, their mean by
+/// 0.9 %, and correlations by 0.01: false alarms below 1e-6. Catches a missing factor 4, and a wavelength of 2 m.
+#[test]
+fn stat_two_layers_have_the_rms_and_length_of_the_formula() {
+    let params = json!({"size_m": [400.0, 400.0], "cell_m": 0.5, "hi_mag_m": 0.1});
+    let found = mean_over(0..24, |seed| rms(&heights("mavs_perlin", &params, seed).values));
+    assert!((found / 0.0996 - 1.0).abs() < 0.05, "{found}");
+    let at = |lag| mean_over(0..24, |seed| correlation(&heights("mavs_perlin", &params, seed), [lag, 0]));
+    // On the line between lags of 3.5 and 4 m.
+    let (before, after) = (at(7), at(8));
+    let length = 3.5 + 0.5 * (before - 1.0 / std::f64::consts::E) / (before - after);
+    assert!((length / 3.55 - 1.0).abs() < 0.1, "{length}");
+    let short = json!({"size_m": [100.0, 100.0], "cell_m": 0.5, "hi_mag_m": 0.1, "true_wavelength": true});
+    let lag = mean_over(0..100, |seed| correlation(&heights("mavs_perlin", &short, seed), [2, 0]));
+    assert!((lag - 0.283).abs() < 0.05, "half a lattice cell of 2 m: {lag}");
+}
+
+/// Item 3: Separable field. Eight surfaces of about 2500 independent patches: standard error of the RMS 0.5 %, of correlations
+/// below 0.004; false alarms below 1e-6.
+#[test]
+fn stat_the_separable_field_has_its_covariance() {
+    for (kind, rms_key, length_key) in
+        [("ornstein_uhlenbeck", "rms_m", "correlation_length_m"), ("mavs_gaussian", "hi_mag_m", "hi_len_m")]
+    {
+        let params = json!({"size_m": [200.0, 200.0], "cell_m": 0.25, rms_key: 0.05, length_key: 2.0});
+        let fields: Vec<Grid> = (0..8).map(|seed| heights(kind, &params, seed)).collect();
+        let mean = |f: &dyn Fn(&Grid) -> f64| sums::mean(&fields.iter().map(f).collect::<Vec<_>>());
+        let found = mean(&|g| rms(&g.values));
+        assert!((found / 0.05 - 1.0).abs() < 0.05, "{found}");
+        for (lag, wanted, bound) in [
+            ([1, 0], 0.8825, 0.02),
+            ([0, 1], 0.8825, 0.02),
+            ([8, 0], 0.368, 0.06),
+            ([0, 8], 0.368, 0.06),
+            ([8, 8], 0.135, 0.06),
+        ] {
+            let found = mean(&|g| correlation(g, lag));
+            assert!((found - wanted).abs() < bound, "{lag:?}: {found}");
+        }
+    }
+}
+
+/// Item 3: The first ten columns have the variance of the last ten, over 100 strips 2 km long: standard error of the ratio 0.9 %,
+/// so that 5 % has a false alarm rate below 1e-7. Catches a start at 0.
+#[test]
+fn stat_the_separable_field_is_stationary() {
+    let params = json!({"size_px": [40, 8000], "cell_m": 0.25, "rms_m": 0.05});
+    let mut squares = [Vec::new(), Vec::new()];
+    for seed in 0..100 {
+        let strip = heights("ornstein_uhlenbeck", &params, seed);
+        for row in strip.values.chunks_exact(40) {
+            squares[0].push(row[..10].iter().map(|v| v * v).sum::<f64>());
+            squares[1].push(row[30..].iter().map(|v| v * v).sum::<f64>());
+        }
+    }
+    let ratio = sums::mean(&squares[0]) / sums::mean(&squares[1]);
+    assert!((ratio - 1.0).abs() < 0.05, "{ratio}");
+}
+
+/// Item 3: The listing, defects and all: white noise for a = 2 m; for 0.6 m correlated along j alone, and from column to column
+/// by rho^(2j + 1) in row j from the south. Standard errors 0.0013 and 0.005 (40 000 columns); bounds at 5 of them and more.
+#[test]
+fn stat_the_listing_keeps_its_defects() {
+    let params = json!({"size_m": [200.0, 200.0], "cell_m": 0.25, "hi_mag_m": 0.05, "hi_len_m": 2.0, "compat": true});
+    let white = heights("mavs_gaussian", &params, 1);
+    assert!(correlation(&white, [1, 0]).abs() < 0.01 && correlation(&white, [0, 1]).abs() < 0.01);
+    assert_eq!(white.at(white.rows() - 1, 0), 0.0);
+    let params = json!({"size_px": [40_000, 12], "cell_m": 0.25, "hi_len_m": 0.6, "compat": true});
+    let field = heights("mavs_gaussian", &params, 1);
+    assert!((correlation(&field, [0, 1]) - 0.487).abs() < 0.02);
+    for (north, wanted) in [(0, 0.487), (1, 0.115), (2, 0.027)] {
+        let row = field.window(field.rows() - 1 - north, 0, 1, field.cols());
+        let found = correlation(&row, [1, 0]);
+        assert!((found - wanted).abs() < 0.026, "{north}: {found}");
+    }
+    let notes = prepare("mavs_gaussian", &params).unwrap().notes().join(" ");
+    assert!(notes.contains("listing with its defects"), "{notes}");
+}
+
+/// The isotropic field has either covariance at lags along the axes and between them. Eight surfaces; bounds above 5 standard
+/// errors.
+#[test]
+fn stat_the_isotropic_field_has_its_covariance() {
+    for covariance in ["exponential", "gaussian"] {
+        let params = json!({"size_m": [100.0, 80.0], "cell_m": 0.25, "mode": "isotropic", "covariance": covariance});
+        let fields: Vec<Grid> = (0..8).map(|seed| heights("ornstein_uhlenbeck", &params, seed)).collect();
+        let mean = |f: &dyn Fn(&Grid) -> f64| sums::mean(&fields.iter().map(f).collect::<Vec<_>>());
+        assert!((mean(&|g| rms(&g.values)) / 0.05 - 1.0).abs() < 0.05);
+        for lag in [[1, 0], [0, 1], [4, 0], [0, 8], [6, 6], [8, 3]] {
+            let d = 0.25 * ((lag[0] * lag[0] + lag[1] * lag[1]) as f64).sqrt() / 2.0;
+            let wanted = if covariance == "gaussian" { libm::exp(-d * d) } else { libm::exp(-d) };
+            let found = mean(&|g| correlation(g, lag));
+            assert!((found - wanted).abs() < 0.05, "{covariance} {lag:?}: {found} {wanted}");
+        }
+    }
+}
+
+/// Profiles along the diagonal, as rows of a grid.
+fn diagonals(grid: &Grid) -> Grid {
+    let n = grid.rows().min(grid.cols()) / 2;
+    let geometry = Geometry::square(n, n, grid.geometry.cell[0] * 2f64.sqrt());
+    let values = (0..n).flat_map(|start| (0..n).map(move |t| grid.at(t, start + t))).collect();
+    Grid { geometry, values }
+}
+
+fn slope(grid: &Grid, direction: sastrugi_roughness::Direction) -> f64 {
+    // From the longest wave of 19.2 m to twice the shortest of 0.3 m.
+    PowerLaw::fit(&profile_spectra(&level(grid)), direction, [1.0 / 19.2, 1.0 / 0.6]).unwrap().n
+}
+
+/// Item 4: Slopes of 100 m at 0.15 m: published amplitudes give 3, ours what is asked for, along x, y and the diagonal. The mean of
+/// twelve surfaces scatters by 0.01; the rest of the bounds is the ripple of octaves.
+#[test]
+fn stat_slopes_of_the_spectra() {
+    use sastrugi_roughness::Direction::{All, X, Y};
+    let mean =
+        |kind: &str, params: &Value, f: &dyn Fn(&Grid) -> f64| mean_over(0..12, |seed| f(&heights(kind, params, seed)));
+    for compat in [true, false] {
+        let found = mean("mavs_variable", &json!({"compat": compat}), &|g| slope(g, All));
+        assert!((found - 3.0).abs() < 0.1, "{compat}: {found}");
+    }
+    for direction in [X, Y] {
+        let found = mean("van_deusen", &json!({}), &|g| slope(g, direction));
+        assert!((found - 2.0).abs() < 0.1, "{direction:?}: {found}");
+    }
+    let found = mean("van_deusen", &json!({}), &|g| slope(&diagonals(g), X));
+    assert!((found - 2.0).abs() < 0.1, "45 degrees: {found}");
+    for (exponent, lacunarity) in [(1.6, 2.0), (2.4, 2.0), (2.0, 2f64.sqrt())] {
+        let params = json!({"exponent": exponent, "lacunarity": lacunarity});
+        let found = mean("van_deusen", &params, &|g| slope(g, All));
+        assert!((found - exponent).abs() < 0.15, "{exponent}, {lacunarity}: {found}");
+    }
+}
+
+/// The constant that the notes state is that of the spectra, also under the scale and other lacunarities. The mean of six
+/// surfaces scatters by 2 %; catches the 0.028 that was measured for the specification (25 % off).
+#[test]
+fn stat_the_constant_of_the_density() {
+    for params in [
+        json!({"psd_constant": 2e-4, "modulation": false}),
+        json!({"psd_constant": 2e-4, "modulation": false, "lacunarity": 1.5}),
+        json!({"psd_constant": 2e-4, "size_px": [1600, 1600]}),
+    ] {
+        let variance = |seed| {
+            let law = PowerLaw::fit(
+                &profile_spectra(&level(&heights("van_deusen", &params, seed))),
+                sastrugi_roughness::Direction::All,
+                [1.0 / 10.0, 1.0 / 0.6],
+            );
+            law.unwrap().variance_m2([0.6, 10.0])
+        };
+        let ratio = mean_over(0..6, variance) / (2e-4 * (10.0 - 0.6));
+        assert!((ratio - 1.0).abs() < 0.1, "{params}: {ratio}");
+    }
+}
+
+fn vehicle() -> WaveBand {
+    WaveBand::of_vehicle(2.7, 0.33).unwrap()
+}
+
+fn band_rms(grid: &Grid, band: &WaveBand) -> f64 {
+    Detrended::of(grid, band, Detrender::Band).rms_m()
+}
+
+/// Item 5: A requested RMS of 0.03 m in 0.33 to 5.4 m is met exactly after the rescaling, and within 8 % by what is expected or by
+/// the constant alone (15 % are allowed; single surfaces scatter by 1.3 %).
+#[test]
+fn stat_calibration_to_a_band() {
+    for kind in ["van_deusen", "mavs_variable", "mavs_perlin", "mavs_gaussian", "ornstein_uhlenbeck"] {
+        let of_vehicle = json!({"roughness": {"wheelbase_m": 2.7, "tyre_radius_m": 0.33, "rms_m": 0.03}});
+        let exact = band_rms(&heights(kind, &of_vehicle, 1), &vehicle());
+        assert!((exact / 0.03 - 1.0).abs() < 1e-9, "{kind}: {exact}");
+    }
+    let roughness = json!({"band_m": [0.33, 5.4], "rms_m": 0.03, "scaling": "expected"});
+    for kind in ["van_deusen", "ornstein_uhlenbeck"] {
+        let mut params = json!({"roughness": roughness});
+        if kind == "van_deusen" {
+            params["modulation"] = json!(false);
+        }
+        for seed in 0..6 {
+            let found = band_rms(&heights(kind, &params, seed), &vehicle());
+            assert!((found / 0.03 - 1.0).abs() < 0.08, "{kind} {seed}: {found}");
+        }
+    }
+    let constant = 0.03 * 0.03 / (5.4 - 0.33);
+    let found = mean_over(0..6, |seed| {
+        band_rms(&heights("van_deusen", &json!({"psd_constant": constant, "modulation": false}), seed), &vehicle())
+    });
+    assert!((found / 0.03 - 1.0).abs() < 0.08, "{found}");
+}
+
+/// Item 6: Variances of bands are as their widths in wavelength.
+#[test]
+fn stat_variances_of_bands() {
+    let params = json!({"modulation": false, "lacunarity": 2f64.sqrt()});
+    let surfaces: Vec<Grid> = (0..6).map(|seed| heights("van_deusen", &params, seed)).collect();
+    let variance = |[min, max]: [f64; 2]| {
+        let band = WaveBand::new(min, max).unwrap();
+        sums::mean(&surfaces.iter().map(|g| band_rms(g, &band)).map(|r| r * r).collect::<Vec<_>>())
+    };
+    for (a, b) in [([0.33, 5.4], [0.6, 3.0]), ([0.6, 10.0], [0.33, 5.4]), ([1.0, 4.0], [2.0, 8.0])] {
+        let ratio = variance(a) / variance(b) / ((a[1] - a[0]) / (b[1] - b[0]));
+        assert!((ratio - 1.0).abs() < 0.15, "{a:?} {b:?}: {ratio}");
+    }
+}
+
+fn map<'a>(terrain: &'a Terrain, name: &str) -> &'a Grid {
+    &terrain.maps.iter().find(|m| m.name == name).unwrap().values
+}
+
+/// Item 8: The predicted roughness is the measured one, over 500 m (a pattern of 100 m).
+#[test]
+fn stat_the_maps_of_roughness_agree() {
+    let params = json!({"size_m": [500.0, 500.0], "cell_m": 0.5,
+        "roughness": {"band_m": [1.0, 5.4], "rms_m": 0.03}});
+    let terrain = made("van_deusen", &params, 3);
+    let (predicted, measured) = (map(&terrain, "rms-predicted"), map(&terrain, "rms-measured"));
+    // Every 5.4 m, away from the border.
+    let places: Vec<usize> = (0..90).flat_map(|r| (0..90).map(move |c| (50 + 10 * r) * 1000 + 50 + 10 * c)).collect();
+    let of = |grid: &Grid| -> Vec<f64> { places.iter().map(|&k| grid.values[k]).collect() };
+    let (x, y) = (of(predicted), of(measured));
+    let (mean_x, mean_y) = (sums::mean(&x), sums::mean(&y));
+    let moment = |a: &[f64], b: &[f64]| sums::mean(&a.iter().zip(b).map(|(a, b)| a * b).collect::<Vec<_>>());
+    let covariance = moment(&x, &y) - mean_x * mean_y;
+    let correlation = covariance / (rms(&x) * rms(&y));
+    assert!(correlation > 0.9, "{correlation}");
+    assert!((mean_y / mean_x - 1.0).abs() < 0.1, "{mean_y} {mean_x}");
+    let whole = made(
+        "van_deusen",
+        &json!({"size_m": [500.0, 500.0], "cell_m": 0.5, "modulation": false,
+        "roughness": {"band_m": [1.0, 5.4]}}),
+        3,
+    );
+    assert!(whole.maps.len() == 1 && whole.maps[0].name == "rms-measured");
+    // The scale itself: what the heights are of those without it.
+    let params = json!({"size_m": [500.0, 500.0], "cell_m": 0.5});
+    let scaled = heights("van_deusen", &params, 3);
+    let scales: Vec<f64> =
+        scaled.values.iter().zip(&whole.heights.values).filter(|(_, w)| w.abs() > 1e-6).map(|(s, w)| s / w).collect();
+    assert!(scales.iter().all(|s| (-1e-9..=1.0 + 1e-9).contains(s)));
+    assert!((sums::mean(&scales) - 0.5).abs() < 0.1, "{}", sums::mean(&scales));
+}
+
+/// Item 10: Four tiles of 50 m are the surface of 100 m, bit for bit.
+#[test]
+fn prop_tiles_are_the_whole() {
+    let params = |kind: &str, size: f64, origin: [f64; 2]| {
+        let mut params = json!({"size_m": [size, size], "cell_m": 0.25, "origin_m": origin});
+        if kind != "mavs_perlin" {
+            params["wavelength_max_m"] = json!(20.0);
+        } else {
+            params["lo_mag_m"] = json!(2.0);
+        }
+        params
+    };
+    for kind in ["mavs_perlin", "mavs_variable", "van_deusen"] {
+        for corner in [[0.0, 0.0], [-75.0, 1234.5]] {
+            let whole = heights(kind, &params(kind, 100.0, corner), 5);
+            for (east, north) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+                let origin = [corner[0] + 50.0 * f64::from(east), corner[1] + 50.0 * f64::from(north)];
+                let tile = heights(kind, &params(kind, 50.0, origin), 5);
+                let part = whole.window(200 * (1 - north as usize), 200 * east as usize, 200, 200);
+                assert_eq!(tile.geometry, part.geometry);
+                assert!(tile.values.iter().zip(&part.values).all(|(a, b)| a.to_bits() == b.to_bits()), "{kind}");
+            }
+        }
+    }
+    // Scaled by what is expected, tiles still join.
+    let scaled = |size: f64, origin: [f64; 2]| {
+        let mut params = params("van_deusen", size, origin);
+        params["roughness"] = json!({"band_m": [0.5, 5.4], "rms_m": 0.03, "scaling": "expected"});
+        heights("van_deusen", &params, 5)
+    };
+    let (whole, tile) = (scaled(100.0, [0.0; 2]), scaled(50.0, [50.0, 0.0]));
+    assert_eq!(whole.window(200, 200, 200, 200).values, tile.values);
+}
+
+/// Item 10: Threads change no bit, seeds change everything (a correlation of 0.05 is 4 standard errors of the shortest layers).
+#[test]
+fn prop_threads_and_seeds() {
+    let on = |threads: usize, kind: &str, params: &Value| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| made(kind, params, 1))
+    };
+    let band = json!({"band_m": [0.5, 5.4], "rms_m": 0.03});
+    for (kind, extra) in [
+        ("mavs_perlin", json!({})),
+        ("mavs_gaussian", json!({})),
+        ("mavs_variable", json!({})),
+        ("van_deusen", json!({})),
+        ("ornstein_uhlenbeck", json!({"mode": "isotropic"})),
+        ("pothole", json!({"count": 50})),
+    ] {
+        let mut params = json!({"size_m": [60.0, 40.0], "cell_m": 0.2});
+        extra.as_object().unwrap().iter().for_each(|(k, v)| params[k] = v.clone());
+        if kind != "pothole" {
+            params["roughness"] = band.clone();
+        }
+        let (one, eight) = (on(1, kind, &params), on(8, kind, &params));
+        let bits = |t: &Terrain| -> Vec<u64> {
+            let maps = t.maps.iter().flat_map(|m| &m.values.values);
+            t.heights.values.iter().chain(maps).map(|v| v.to_bits()).collect()
+        };
+        assert_eq!(bits(&one), bits(&eight), "{kind}");
+    }
+    for (kind, key, length) in [("van_deusen", "wavelength_max_m", 3.0), ("mavs_perlin", "hi_len_m", 0.5)] {
+        let params = json!({"size_m": [150.0, 150.0], "cell_m": 0.25, key: length});
+        let (a, b) = (heights(kind, &params, 1), heights(kind, &params, 2));
+        let (a, b) = (ops::without_mean(&a), ops::without_mean(&b));
+        let product = sums::mean(&ops::multiply(&a, &b).values);
+        assert!((product / (rms(&a.values) * rms(&b.values))).abs() < 0.05, "{kind}");
+    }
+}
+
+/// Item 12: What is refused, by the parameter that is named.
+#[test]
+fn val_impossible_parameters_are_refused() {
+    let refused = |kind: &str, params: Value| -> ParameterError { prepare(kind, &params).err().expect(kind) };
+    let key = |kind: &str, params: Value| refused(kind, params).key;
+    let kinds = [
+        "mavs_perlin",
+        "mavs_gaussian",
+        "mavs_variable",
+        "van_deusen",
+        "ornstein_uhlenbeck",
+        "gap",
+        "pothole",
+        "mavs_profile",
+    ];
+    for kind in kinds {
+        for bad in [json!(0.0), json!(-1.0)] {
+            assert_eq!(key(kind, json!({"cell_m": bad})), "cell_m");
+            assert_eq!(key(kind, json!({"size_m": [bad, 50.0]})), "size_m");
+        }
+        assert_eq!(key(kind, json!({"size_px": [40_000, 40_000]})), "size_px");
+    }
+    for kind in &kinds[..5] {
+        let roughness = |value: Value| key(kind, json!({"roughness": value}));
+        assert_eq!(roughness(json!({"rms_m": 0.03})), "roughness.rms_m");
+        assert_eq!(roughness(json!({"rms_m": -0.03, "band_m": [0.33, 5.4]})), "roughness.rms_m");
+        assert_eq!(roughness(json!({"band_m": [5.4, 0.33]})), "roughness.band_m");
+        assert_eq!(roughness(json!({"band_m": [0.0, 5.4]})), "roughness.band_m");
+        assert_eq!(roughness(json!({"band_m": [0.2, 5.4]})), "roughness.band_m");
+        assert_eq!(roughness(json!({"band_m": [0.33, 30.0]})), "roughness.band_m");
+        assert_eq!(roughness(json!({"band_m": [0.33, 5.4], "wheelbase_m": 2.7})), "roughness.band_m");
+        assert_eq!(roughness(json!({"wheelbase_m": 2.7})), "roughness.tyre_radius_m");
+        assert_eq!(roughness(json!({"tyre_radius_m": 0.33})), "roughness.wheelbase_m");
+        assert_eq!(roughness(json!({"wheelbase_m": -2.7, "tyre_radius_m": 0.33})), "roughness.wheelbase_m");
+        assert_eq!(roughness(json!({"wheelbase_m": 2.7, "tyre_radius_m": 0.0})), "roughness.wheelbase_m");
+        assert_eq!(roughness(json!({"wheelbase_m": 2.7, "tyre_radius_m": 0.29})), "roughness.wheelbase_m");
+        let coarse = json!({"roughness": {"wheelbase_m": 2.7, "tyre_radius_m": 0.29, "allow_coarse": true}});
+        assert!(made(kind, &coarse, 1).notes.iter().any(|n| n.contains("not all there")), "{kind}");
+        assert_eq!(key(kind, json!({"origin_m": [0.1, 0.0]})), "origin_m");
+    }
+    for (kind, name, bad) in [
+        ("mavs_perlin", "hi_mag_m", json!(-0.1)),
+        ("mavs_perlin", "hi_mag_m", json!(0.0)),
+        ("mavs_perlin", "hi_len_m", json!(0.0)),
+        ("mavs_perlin", "lo_mag_m", json!(-0.1)),
+        ("mavs_perlin", "lo_len_m", json!(0.0)),
+        ("mavs_gaussian", "hi_mag_m", json!(0.0)),
+        ("mavs_gaussian", "hi_len_m", json!(0.1)),
+        ("mavs_gaussian", "lo_mag_m", json!(-1.0)),
+        ("mavs_variable", "hi_mag_m", json!(0.0)),
+        ("mavs_variable", "hi_mag_m", json!(-0.1)),
+        ("mavs_variable", "wavelength_max_m", json!(0.2)),
+        ("van_deusen", "psd_constant", json!(0.0)),
+        ("van_deusen", "psd_constant", json!(-1e-4)),
+        ("van_deusen", "exponent", json!(3.0)),
+        ("van_deusen", "exponent", json!(1.0)),
+        ("van_deusen", "lacunarity", json!(1.0)),
+        ("van_deusen", "lacunarity", json!(1.0001)),
+        ("van_deusen", "lacunarity", json!(5.0)),
+        ("van_deusen", "hi_mag_m", json!(0.0)),
+        ("ornstein_uhlenbeck", "correlation_length_m", json!(0.1)),
+        ("ornstein_uhlenbeck", "rms_m", json!(0.0)),
+        ("ornstein_uhlenbeck", "covariance", json!("gaussian")),
+        ("gap", "depth_m", json!(0.0)),
+        ("gap", "width_m", json!(0.1)),
+        ("gap", "width_m", json!(500.0)),
+        ("gap", "wall_angle_deg", json!(90.0)),
+        ("gap", "wall_angle_deg", json!(-1.0)),
+        ("gap", "edge_m", json!(1000.0)),
+        ("pothole", "diameter_m", json!(0.4)),
+        ("pothole", "depth_m", json!(0.0)),
+        ("pothole", "count", json!(0)),
+        ("pothole", "places_m", json!([[1000.0, 0.0]])),
+        ("mavs_profile", "rms_m", json!(0.0)),
+        ("mavs_profile", "correlation_length_m", json!(0.1)),
+    ] {
+        let mut params = json!({});
+        params[name] = bad.clone();
+        assert_eq!(key(kind, params), name, "{kind} {name} {bad}");
+    }
+    // Too few cells for one octave; a magnitude that octaves ignore; a cell beyond twice the length in the listing.
+    for kind in ["mavs_variable", "van_deusen"] {
+        assert_eq!(key(kind, json!({"size_m": [2.0, 2.0], "cell_m": 0.3})), "cell_m");
+        assert!(refused(kind, json!({"lo_mag_m": 1.0})).to_string().contains("lo_mag_m"));
+    }
+    assert_eq!(key("mavs_gaussian", json!({"compat": true, "hi_len_m": 0.07})), "cell_m");
+    assert_eq!(key("van_deusen", json!({"hi_mag_m": 0.1, "psd_constant": 1e-4})), "psd_constant");
+    assert!(refused("mavs", json!({})).message.contains("van_deusen"));
+}
+
+/// The listing takes a smaller cell without a word; ours says so.
+#[test]
+fn val_the_listing_replaces_large_cells() {
+    let params = json!({"size_m": [10.0, 10.0], "cell_m": 2.5, "hi_len_m": 1.3, "compat": true});
+    let generator = prepare("mavs_gaussian", &params).unwrap();
+    assert_eq!((generator.geometry().cell[0], generator.geometry().cols), (2.5, 4));
+    let params = json!({"size_m": [15.0, 15.0], "cell_m": 3.0, "hi_len_m": 1.5, "compat": true});
+    let generator = prepare("mavs_gaussian", &params).unwrap();
+    assert_eq!((generator.geometry().cell[0], generator.geometry().cols), (2.5, 6));
+    assert!(generator.notes().join(" ").contains("replaced by 2.5 m"));
+}
+
+/// In the listings both layers, or all octaves, are 0 in the corner of the surface and share one noise.
+#[test]
+fn val_shared_noise_is_flat_in_the_corner() {
+    let params = json!({"size_px": [40, 40], "cell_m": 0.01, "compat": true, "origin_m": [100.0, 0.0]});
+    let near = heights("mavs_perlin", &params, 3).at(39, 0).abs();
+    assert!(near < 0.01 * 0.05, "{near}");
+    let elsewhere = json!({"size_px": [40, 40], "cell_m": 0.01, "compat": true});
+    assert_eq!(heights("mavs_perlin", &params, 3).values, heights("mavs_perlin", &elsewhere, 3).values);
+}
+
+/// Walls, floor and level ground, by hand.
+#[test]
+fn val_a_gap_has_its_profile() {
+    let params = json!({"size_m": [4.0, 1.0], "cell_m": 0.1, "depth_m": 0.5, "width_m": 1.0, "wall_angle_deg": 45.0, "edge_m": 1.0});
+    let gap = heights("gap", &params, 1);
+    for (col, wanted) in
+        [(0, 0.0), (9, 0.0), (10, -0.05), (14, -0.45), (15, -0.5), (24, -0.5), (25, -0.45), (29, -0.05), (30, 0.0)]
+    {
+        for row in [0, 9] {
+            assert!((gap.at(row, col) - wanted).abs() < 1e-12, "{col}: {}", gap.at(row, col));
+        }
+    }
+    let upright =
+        heights("gap", &json!({"size_m": [4.0, 1.0], "cell_m": 0.1, "wall_angle_deg": 0.0, "hi_mag_m": 0.01}), 1);
+    assert!(upright.range().unwrap().0 < -0.29 && upright.values[0].abs() <= 0.01);
+}
+
+/// Depth within a tenth, a level edge within half the diameter and a tenth, nothing beyond.
+#[test]
+fn val_a_pothole_has_its_profile() {
+    let params =
+        json!({"size_m": [4.1, 4.1], "cell_m": 0.1, "diameter_m": 2.0, "depth_m": 0.2, "places_m": [[2.05, 2.05]]});
+    let hole = heights("pothole", &params, 1);
+    let depth = -hole.at(20, 20);
+    assert!((0.18..=0.22).contains(&depth), "{depth}");
+    let at = |cells: usize| -hole.at(20, 20 + cells);
+    assert!(at(12) == 0.0 && at(8) > 0.0 && (at(5) / depth - 0.5).abs() < 0.1, "{}", at(5) / depth);
+    assert!((at(5) - -hole.at(25, 20)).abs() < 1e-12);
+}
+
+/// Standard deviation s and 1/e at twice the filter's length; the same for every y. 40 profiles of 200 lengths: standard error
+/// 1 %.
+#[test]
+fn stat_a_profile_has_its_covariance() {
+    let params = json!({"size_px": [4000, 3], "cell_m": 0.1, "rms_m": 0.04, "correlation_length_m": 1.0});
+    let profiles: Vec<Grid> = (0..40).map(|seed| heights("mavs_profile", &params, seed)).collect();
+    let squares: Vec<f64> = profiles.iter().flat_map(|g| g.row(0).iter().map(|z| z * z)).collect();
+    assert!((sums::mean(&squares).sqrt() / 0.04 - 1.0).abs() < 0.05);
+    let lag = sums::mean(&profiles.iter().map(|g| correlation(g, [20, 0])).collect::<Vec<_>>());
+    assert!((lag - 0.368).abs() < 0.05, "{lag}");
+    assert!(profiles.iter().all(|g| g.row(0) == g.row(2)));
+}
