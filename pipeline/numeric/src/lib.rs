@@ -13,6 +13,7 @@
 //! the CPU's, number by number with the operations of the narrow ones. Work is spread over threads only where each output element is computed by one task from inputs
 //! that are already complete, so that the number of threads changes no bit.
 
+pub mod counter;
 pub mod fft;
 pub mod filters;
 pub mod grid;
@@ -24,6 +25,7 @@ pub mod sums;
 pub mod surface;
 pub mod turns;
 
+pub use counter::{Counter, Poisson};
 pub use grid::{Geometry, Grid};
 pub use streams::{Stream, Streams};
 pub use surface::Surface;
