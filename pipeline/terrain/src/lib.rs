@@ -9,6 +9,7 @@ pub mod compose;
 pub mod generator;
 pub mod mavs;
 pub mod multifractal;
+pub mod planetary;
 pub mod registry;
 pub mod size;
 pub mod spheroids;

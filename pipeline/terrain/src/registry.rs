@@ -11,6 +11,7 @@ use crate::mavs::pothole::{Pothole, RawPothole};
 use crate::mavs::profile::{Profile, RawProfile};
 use crate::mavs::two_layers::{RawTwoLayers, TwoLayers};
 use crate::multifractal::{Multifractal, RawMultifractal};
+use crate::planetary::{Planetary, RawPlanetary};
 use crate::spheroids::{RawSpheroids, Spheroids};
 use crate::weierstrass_mandelbrot::{RawWeierstrassMandelbrot, WeierstrassMandelbrot};
 use sastrugi_schemas::kind::{read_parameters, schema_of};
@@ -120,6 +121,13 @@ const ENTRIES: &[Entry] = &[
         source: "MAVS profile_2d.cpp",
         parameters: schema_of::<RawProfile>,
         prepare: prepare_as::<RawProfile, Profile>,
+    },
+    Entry {
+        kind: crate::planetary::KIND,
+        summary: "a patch of a world of texture, craters, rocks and dust: the same bits at any place and zoom",
+        source: "JPL synthetic terrain environment, section 2; Golombek and Rapp (1997)",
+        parameters: schema_of::<RawPlanetary>,
+        prepare: prepare_as::<RawPlanetary, Planetary>,
     },
 ];
 

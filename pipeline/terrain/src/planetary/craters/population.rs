@@ -1,0 +1,299 @@
+//! Where and when craters strike.
+
+use super::shape::{EJECTA_RADII, Profile};
+use crate::planetary::levels::{RADIUS_SHARE, SizeRange, Window, size_ranges, spacing};
+use sastrugi_numeric::{Counter, Poisson};
+use std::cell::RefCell;
+use std::cmp::Ordering;
+use std::collections::HashMap;
+use std::f64::consts::TAU;
+use std::rc::Rc;
+
+/// Words below a crater's place.
+const DIAMETER: i64 = 0;
+const ALONG: i64 = 1;
+const ACROSS: i64 = 2;
+const TIME: i64 = 3;
+const TEXTURE: i64 = 4;
+
+/// What tells craters of one time apart: process, bin, diamond, number, and number among the secondaries of a primary.
+pub type Place = (usize, u32, i64, i64, i64, i64);
+
+/// One crater.
+#[derive(Clone, Copy, Debug)]
+pub struct Crater {
+    /// When it struck, in 0 to 1; ties go by place.
+    pub time: f64,
+    /// Which it is.
+    pub place: Place,
+    /// Centre, lattice units.
+    pub centre: [f64; 2],
+    /// Radius, lattice units.
+    pub radius: f64,
+    /// Diameter, m.
+    pub diameter_m: f64,
+    /// Key of the texture of its floor.
+    pub texture: Counter,
+    /// What its process says of all its craters.
+    pub style: Style,
+}
+
+/// What the craters of a process have in common.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Style {
+    /// Depth over diameter of small craters.
+    pub depth_ratio: f64,
+    /// Whether depths count from the surface instead of the rim.
+    pub below_datum: bool,
+    /// Roughness of new floors over that of the surface.
+    pub floor_roughness: f64,
+}
+
+impl Crater {
+    /// Height above what it struck.
+    pub fn profile(&self) -> Profile {
+        Profile::new(self.diameter_m, self.style.depth_ratio, self.style.below_datum)
+    }
+
+    /// Earlier before later.
+    pub fn order(&self, other: &Self) -> Ordering {
+        self.time.total_cmp(&other.time).then_with(|| self.place.cmp(&other.place))
+    }
+}
+
+/// What is looked at: points, and how far around them everything counts, lattice units.
+#[derive(Clone, Copy)]
+pub struct Near<'a> {
+    /// The points.
+    pub window: &'a Window,
+    /// Beyond the craters' own reach.
+    pub margin: f64,
+}
+
+impl Near<'_> {
+    /// Whether a point may lie within `reach` of a centre.
+    pub fn touches(&self, centre: [f64; 2], reach: f64) -> bool {
+        self.window.part(centre, reach + self.margin).is_some()
+    }
+}
+
+/// Secondaries of primaries that were met before.
+pub type Families = RefCell<HashMap<Place, Rc<[Crater]>>>;
+
+/// A set of craters that can be asked for those near a place.
+pub trait Population: Send + Sync {
+    /// Adds every crater wider than `diameter_min_m` whose ejecta may reach a point that is looked at.
+    fn find(&self, near: &Near<'_>, diameter_min_m: f64, families: &Families, found: &mut Vec<Crater>);
+
+    /// Adds to the expected number of craters that [`Self::find`] draws.
+    fn expected(&self, near: &Near<'_>) -> f64;
+}
+
+/// Craters of one range of diameters, a factor of 2 or less.
+#[derive(Clone, Debug)]
+struct Bin {
+    /// Binary logarithm of the grid spacing whose diamonds hold them.
+    zoom: u32,
+    /// Diameters to the power of -A: of the smallest, and less that of the largest.
+    power: [f64; 2],
+    diameter_max_m: f64,
+    mean: f64,
+    per_diamond: Poisson,
+}
+
+/// Craters by a power law: `N(>D) = density D^-A` per square metre between two diameters.
+#[derive(Clone, Debug)]
+pub struct PowerLaw {
+    counter: Counter,
+    process: usize,
+    exponent: f64,
+    style: Style,
+    spacing_m: f64,
+    bins: Vec<Bin>,
+}
+
+/// Parameters of a power law.
+#[derive(Clone, Copy, Debug)]
+pub struct PowerLawParameters {
+    /// `density`, m^(A - 2).
+    pub density: f64,
+    /// A.
+    pub exponent: f64,
+    /// Smallest and largest diameter, m.
+    pub diameters_m: [f64; 2],
+    /// Shape.
+    pub style: Style,
+}
+
+impl PowerLawParameters {
+    /// Craters per square metre wider than `diameter_m`.
+    fn above(&self, diameter_m: f64) -> f64 {
+        self.density * libm::pow(diameter_m, -self.exponent)
+    }
+
+    fn bins(&self, spacing_m: f64) -> Vec<Bin> {
+        let bin = |range: SizeRange| {
+            let [from, to] = range.diameters_m;
+            let mean = range.diamond_m2 * (self.above(from) - self.above(to));
+            let power = libm::pow(from, -self.exponent);
+            let power = [power, power - libm::pow(to, -self.exponent)];
+            Bin { zoom: range.zoom, power, diameter_max_m: to, mean, per_diamond: Poisson::new(mean) }
+        };
+        size_ranges(self.diameters_m, spacing_m).map(bin).collect()
+    }
+
+    /// The largest mean number of craters in a diamond.
+    pub fn mean_max(&self, spacing_m: f64) -> f64 {
+        self.bins(spacing_m).iter().fold(0.0, |most, bin| f64::max(most, bin.mean))
+    }
+}
+
+impl PowerLaw {
+    /// The craters of process number `process` on a lattice.
+    pub fn new(parameters: &PowerLawParameters, process: usize, spacing_m: f64, counter: Counter) -> Self {
+        let bins = parameters.bins(spacing_m);
+        let PowerLawParameters { exponent, style, .. } = *parameters;
+        Self { counter, process, exponent, style, spacing_m, bins }
+    }
+
+    /// How far from the centre of a bin's diamond something of `radii` radii can reach, lattice units.
+    fn reach(bin: &Bin, radii: f64, near: &Near<'_>) -> f64 {
+        (1.0 + RADIUS_SHARE * radii) * spacing(bin.zoom) + near.margin
+    }
+
+    /// Calls `f` for every crater wider than `diameter_min_m` that may reach a point that is looked at over `radii` radii.
+    fn visit(&self, near: &Near<'_>, radii: f64, diameter_min_m: f64, mut f: impl FnMut(Crater)) {
+        for bin in self.bins.iter().filter(|bin| bin.diameter_max_m > diameter_min_m) {
+            near.window.visit_diamonds(bin.zoom, Self::reach(bin, radii, near), |i, j| {
+                let diamond = self.counter.at(j).at(i);
+                for n in 0..i64::from(bin.per_diamond.count(diamond.uniform())) {
+                    let crater = self.crater(bin, [i, j], n, diamond.at(n));
+                    if crater.diameter_m > diameter_min_m && near.touches(crater.centre, radii * crater.radius) {
+                        f(crater);
+                    }
+                }
+            });
+        }
+    }
+
+    fn crater(&self, bin: &Bin, [i, j]: [i64; 2], n: i64, own: Counter) -> Crater {
+        let [low, span] = bin.power;
+        let diameter_m = libm::pow(low - own.at(DIAMETER).uniform() * span, -1.0 / self.exponent);
+        let [s, t] = [ALONG, ACROSS].map(|word| (own.at(word).uniform() - 0.5) * spacing(bin.zoom));
+        Crater {
+            time: own.at(TIME).uniform(),
+            place: (self.process, bin.zoom, j, i, n, 0),
+            centre: [i as f64 + (s + t), j as f64 + (s - t)],
+            radius: 0.5 * diameter_m / self.spacing_m,
+            diameter_m,
+            texture: own.at(TEXTURE),
+            style: self.style,
+        }
+    }
+
+    /// Expected number of craters drawn to find those that reach over `radii` radii.
+    fn expected(&self, near: &Near<'_>, radii: f64, diameter_min_m: f64) -> f64 {
+        let wide = self.bins.iter().filter(|bin| bin.diameter_max_m > diameter_min_m);
+        wide.map(|bin| (1.0 + bin.mean) * near.window.diamonds(bin.zoom, Self::reach(bin, radii, near))).sum()
+    }
+}
+
+impl Population for PowerLaw {
+    fn find(&self, near: &Near<'_>, diameter_min_m: f64, _families: &Families, found: &mut Vec<Crater>) {
+        self.visit(near, EJECTA_RADII, diameter_min_m, |crater| found.push(crater));
+    }
+
+    fn expected(&self, near: &Near<'_>) -> f64 {
+        self.expected(near, EJECTA_RADII, 0.0)
+    }
+}
+
+/// Secondaries around the larger craters of a power law: as many to each, at the time of their primary.
+#[derive(Clone, Debug)]
+pub struct Secondaries {
+    /// The primaries.
+    pub primaries: PowerLaw,
+    /// Their own process.
+    pub process: usize,
+    /// Key of their draws.
+    pub counter: Counter,
+    /// Parameters.
+    pub parameters: SecondaryParameters,
+}
+
+/// Parameters of secondaries around primaries.
+#[derive(Clone, Copy, Debug)]
+pub struct SecondaryParameters {
+    /// Smallest primary with secondaries, m.
+    pub primary_min_m: f64,
+    /// Secondaries of each primary.
+    pub count: u32,
+    /// Largest secondary over its primary.
+    pub largest_ratio: f64,
+    /// Smallest over largest secondary.
+    pub smallest_share: f64,
+    /// A of their diameters.
+    pub exponent: f64,
+    /// Nearest and farthest secondary, radii of the primary.
+    pub ring_radii: [f64; 2],
+    /// Shape.
+    pub style: Style,
+}
+
+impl SecondaryParameters {
+    /// Reach of secondaries and their ejecta, radii of the primary.
+    fn reach_radii(&self) -> f64 {
+        self.ring_radii[1] + EJECTA_RADII * self.largest_ratio
+    }
+}
+
+impl Secondaries {
+    /// All secondaries of a primary.
+    fn family(&self, primary: &Crater) -> Rc<[Crater]> {
+        let (_, bin, j, i, n, _) = primary.place;
+        let root = self.counter.at(i64::from(bin)).at(j).at(i).at(n);
+        (0..i64::from(self.parameters.count)).map(|m| self.secondary(primary, m, root.at(m))).collect()
+    }
+
+    fn secondary(&self, primary: &Crater, m: i64, own: Counter) -> Crater {
+        let p = &self.parameters;
+        let largest_m = p.largest_ratio * primary.diameter_m;
+        // D^-A, over that of the largest.
+        let power = libm::pow(p.smallest_share, -p.exponent);
+        let diameter_m = largest_m * libm::pow(power - own.at(DIAMETER).uniform() * (power - 1.0), -1.0 / p.exponent);
+        // Density r^-2 over a ring: log r is uniform.
+        let [near, far] = p.ring_radii;
+        let distance = primary.radius * near * libm::pow(far / near, own.at(ALONG).uniform());
+        let (sin, cos) = libm::sincos(TAU * own.at(ACROSS).uniform());
+        let (_, bin, j, i, n, _) = primary.place;
+        Crater {
+            time: primary.time,
+            place: (self.process, bin, j, i, n, m),
+            centre: [primary.centre[0] + distance * cos, primary.centre[1] + distance * sin],
+            radius: 0.5 * diameter_m / self.primaries.spacing_m,
+            diameter_m,
+            texture: own.at(TEXTURE),
+            style: p.style,
+        }
+    }
+}
+
+impl Population for Secondaries {
+    fn find(&self, near: &Near<'_>, diameter_min_m: f64, families: &Families, found: &mut Vec<Crater>) {
+        let p = &self.parameters;
+        let parent_min_m = p.primary_min_m.max(diameter_min_m / p.largest_ratio);
+        self.primaries.visit(near, p.reach_radii(), parent_min_m, |primary| {
+            let (_, bin, j, i, n, _) = primary.place;
+            let key = (self.process, bin, j, i, n, 0);
+            let family = families.borrow_mut().entry(key).or_insert_with(|| self.family(&primary)).clone();
+            let reaching =
+                |c: &&Crater| c.diameter_m > diameter_min_m && near.touches(c.centre, EJECTA_RADII * c.radius);
+            found.extend(family.iter().filter(reaching));
+        });
+    }
+
+    fn expected(&self, near: &Near<'_>) -> f64 {
+        let p = &self.parameters;
+        self.primaries.expected(near, p.reach_radii(), p.primary_min_m) * f64::from(p.count)
+    }
+}

@@ -1,0 +1,157 @@
+//! Planetary surfaces after JPL's synthetic terrain environment: any patch of a world, at any resolution, without making the world.
+//!
+//! # What
+//! A world is a lattice of points, a basic spacing apart, and an ordered list of processes: `base_slope`, `texture`,
+//! `primary_craters`, `secondary_craters`, `rocks`, `albedo`, `dust` (one module each says what it does). Every sample is a pure
+//! function of the world and of its lattice point. Patches of twice the spacing hold every second sample of the finer ones,
+//! overlapping patches agree, bit by bit.
+//!
+//! # Where the samples lie
+//! Samples are values at points, never averages over cells. A patch of distance `cell_m` = basic spacing times `2^k` has its
+//! south-west sample at `origin_m`, its others `cell_m` apart. A grid puts a sample at the centre of its cell: its south-west corner
+//! is therefore half a cell south-west of `origin_m`, and the cells of zoom k + 1 are centred on every second sample of zoom k.
+//!
+//! # Source
+//! The paper in `docs/papers/jpl.md`, after Gaskell's surface simulations; rocks after Golombek and Rapp (1997). What the paper
+//! leaves open, and where we differ, stands there.
+//!
+//! # Order
+//! Ground-shaping processes act in the order of the list. Craters of neighbouring crater processes strike in one order of time.
+//! Rocks set their potential at their place in the list; craters below them in the list clear it and strew rocks; they are
+//! set on the finished ground. Albedo and dust may stand anywhere.
+//!
+//! # Cost and memory
+//! A patch costs what its own points and the craters and rocks that reach them cost, plus some tens of points a level: see
+//! `benches/benches/planetary.rs`. Patches are made in tiles of 256 x 256 samples, each by one task with working memory of its
+//! own, and with its own account of craters: a wide crater that reaches many tiles is looked at by each. Working memory does not
+//! depend on the size of the world.
+//!
+//! # When not to use it
+//! Coarse patches hold point values: a coarse sample is as rough as a fine one, and may stand on a rock. For means over cells make the
+//! fine patch and average it.
+
+mod assemble;
+mod craters;
+pub mod levels;
+mod params;
+mod processes;
+mod rocks;
+#[cfg(test)]
+mod tests;
+mod texture;
+mod world;
+
+pub use levels::Window;
+pub use params::{Planetary, RawPlanetary};
+pub use processes::RawProcess;
+pub use rocks::law::Law;
+pub use world::{Patch, ROCK, SAND, World};
+
+use crate::generator::{Generator, Map, Terrain, TerrainError};
+use rayon::prelude::*;
+use sastrugi_numeric::{Geometry, Grid, Streams};
+use serde_json::Value;
+
+/// Name in the registry.
+pub const KIND: &str = "planetary";
+
+/// Samples along the side of a tile.
+const TILE: usize = 256;
+/// Working memory of a tile for a sample of it: the patch, heights on the way, and what two levels of a texture need.
+const BYTES_PER_TILE_SAMPLE: u64 = 120;
+/// Room for the craters and rocks of a tile.
+const BYTES_PER_TILE: u64 = 32 << 20;
+
+impl World {
+    /// A patch, made in tiles side by side.
+    pub fn tiled_patch(&self, window: &Window) -> Patch {
+        let tiles: Vec<(usize, usize)> =
+            (0..window.rows).step_by(TILE).flat_map(|r| (0..window.cols).step_by(TILE).map(move |c| (r, c))).collect();
+        let made: Vec<Patch> = tiles
+            .par_iter()
+            .map(|&(row, col)| {
+                let (rows, cols) = (TILE.min(window.rows - row), TILE.min(window.cols - col));
+                let (west, south) = (window.west + col as i64, window.south + row as i64);
+                self.patch(&Window { zoom: window.zoom, west, south, cols, rows })
+            })
+            .collect();
+        let field = |of: fn(&Patch) -> &[f64]| joined(window, &made, of, 0.0);
+        Patch {
+            window: *window,
+            heights: field(|p| &p.heights),
+            albedo: field(|p| &p.albedo),
+            class: joined(window, &made, |p| &p.class, SAND),
+            rock_potential: field(|p| &p.rock_potential),
+        }
+    }
+}
+
+/// The values of tiles in those of the window that they make up.
+fn joined<T: Copy>(window: &Window, tiles: &[Patch], of: fn(&Patch) -> &[T], empty: T) -> Vec<T> {
+    let mut all = vec![empty; window.len()];
+    for tile in tiles {
+        let (col, row) = ((tile.window.west - window.west) as usize, (tile.window.south - window.south) as usize);
+        for (r, line) in of(tile).chunks_exact(tile.window.cols).enumerate() {
+            let from = (row + r) * window.cols + col;
+            all[from..from + line.len()].copy_from_slice(line);
+        }
+    }
+    all
+}
+
+/// Peak memory of making a patch and of its grids, bytes.
+pub(crate) fn memory_bytes(window: &Window) -> u64 {
+    let samples = window.len() as u64;
+    let tiles = (window.cols.div_ceil(TILE) * window.rows.div_ceil(TILE)) as u64;
+    // Four fields of the patch beside those of its tiles or its grids; no more than 64 tiles are at work at once.
+    8 * 8 * samples + tiles.min(64) * (BYTES_PER_TILE_SAMPLE * (TILE * TILE) as u64 + BYTES_PER_TILE)
+}
+
+/// A grid with row 0 in the north from values with row 0 in the south.
+pub(crate) fn to_grid<T: Copy + Into<f64>>(geometry: Geometry, values: &[T]) -> Grid {
+    Grid::new(geometry, values.chunks_exact(geometry.cols).rev().flatten().map(|&v| v.into()).collect())
+}
+
+/// The maps that a world has beside its heights.
+pub(crate) fn maps(world: &World, geometry: Geometry, patch: &Patch) -> Vec<Map> {
+    let mut maps = Vec::new();
+    if world.rocks.is_some() {
+        maps.push(Map { name: "class", unit: "0 sand, 1 rock", values: to_grid(geometry, &patch.class) });
+        maps.push(Map { name: "rock-potential", unit: "1", values: to_grid(geometry, &patch.rock_potential) });
+    }
+    if world.albedo.is_some() {
+        maps.push(Map { name: "albedo", unit: "1", values: to_grid(geometry, &patch.albedo) });
+    }
+    maps
+}
+
+impl Generator for Planetary {
+    fn kind(&self) -> &'static str {
+        KIND
+    }
+
+    fn geometry(&self) -> Geometry {
+        let half = 0.5 * self.raw.cell_m;
+        Geometry { origin: self.raw.origin_m.map(|at| at - half), ..self.size.geometry() }
+    }
+
+    fn parameters(&self) -> Value {
+        serde_json::to_value(&self.raw).unwrap_or_default()
+    }
+
+    fn memory_bytes(&self) -> u64 {
+        memory_bytes(&self.window)
+    }
+
+    fn notes(&self) -> Vec<String> {
+        self.size.note().into_iter().collect()
+    }
+
+    fn generate(&self, streams: &Streams, _bases: &[Grid]) -> Result<Terrain, TerrainError> {
+        let world = self.world(streams);
+        let patch = world.tiled_patch(&self.window);
+        let geometry = self.geometry();
+        let maps = maps(&world, geometry, &patch);
+        Ok(Terrain { heights: to_grid(geometry, &patch.heights), maps, notes: Vec::new() })
+    }
+}

@@ -1,0 +1,153 @@
+//! Parameters of the planetary surface.
+
+use super::assemble;
+use super::levels::{Window, spacing};
+use super::processes::{self, RawAlbedo, RawPrimaryCraters, RawProcess, RawRocks, RawTexture};
+use super::world::World;
+use crate::size::Size;
+use sastrugi_numeric::Streams;
+use sastrugi_schemas::ParameterError;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Coarsest basic spacing that is chosen unasked, m.
+const SPACING_MAX_M: f64 = 0.0125;
+/// Samples of a patch when no size is given.
+const DEFAULT_SIZE_PX: [u32; 2] = [512, 512];
+/// Largest K.
+const ANCHOR_LEVEL_MAX: u32 = 40;
+/// Lattice points are counted up to here, so that they are whole numbers in double precision.
+const LATTICE_MAX: f64 = (1u64 << 52) as f64;
+/// A quotient this near to a whole number is that number.
+const WHOLE_TOLERANCE: f64 = 1e-6;
+/// Most craters and rocks that making a surface may have to look at.
+const OBJECTS_MAX: f64 = (1u64 << 28) as f64;
+
+/// Planetary surface.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct RawPlanetary {
+    /// Size east and north, m; in place of `size_px`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub size_m: Option<[f64; 2]>,
+    /// Samples east and north; 512 x 512 when no size is given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub size_px: Option<[u32; 2]>,
+    /// Distance of the samples, m: the basic spacing times a power of 2 (the paper's rovers: 0.02).
+    pub cell_m: f64,
+    /// Distance of the lattice points, m (the paper: a few millimetres to 0.01). Part of the world: other spacings are other worlds.
+    /// When absent, `cell_m` over the power of 2 that makes it at most 0.0125 m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub basic_spacing_m: Option<f64>,
+    /// K: the coarsest points of the texture are 2^K basic spacings apart, at most 40 (our choice: 20).
+    pub anchor_level: u32,
+    /// Place of the south-west sample in the world, m: whole numbers of cells.
+    pub origin_m: [f64; 2],
+    /// What shapes the surface, in order: tables with a `kind` of `base_slope`, `texture`, `primary_craters`, `secondary_craters`,
+    /// `rocks`, `albedo`, `dust`.
+    pub processes: Vec<RawProcess>,
+}
+
+impl Default for RawPlanetary {
+    fn default() -> Self {
+        let processes = vec![
+            RawProcess::Texture(RawTexture::default()),
+            RawProcess::Rocks(RawRocks::default()),
+            RawProcess::PrimaryCraters(RawPrimaryCraters::default()),
+            RawProcess::Albedo(RawAlbedo::default()),
+        ];
+        Self {
+            size_m: None,
+            size_px: None,
+            cell_m: 0.02,
+            basic_spacing_m: None,
+            anchor_level: 20,
+            origin_m: [0.0; 2],
+            processes,
+        }
+    }
+}
+
+/// Checked parameters of a planetary surface.
+#[derive(Clone, Debug)]
+pub struct Planetary {
+    pub(super) raw: RawPlanetary,
+    pub(super) size: Size,
+    pub(super) spacing_m: f64,
+    pub(super) window: Window,
+}
+
+impl TryFrom<RawPlanetary> for Planetary {
+    type Error = ParameterError;
+
+    fn try_from(raw: RawPlanetary) -> Result<Self, ParameterError> {
+        let size = Size::check(raw.size_m, raw.size_px, raw.cell_m, DEFAULT_SIZE_PX)?;
+        let (spacing_m, zoom) = lattice(raw.basic_spacing_m, raw.cell_m)?;
+        if raw.anchor_level > ANCHOR_LEVEL_MAX {
+            let message = format!("is {}; it must be at most {ANCHOR_LEVEL_MAX}", raw.anchor_level);
+            return Err(ParameterError::new("anchor_level", message));
+        }
+        processes::check(&raw.processes, spacing_m)?;
+        let [west, south] = raw.origin_m.map(|at| column(at, raw.cell_m));
+        let window = Window { zoom, west: west?, south: south?, cols: size.cols(), rows: size.rows() };
+        let raw = RawPlanetary { size_m: None, size_px: Some(size.px), basic_spacing_m: Some(spacing_m), ..raw };
+        let planetary = Self { raw, size, spacing_m, window };
+        within_reach(&planetary.world(&Streams::for_seed(0, "terrain")), &window)?;
+        Ok(planetary)
+    }
+}
+
+impl Planetary {
+    /// The world that the patch is part of.
+    pub fn world(&self, streams: &Streams) -> World {
+        assemble::world(&self.raw.processes, self.spacing_m, self.raw.anchor_level, streams)
+    }
+}
+
+/// Basic spacing, and how many times it is doubled to the distance of the samples.
+pub fn lattice(basic_spacing_m: Option<f64>, cell_m: f64) -> Result<(f64, u32), ParameterError> {
+    let Some(asked_m) = basic_spacing_m else {
+        let zoom = (0..62).find(|k| cell_m / spacing(*k) <= SPACING_MAX_M).unwrap_or(0);
+        return Ok((cell_m / spacing(zoom), zoom));
+    };
+    ParameterError::positive("basic_spacing_m", asked_m)?;
+    let ratio = cell_m / asked_m;
+    match (0..40).find(|k| (ratio / spacing(*k) - 1.0).abs() < WHOLE_TOLERANCE) {
+        Some(zoom) => Ok((asked_m, zoom)),
+        None => {
+            let message = format!("is {cell_m} m, {ratio} times the basic spacing; it must be 1, 2, 4, 8 ... times");
+            Err(ParameterError::new("cell_m", message))
+        }
+    }
+}
+
+/// Which column or row of samples lies at a place.
+fn column(at_m: f64, cell_m: f64) -> Result<i64, ParameterError> {
+    let quotient = at_m / cell_m;
+    if !quotient.is_finite() || quotient.abs() > LATTICE_MAX {
+        return Err(ParameterError::new("origin_m", format!("holds {at_m} m; the world ends at 2^52 basic spacings")));
+    }
+    if (quotient - quotient.round()).abs() > WHOLE_TOLERANCE * quotient.abs().max(1.0) {
+        let nearest_m = quotient.round() * cell_m;
+        let message = format!("holds {at_m} m, no whole number of cells of {cell_m} m; the nearest is {nearest_m} m");
+        return Err(ParameterError::new("origin_m", message));
+    }
+    Ok(quotient.round() as i64)
+}
+
+/// Whether a window lies in the world and does not take too much work.
+pub fn within_reach(world: &World, window: &Window) -> Result<(), ParameterError> {
+    let ends = [window.x(0), window.y(0), window.x(window.cols), window.y(window.rows)];
+    if ends.iter().any(|end| end.abs() > LATTICE_MAX) {
+        return Err(ParameterError::new("origin_m", "leads out of the world, which ends at 2^52 basic spacings"));
+    }
+    let objects = world.expected_objects(window);
+    if objects <= OBJECTS_MAX {
+        return Ok(());
+    }
+    let message = format!(
+        "stand for {objects:.1e} craters and rocks that the surface would have to look at; the most is {OBJECTS_MAX:.1e}: \
+         raise their smallest diameters, or choose fewer cells"
+    );
+    Err(ParameterError::new("processes", message))
+}

@@ -1,0 +1,498 @@
+//! The processes that shape a surface: their parameters, and what of them is possible.
+
+use super::craters::population::{PowerLawParameters, SecondaryParameters, Style};
+use super::rocks::{COVERAGE_MAX, RockParameters};
+use sastrugi_numeric::counter::POISSON_MEAN_MAX;
+use sastrugi_schemas::ParameterError;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Smallest crater, basic spacings: its retained points need a spacing of a quarter of it.
+const CRATER_SPACINGS_MIN: f64 = 4.0;
+
+/// A smooth slope.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct RawBaseSlope {
+    /// Rise to the east and to the north, m per m.
+    pub gradient: [f64; 2],
+    /// Heights at the south-west, south-east, north-west and north-east corner of the square from the origin over one spacing of the
+    /// anchors, m; bilinear between them and beyond.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub corner_heights_m: Option<[f64; 4]>,
+}
+
+/// Roughness at every scale.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct RawTexture {
+    /// Standard deviation of a point about the mean of its parents 1 m away, m; 0 or above (not published; our choice).
+    pub roughness_m: f64,
+    /// Hurst exponent H, above 0 to 1: spectra of profiles fall with 2 H + 1 (not published; our choice).
+    pub hurst: f64,
+}
+
+impl Default for RawTexture {
+    fn default() -> Self {
+        Self { roughness_m: 0.02, hurst: 0.8 }
+    }
+}
+
+/// Where the depth of a crater is counted from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Datum {
+    /// From the crest of the rim.
+    Rim,
+    /// From the surface that was struck.
+    Surface,
+}
+
+/// Craters of impacts from space.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct RawPrimaryCraters {
+    /// Craters wider than 1 m per square metre, if the law held there (0.079 is saturation: Trask, 1966; 0.008, a tenth of it, is our
+    /// choice).
+    pub density: f64,
+    /// Exponent A of N(>D) = density D^-A (the paper: about 2).
+    pub exponent: f64,
+    /// Smallest diameter, m; at least 4 basic spacings.
+    pub diameter_min_m: f64,
+    /// Largest diameter, m (the paper's example: 1000).
+    pub diameter_max_m: f64,
+    /// Depth over diameter of small craters (the paper: 0.2); no crater is deeper than 6 km.
+    pub depth_ratio: f64,
+    /// Where the depth is counted from.
+    pub datum: Datum,
+    /// Roughness of new floors over that of the surface (not published; our choice).
+    pub floor_roughness: f64,
+}
+
+impl Default for RawPrimaryCraters {
+    fn default() -> Self {
+        Self {
+            density: 0.008,
+            exponent: 2.0,
+            diameter_min_m: 0.5,
+            diameter_max_m: 1000.0,
+            depth_ratio: 0.2,
+            datum: Datum::Rim,
+            floor_roughness: 0.5,
+        }
+    }
+}
+
+/// Craters of what other impacts threw out.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct RawSecondaryCraters {
+    /// Secondaries of primaries that are not in the list, everywhere alike: craters wider than 1 m per square metre, if the law held
+    /// there; 0 for none.
+    pub density: f64,
+    /// Smallest diameter of those, m; at least 4 basic spacings.
+    pub diameter_min_m: f64,
+    /// Largest diameter of those, m.
+    pub diameter_max_m: f64,
+    /// Exponent A of N(>D) = density D^-A, and around primaries (the paper: 3.5).
+    pub exponent: f64,
+    /// Secondaries around each wide crater of the nearest `primary_craters` above; 0 for none (our choice: one of the largest size by
+    /// the power law).
+    pub per_primary: u32,
+    /// Smallest crater with secondaries, m (our choice).
+    pub primary_min_m: f64,
+    /// Largest secondary over its primary (our choice).
+    pub largest_ratio: f64,
+    /// Smallest over largest secondary of a primary (our choice).
+    pub smallest_share: f64,
+    /// Nearest and farthest secondary, radii of the primary; their density falls with the square of the distance (our choice).
+    pub ring_radii: [f64; 2],
+    /// Depth over diameter (Pike and Wilhelms, 1978: about half that of primaries).
+    pub depth_ratio: f64,
+    /// Where the depth is counted from.
+    pub datum: Datum,
+    /// Roughness of new floors over that of the surface.
+    pub floor_roughness: f64,
+}
+
+impl Default for RawSecondaryCraters {
+    fn default() -> Self {
+        Self {
+            density: 0.0,
+            diameter_min_m: 0.5,
+            diameter_max_m: 50.0,
+            exponent: 3.5,
+            per_primary: 1448,
+            primary_min_m: 100.0,
+            largest_ratio: 0.05,
+            smallest_share: 0.125,
+            ring_radii: [3.0, 16.0],
+            depth_ratio: 0.1,
+            datum: Datum::Rim,
+            floor_roughness: 0.5,
+        }
+    }
+}
+
+/// How many rocks make a coverage.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum RockLaw {
+    /// So many that their union covers what the law says, although they overlap.
+    ExactUnion,
+    /// As published, for rocks that do not overlap: placed independently they cover less.
+    Literal,
+}
+
+/// Rocks.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct RawRocks {
+    /// Share of the ground that all rocks cover, 0 to 0.6 (Golombek and Rapp, 1997: 0.069 at Viking 1, 0.176 at Viking 2).
+    pub coverage: f64,
+    /// Smallest diameter, m; at least a basic spacing (our choice).
+    pub diameter_min_m: f64,
+    /// Largest diameter, m (our choice).
+    pub diameter_max_m: f64,
+    /// How many rocks make a coverage.
+    pub law: RockLaw,
+    /// Height over diameter where rocks cover 0.069 (Golombek and Rapp, 1997).
+    pub height_ratio: f64,
+    /// Growth of that ratio with the coverage (0.506 at 0.176).
+    pub height_gain: f64,
+    /// Added to every height, m.
+    pub height_offset_m: f64,
+    /// Share of the ground covered by what a wide crater strews, at its rim (our choice).
+    pub crater_peak: f64,
+    /// Distance over which that falls by e, crater radii (our choice).
+    pub crater_decay_radii: f64,
+    /// Craters narrower than this strew none, m (our choice).
+    pub crater_min_m: f64,
+}
+
+impl Default for RawRocks {
+    fn default() -> Self {
+        Self {
+            coverage: 0.069,
+            diameter_min_m: 0.03,
+            diameter_max_m: 5.0,
+            law: RockLaw::ExactUnion,
+            height_ratio: 0.365,
+            height_gain: 1.318,
+            height_offset_m: 0.008,
+            crater_peak: 0.3,
+            crater_decay_radii: 1.0,
+            crater_min_m: 5.0,
+        }
+    }
+}
+
+/// How bright the ground is.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct RawAlbedo {
+    /// Mean of sand (our choice).
+    pub sand: f64,
+    /// Standard deviation from point to point.
+    pub sand_deviation: f64,
+    /// Mean of rocks (our choice).
+    pub rock: f64,
+    /// Standard deviation from rock to rock.
+    pub rock_deviation: f64,
+}
+
+impl Default for RawAlbedo {
+    fn default() -> Self {
+        Self { sand: 0.25, sand_deviation: 0.02, rock: 0.16, rock_deviation: 0.03 }
+    }
+}
+
+/// Dust over everything: it buries rocks, and brightens where there is an albedo.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct RawDust {
+    /// Thickness, m: rocks stand that much less high, and lower ones vanish (our choice).
+    pub thickness_m: f64,
+    /// Albedo of the dust (our choice).
+    pub albedo: f64,
+    /// Share of every point that it covers, 0 to 1 (our choice).
+    pub cover: f64,
+}
+
+impl Default for RawDust {
+    fn default() -> Self {
+        Self { thickness_m: 0.01, albedo: 0.3, cover: 0.5 }
+    }
+}
+
+/// One process that shapes the surface.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum RawProcess {
+    /// A smooth slope.
+    BaseSlope(RawBaseSlope),
+    /// Roughness at every scale.
+    Texture(RawTexture),
+    /// Craters of impacts from space.
+    PrimaryCraters(RawPrimaryCraters),
+    /// Craters of what other impacts threw out.
+    SecondaryCraters(RawSecondaryCraters),
+    /// Rocks.
+    Rocks(RawRocks),
+    /// How bright the ground is.
+    Albedo(RawAlbedo),
+    /// Dust over everything.
+    Dust(RawDust),
+}
+
+impl RawProcess {
+    /// Name in `kind = "..."`.
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Self::BaseSlope(_) => "base_slope",
+            Self::Texture(_) => "texture",
+            Self::PrimaryCraters(_) => "primary_craters",
+            Self::SecondaryCraters(_) => "secondary_craters",
+            Self::Rocks(_) => "rocks",
+            Self::Albedo(_) => "albedo",
+            Self::Dust(_) => "dust",
+        }
+    }
+
+    /// Whether the process is possible by itself on a lattice with points `spacing_m` apart.
+    fn check(&self, spacing_m: f64) -> Result<(), ParameterError> {
+        match self {
+            Self::BaseSlope(p) => p.check(),
+            Self::Texture(p) => p.check(),
+            Self::PrimaryCraters(p) => p.check(spacing_m),
+            Self::SecondaryCraters(p) => p.check(spacing_m),
+            Self::Rocks(p) => p.check(spacing_m),
+            Self::Albedo(p) => p.check(),
+            Self::Dust(p) => p.check(),
+        }
+    }
+}
+
+/// Whether a list of processes is possible on a lattice with points `spacing_m` apart.
+///
+/// # Errors
+/// The first value that is out of range, a process that may stand once only, or secondaries without primaries.
+pub fn check(processes: &[RawProcess], spacing_m: f64) -> Result<(), ParameterError> {
+    for (n, process) in processes.iter().enumerate() {
+        let here = |e: ParameterError| e.within(&n.to_string()).within("processes");
+        process.check(spacing_m).map_err(here)?;
+        let before = &processes[..n];
+        let once = matches!(process, RawProcess::Rocks(_) | RawProcess::Albedo(_) | RawProcess::Dust(_));
+        if once && before.iter().any(|p| p.kind() == process.kind()) {
+            let message = format!("is `{}` for the second time; it may stand once in the list", process.kind());
+            return Err(here(ParameterError::new("kind", message)));
+        }
+        if let RawProcess::SecondaryCraters(p) = process
+            && p.per_primary > 0
+            && !before.iter().any(|p| matches!(p, RawProcess::PrimaryCraters(_)))
+        {
+            let message = format!(
+                "is {}, but no `primary_craters` stand above in the list; put them there, or set it to 0",
+                p.per_primary
+            );
+            return Err(here(ParameterError::new("per_primary", message)));
+        }
+    }
+    Ok(())
+}
+
+fn finite(key: &str, values: &[f64]) -> Result<(), ParameterError> {
+    match values.iter().find(|v| !v.is_finite()) {
+        Some(v) => Err(ParameterError::new(key, format!("holds {v}; it must hold finite numbers"))),
+        None => Ok(()),
+    }
+}
+
+/// From `low` to `high`, both included.
+fn within(key: &str, value: f64, low: f64, high: f64) -> Result<(), ParameterError> {
+    if (low..=high).contains(&value) {
+        Ok(())
+    } else {
+        Err(ParameterError::new(key, format!("is {value}; it must lie in {low} to {high}")))
+    }
+}
+
+/// Two diameters in order, from `least_m` on.
+fn diameters([low, high]: [f64; 2], least_m: f64) -> Result<(), ParameterError> {
+    ParameterError::positive("diameter_min_m", low)?;
+    ParameterError::positive("diameter_max_m", high)?;
+    if low < least_m {
+        let message = format!("is {low} m; the lattice carries none below {least_m} m");
+        return Err(ParameterError::new("diameter_min_m", message));
+    }
+    if high < low {
+        let message = format!("is {high} m; it must not be below `diameter_min_m`, {low} m");
+        return Err(ParameterError::new("diameter_max_m", message));
+    }
+    Ok(())
+}
+
+/// A density whose counts can be drawn.
+fn drawable(key: &str, mean: f64) -> Result<(), ParameterError> {
+    if mean <= POISSON_MEAN_MAX {
+        Ok(())
+    } else {
+        let message = format!("gives {mean:.3e} of one size in one place; at most {POISSON_MEAN_MAX} can be drawn");
+        Err(ParameterError::new(key, message))
+    }
+}
+
+impl RawBaseSlope {
+    fn check(&self) -> Result<(), ParameterError> {
+        finite("gradient", &self.gradient)?;
+        finite("corner_heights_m", self.corner_heights_m.as_ref().map_or(&[], |c| &c[..]))
+    }
+}
+
+impl RawTexture {
+    fn check(&self) -> Result<(), ParameterError> {
+        check_texture(self.roughness_m, self.hurst)
+    }
+}
+
+/// Roughness and Hurst exponent of a texture.
+///
+/// # Errors
+/// A value out of range.
+pub fn check_texture(roughness_m: f64, hurst: f64) -> Result<(), ParameterError> {
+    ParameterError::not_negative("roughness_m", roughness_m)?;
+    if hurst > 0.0 && hurst <= 1.0 {
+        Ok(())
+    } else {
+        Err(ParameterError::new("hurst", format!("is {hurst}; it must lie above 0 and be at most 1")))
+    }
+}
+
+impl RawPrimaryCraters {
+    /// As the kernel takes them.
+    pub fn power_law(&self) -> PowerLawParameters {
+        PowerLawParameters {
+            density: self.density,
+            exponent: self.exponent,
+            diameters_m: [self.diameter_min_m, self.diameter_max_m],
+            style: style(self.depth_ratio, self.datum, self.floor_roughness),
+        }
+    }
+
+    fn check(&self, spacing_m: f64) -> Result<(), ParameterError> {
+        ParameterError::not_negative("density", self.density)?;
+        ParameterError::positive("exponent", self.exponent)?;
+        diameters([self.diameter_min_m, self.diameter_max_m], CRATER_SPACINGS_MIN * spacing_m)?;
+        check_style(self.depth_ratio, self.floor_roughness)?;
+        drawable("density", self.power_law().mean_max(spacing_m))
+    }
+}
+
+fn style(depth_ratio: f64, datum: Datum, floor_roughness: f64) -> Style {
+    Style { depth_ratio, below_datum: datum == Datum::Surface, floor_roughness }
+}
+
+fn check_style(depth_ratio: f64, floor_roughness: f64) -> Result<(), ParameterError> {
+    ParameterError::between("depth_ratio", depth_ratio, 0.0, 1.0)?;
+    ParameterError::not_negative("floor_roughness", floor_roughness)?;
+    Ok(())
+}
+
+impl RawSecondaryCraters {
+    /// Those that are everywhere alike.
+    pub fn background(&self) -> PowerLawParameters {
+        PowerLawParameters {
+            density: self.density,
+            exponent: self.exponent,
+            diameters_m: [self.diameter_min_m, self.diameter_max_m],
+            style: style(self.depth_ratio, self.datum, self.floor_roughness),
+        }
+    }
+
+    /// Those around primaries.
+    pub fn around_primaries(&self) -> SecondaryParameters {
+        SecondaryParameters {
+            primary_min_m: self.primary_min_m,
+            count: self.per_primary,
+            largest_ratio: self.largest_ratio,
+            smallest_share: self.smallest_share,
+            exponent: self.exponent,
+            ring_radii: self.ring_radii,
+            style: style(self.depth_ratio, self.datum, self.floor_roughness),
+        }
+    }
+
+    fn check(&self, spacing_m: f64) -> Result<(), ParameterError> {
+        let least_m = CRATER_SPACINGS_MIN * spacing_m;
+        ParameterError::not_negative("density", self.density)?;
+        ParameterError::positive("exponent", self.exponent)?;
+        diameters([self.diameter_min_m, self.diameter_max_m], least_m)?;
+        check_style(self.depth_ratio, self.floor_roughness)?;
+        drawable("density", self.background().mean_max(spacing_m))?;
+        ParameterError::positive("primary_min_m", self.primary_min_m)?;
+        ParameterError::between("largest_ratio", self.largest_ratio, 0.0, 1.0)?;
+        ParameterError::between("smallest_share", self.smallest_share, 0.0, 1.0)?;
+        within("per_primary", f64::from(self.per_primary), 0.0, 1e5)?;
+        let [near, far] = self.ring_radii;
+        if !(near >= 1.0 && far > near && far <= 100.0) {
+            let message = format!("is [{near}, {far}]; it must rise from 1 or more to 100 or less");
+            return Err(ParameterError::new("ring_radii", message));
+        }
+        let smallest_m = self.primary_min_m * self.largest_ratio * self.smallest_share;
+        if self.per_primary > 0 && smallest_m < least_m {
+            let message = format!(
+                "is {} m, which gives secondaries of {smallest_m} m; the lattice carries none below {least_m} m",
+                self.primary_min_m
+            );
+            return Err(ParameterError::new("primary_min_m", message));
+        }
+        Ok(())
+    }
+}
+
+impl RawRocks {
+    /// As the kernel takes them, buried to `buried_m`.
+    pub fn parameters(&self, buried_m: f64) -> RockParameters {
+        RockParameters {
+            coverage: self.coverage,
+            exact_union: self.law == RockLaw::ExactUnion,
+            diameters_m: [self.diameter_min_m, self.diameter_max_m],
+            height_ratio: self.height_ratio,
+            height_gain: self.height_gain,
+            height_offset_m: self.height_offset_m,
+            crater_peak: self.crater_peak,
+            crater_decay_radii: self.crater_decay_radii,
+            crater_min_m: self.crater_min_m,
+            buried_m,
+        }
+    }
+
+    fn check(&self, spacing_m: f64) -> Result<(), ParameterError> {
+        within("coverage", self.coverage, 0.0, COVERAGE_MAX)?;
+        diameters([self.diameter_min_m, self.diameter_max_m], spacing_m)?;
+        ParameterError::not_negative("height_ratio", self.height_ratio)?;
+        finite("height_gain", &[self.height_gain])?;
+        finite("height_offset_m", &[self.height_offset_m])?;
+        within("crater_peak", self.crater_peak, 0.0, COVERAGE_MAX)?;
+        ParameterError::positive("crater_decay_radii", self.crater_decay_radii)?;
+        ParameterError::not_negative("crater_min_m", self.crater_min_m)?;
+        drawable("diameter_max_m", self.parameters(0.0).mean_max(spacing_m))
+    }
+}
+
+impl RawAlbedo {
+    fn check(&self) -> Result<(), ParameterError> {
+        within("sand", self.sand, 0.0, 1.0)?;
+        within("sand_deviation", self.sand_deviation, 0.0, 1.0)?;
+        within("rock", self.rock, 0.0, 1.0)?;
+        within("rock_deviation", self.rock_deviation, 0.0, 1.0)
+    }
+}
+
+impl RawDust {
+    fn check(&self) -> Result<(), ParameterError> {
+        ParameterError::not_negative("thickness_m", self.thickness_m)?;
+        within("albedo", self.albedo, 0.0, 1.0)?;
+        within("cover", self.cover, 0.0, 1.0)
+    }
+}

@@ -1,0 +1,271 @@
+//! Rocks: the potential that says how many there may be, and the rocks themselves.
+//!
+//! The process sets the rock potential, the share of the ground that all rocks cover, at its place in the list. Later craters
+//! clear it (inside and over most of the ejecta), and wide ones strew rocks of their own around them, by a share that falls
+//! exponentially with the distance. The rocks are set when everything else is done: as in the paper, large ones first, which here
+//! means that of two rocks the higher top is seen.
+//!
+//! A rock is an ellipse of area `pi D^2 / 4` with a random azimuth and the profile of half an ellipsoid, of height
+//! `(0.365 + 1.318 (f - 0.069)) D + 0.008 m`: the more rocks, the less they are buried. It stands at the height of the ground at the
+//! lattice point nearest to its centre, on the coarsest grid of a spacing of half a diameter or less, and has a texture of its own.
+//!
+//! Placement: candidates strike the diamonds of `levels` by a density that is never below the wanted one, and stay with the
+//! ratio of the two at their place.
+
+pub mod law;
+
+use super::craters::population::{Crater, Near};
+use super::craters::shape::{fall, fringe};
+use super::levels::{RADIUS_SHARE, SizeRange, Window, floor_log2, size_ranges, spacing};
+use super::texture::{Amplitudes, interpolate};
+use law::Law;
+use sastrugi_numeric::{Counter, Poisson};
+use std::f64::consts::PI;
+
+/// Largest share of the ground that rocks may cover.
+pub const COVERAGE_MAX: f64 = 0.6;
+/// Radii of a crater up to which no rock is left, and from which all are.
+const CLEARED_RADII: [f64; 2] = [2.5, 3.5];
+/// Shortest over longest axis is uniform from this to 1.
+const AXIS_RATIO_MIN: f64 = 0.6;
+/// Roughness of a rock over its height, at distances of its diameter.
+const ROUGHNESS_SHARE: f64 = 0.05;
+/// Hurst exponent of that roughness.
+const ROUGHNESS_HURST: f64 = 0.8;
+
+/// Words below a rock's place.
+const DIAMETER: i64 = 0;
+const ALONG: i64 = 1;
+const ACROSS: i64 = 2;
+const STAYS: i64 = 3;
+const AXES: i64 = 4;
+const AZIMUTH: i64 = 5;
+const TEXTURE: i64 = 6;
+const ALBEDO: i64 = 7;
+
+/// Parameters of the rocks.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RockParameters {
+    /// Share of the ground covered by all rocks.
+    pub coverage: f64,
+    /// Whether independent placement is made up for.
+    pub exact_union: bool,
+    /// Smallest and largest diameter, m.
+    pub diameters_m: [f64; 2],
+    /// Height over diameter at a coverage of 0.069.
+    pub height_ratio: f64,
+    /// Growth of that ratio with coverage.
+    pub height_gain: f64,
+    /// What is added to every height, m.
+    pub height_offset_m: f64,
+    /// Share of the ground covered at the rim of a wide crater.
+    pub crater_peak: f64,
+    /// Length over which that falls by e, radii.
+    pub crater_decay_radii: f64,
+    /// Craters below this diameter strew no rocks, m.
+    pub crater_min_m: f64,
+    /// Depth to which rocks are buried, m.
+    pub buried_m: f64,
+}
+
+/// Rocks of one range of diameters.
+#[derive(Clone, Debug)]
+struct Bin {
+    zoom: u32,
+    /// 1 / smallest diameter, and less 1 / largest, 1/m.
+    inverse: [f64; 2],
+    /// Candidates have the density `bound / D^2`, 1/m3.
+    bound: f64,
+    mean: f64,
+    per_diamond: Poisson,
+}
+
+/// Rocks of a world.
+#[derive(Clone, Debug)]
+pub struct Rocks {
+    parameters: RockParameters,
+    counter: Counter,
+    spacing_m: f64,
+    bins: Vec<Bin>,
+    amplitudes: Amplitudes,
+}
+
+/// One rock.
+#[derive(Clone, Copy, Debug)]
+pub struct Rock {
+    /// Diameter of the disk of the same area, m.
+    pub diameter_m: f64,
+    /// Centre, lattice units.
+    pub centre: [f64; 2],
+    /// Height of the top above its base, m.
+    pub height_m: f64,
+    /// Half axes, lattice units, the longer first.
+    axes: [f64; 2],
+    /// Sine and cosine of the azimuth of the longer axis, from east to north.
+    azimuth: [f64; 2],
+    /// Key of its albedo.
+    pub albedo: Counter,
+    texture: Counter,
+    place: [i64; 4],
+}
+
+impl RockParameters {
+    fn law(&self, coverage: f64) -> Law {
+        Law { coverage, exact_union: self.exact_union }
+    }
+
+    /// `largest` is the largest coverage anywhere.
+    fn bins(&self, spacing_m: f64, largest: f64) -> Vec<Bin> {
+        let law = self.law(largest);
+        let bin = |range: SizeRange| {
+            let [from, to] = range.diameters_m;
+            // n D^2 falls with D.
+            let bound = law.density(from) * from * from;
+            let inverse = [1.0 / from, 1.0 / from - 1.0 / to];
+            let mean = range.diamond_m2 * bound * inverse[1];
+            Bin { zoom: range.zoom, inverse, bound, mean, per_diamond: Poisson::new(mean) }
+        };
+        size_ranges(self.diameters_m, spacing_m).map(bin).collect()
+    }
+
+    /// The largest mean number of rocks in a diamond, whatever craters strew.
+    pub fn mean_max(&self, spacing_m: f64) -> f64 {
+        self.bins(spacing_m, COVERAGE_MAX).iter().fold(0.0, |most, bin| f64::max(most, bin.mean))
+    }
+
+    /// The coverage after a crater at `rho` radii from its centre.
+    pub fn after_crater(&self, coverage: f64, crater: &Crater, rho: f64) -> f64 {
+        let kept = coverage * (1.0 - fall(rho, CLEARED_RADII[0], CLEARED_RADII[1]));
+        let strewn = if rho >= 1.0 && crater.diameter_m >= self.crater_min_m {
+            self.crater_peak * libm::exp(-(rho - 1.0) / self.crater_decay_radii) * fringe(rho)
+        } else {
+            0.0
+        };
+        (kept + strewn).min(COVERAGE_MAX)
+    }
+}
+
+impl Rocks {
+    /// Rocks on a lattice; `strewn` where craters may add to the coverage.
+    pub fn new(parameters: RockParameters, spacing_m: f64, counter: Counter, strewn: bool) -> Self {
+        let largest = if strewn { COVERAGE_MAX } else { parameters.coverage };
+        let bins = if largest > 0.0 { parameters.bins(spacing_m, largest) } else { Vec::new() };
+        let coarsest = bins.last().map_or(0, |bin| bin.zoom);
+        Self { parameters, counter, spacing_m, bins, amplitudes: Amplitudes::new(ROUGHNESS_HURST, spacing_m, coarsest) }
+    }
+
+    /// Parameters.
+    pub fn parameters(&self) -> &RockParameters {
+        &self.parameters
+    }
+
+    /// How far from a point rocks may lie that cover it, and stand, lattice units.
+    pub fn reach(&self) -> f64 {
+        let widest = self.parameters.diameters_m[1] / self.spacing_m;
+        // Beyond its centre a rock may stand half a diagonal of half a diameter away.
+        long_axis(widest, AXIS_RATIO_MIN) + 0.36 * widest
+    }
+
+    /// The rocks that may lie under a point of the window, largest first; `coverage` tells the share of the ground that all rocks
+    /// cover at a place (lattice units).
+    pub fn find(&self, window: &Window, coverage: impl Fn([f64; 2]) -> f64) -> Vec<Rock> {
+        let near = Near { window, margin: 0.0 };
+        let mut found = Vec::new();
+        for bin in &self.bins {
+            window.visit_diamonds(bin.zoom, self.bin_reach(bin), |i, j| {
+                let diamond = self.counter.at(j).at(i);
+                for n in 0..i64::from(bin.per_diamond.count(diamond.uniform())) {
+                    found.extend(self.rock(bin, [i, j, n], diamond.at(n), &near, &coverage));
+                }
+            });
+        }
+        found.sort_unstable_by(|a, b| b.diameter_m.total_cmp(&a.diameter_m).then_with(|| a.place.cmp(&b.place)));
+        found
+    }
+
+    /// How far from the centre of a bin's diamond its rocks reach, lattice units.
+    fn bin_reach(&self, bin: &Bin) -> f64 {
+        let diameter = 2.0 * RADIUS_SHARE * spacing(bin.zoom);
+        spacing(bin.zoom) + long_axis(diameter, AXIS_RATIO_MIN)
+    }
+
+    /// The candidate, if it may lie under a point that is looked at, stays, and is not buried.
+    fn rock(
+        &self,
+        bin: &Bin,
+        [i, j, n]: [i64; 3],
+        own: Counter,
+        near: &Near<'_>,
+        coverage: impl Fn([f64; 2]) -> f64,
+    ) -> Option<Rock> {
+        let [inverse, span] = bin.inverse;
+        let diameter_m = 1.0 / (inverse - own.at(DIAMETER).uniform() * span);
+        let [s, t] = [ALONG, ACROSS].map(|word| (own.at(word).uniform() - 0.5) * spacing(bin.zoom));
+        let centre = [i as f64 + (s + t), j as f64 + (s - t)];
+        let ratio = AXIS_RATIO_MIN + (1.0 - AXIS_RATIO_MIN) * own.at(AXES).uniform();
+        let long = long_axis(diameter_m, ratio) / self.spacing_m;
+        if !near.touches(centre, long) {
+            return None;
+        }
+        let here = coverage(centre);
+        let wanted = if here > 0.0 { self.parameters.law(here).density(diameter_m) } else { 0.0 };
+        if own.at(STAYS).uniform() * bin.bound >= wanted * diameter_m * diameter_m {
+            return None;
+        }
+        let height_m = self.height_m(diameter_m, here) - self.parameters.buried_m;
+        let (sin, cos) = libm::sincos(PI * own.at(AZIMUTH).uniform());
+        (height_m > 0.0).then(|| Rock {
+            diameter_m,
+            centre,
+            height_m,
+            axes: [long, long * ratio],
+            azimuth: [sin, cos],
+            albedo: own.at(ALBEDO),
+            texture: own.at(TEXTURE),
+            place: [i64::from(bin.zoom), j, i, n],
+        })
+    }
+
+    fn height_m(&self, diameter_m: f64, coverage: f64) -> f64 {
+        let p = &self.parameters;
+        (p.height_ratio + p.height_gain * (coverage - 0.069)) * diameter_m + p.height_offset_m
+    }
+
+    /// Calls `f(k, height)` for every point of the window under the rock: its place in the row-major values and the rock's
+    /// height above its base there, m.
+    pub fn cover(&self, rock: &Rock, window: &Window, mut f: impl FnMut(usize, f64)) {
+        let Some(part) = window.part(rock.centre, rock.axes[0]) else { return };
+        let anchor = floor_log2(0.5 * rock.diameter_m / self.spacing_m);
+        let scale_m = ROUGHNESS_SHARE * rock.height_m / libm::pow(rock.diameter_m, ROUGHNESS_HURST);
+        let texture = interpolate(&window.of_part(&part), anchor, rock.texture, scale_m, &self.amplitudes);
+        let [sin, cos] = rock.azimuth;
+        for (row, line) in part.rows.zip(texture.chunks_exact(part.cols.len())) {
+            let dy = window.y(row) - rock.centre[1];
+            for (col, texture) in part.cols.clone().zip(line) {
+                let dx = window.x(col) - rock.centre[0];
+                let (along, across) = ((dx * cos + dy * sin) / rock.axes[0], (dy * cos - dx * sin) / rock.axes[1]);
+                let inside = 1.0 - (along * along + across * across);
+                if inside >= 0.0 {
+                    f(row * window.cols + col, rock.height_m * inside.sqrt() + texture);
+                }
+            }
+        }
+    }
+
+    /// The lattice point that a rock stands on: binary logarithm of its grid's spacing, and the point in that spacing.
+    pub fn base(&self, rock: &Rock) -> (u32, i64, i64) {
+        let zoom = floor_log2(0.5 * rock.diameter_m / self.spacing_m);
+        let [i, j] = rock.centre.map(|at| (at / spacing(zoom)).round() as i64);
+        (zoom, i, j)
+    }
+
+    /// Expected number of rocks drawn for a window.
+    pub fn expected(&self, window: &Window) -> f64 {
+        self.bins.iter().map(|bin| (1.0 + bin.mean) * window.diamonds(bin.zoom, self.bin_reach(bin))).sum()
+    }
+}
+
+/// Longer half axis of an ellipse with the area of a disk.
+fn long_axis(diameter: f64, ratio: f64) -> f64 {
+    0.5 * diameter / ratio.sqrt()
+}

@@ -1,0 +1,82 @@
+//! Roughness over scales.
+
+use super::*;
+use sastrugi_roughness::{level, profile_spectra};
+
+fn texture(hurst: f64, seed: u64) -> World {
+    world(json!([{"kind": "texture", "roughness_m": 0.02, "hurst": hurst}]), seed)
+}
+
+/// Least-squares slope of log PSD over log frequency of profiles, between 8 and 128 samples.
+fn slope(grid: &Grid) -> f64 {
+    let band = |f: f64| (1.0 / 128.0..=1.0 / 8.0).contains(&(f * grid.geometry.cell[0]));
+    let points: Vec<[f64; 2]> = profile_spectra(&level(grid))
+        .iter()
+        .filter(|b| band(b.frequency_cycles_m))
+        .map(|b| [libm::log(b.frequency_cycles_m), libm::log(b.psd_m3)])
+        .collect();
+    let n = points.len() as f64;
+    let mean = |k: usize| points.iter().map(|p| p[k]).sum::<f64>() / n;
+    let [x, y] = [mean(0), mean(1)];
+    let sum = |f: &dyn Fn(&[f64; 2]) -> f64| points.iter().map(f).sum::<f64>();
+    sum(&|p| (p[0] - x) * (p[1] - y)) / sum(&|p| (p[0] - x) * (p[0] - x))
+}
+
+/// Acceptance 4: spectra of profiles fall with -(2 H + 1), within 0.15, between 8 and 128 samples: shorter waves are lifted by the
+/// aliases that point samples have. One patch of 1024 x 1024 scatters by 0.015 (printed) about 0.05 to 0.07 less than H says, so that a
+/// right kernel fails with 1e-6 or so; an exponent of H + 1 or a missing level would be off by more than 0.3.
+#[test]
+fn stat_spectra_follow_the_hurst_exponent() {
+    for hurst in [0.5, 0.7, 0.8, 0.9] {
+        let slopes: Vec<f64> = (0..2)
+            .map(|seed| slope(&heights(&texture(hurst, seed).tiled_patch(&window(2, 4000, 900, 1024, 1024)), 0.04)))
+            .collect();
+        eprintln!("H = {hurst}: {slopes:.3?}, {:.3} expected", -(2.0 * hurst + 1.0));
+        assert!(slopes.iter().all(|s| (s + 2.0 * hurst + 1.0).abs() < 0.15), "{hurst}: {slopes:?}");
+    }
+}
+
+/// Root mean square difference of neighbours: 2.12 s1 d^H at H = 0.8 over a world with 20 levels (2.05 was measured for the
+/// specification, on fewer). Over 4000 places; half of the squares come from waves longer than 8 points, so that they scatter by
+/// about 1.5 % as one figure a place: 6 % is 5 standard errors of the root and more.
+#[test]
+fn stat_neighbours_differ_as_specified() {
+    let (world, mut places) = (texture(0.8, 7), Streams::for_seed(7, "texture").stream("places"));
+    let squares: Vec<f64> = (0..4000)
+        .map(|_| {
+            let [west, south] = [(); 2].map(|()| places.below(1 << 30) as i64);
+            let z = world.patch(&window(0, west, south, 2, 2)).heights;
+            let square = |a: usize, b: usize| (z[a] - z[b]) * (z[a] - z[b]);
+            0.25 * (square(0, 1) + square(2, 3) + square(0, 2) + square(1, 3))
+        })
+        .collect();
+    let rms = sastrugi_numeric::sums::mean(&squares).sqrt() / (0.02 * libm::pow(0.01, 0.8));
+    assert!((rms / 2.12 - 1.0).abs() < 0.06, "{rms}");
+}
+
+/// Every point is the mean of its parents and a draw; anchors are 0; no roughness is flat; twice the roughness is twice the height.
+#[test]
+fn prop_roughness_scales() {
+    let at = |roughness: f64| {
+        let processes = json!([{"kind": "texture", "roughness_m": roughness, "hurst": 0.6}]);
+        world(processes, 8).patch(&window(3, -20, 7, 33, 21)).heights
+    };
+    assert!(at(0.0).iter().all(|z| *z == 0.0));
+    assert!(at(0.02).iter().zip(at(0.04)).all(|(a, b)| 2.0 * a == b));
+    assert!(at(0.02).iter().any(|z| z.abs() > 0.01));
+    assert!(texture(0.7, 9).patch(&window(20, -2, -2, 5, 5)).heights.iter().all(|z| *z == 0.0));
+}
+
+/// On a slope the texture is the stochastic interpolation of the slope: both add.
+#[test]
+fn prop_texture_adds_to_a_slope() {
+    let slope = json!({"kind": "base_slope", "gradient": [0.3, -0.1]});
+    let texture = json!({"kind": "texture"});
+    let of = |processes: Value| world(processes, 10).patch(&window(1, 100, 200, 30, 30)).heights;
+    let (both, alone, flat) = (of(json!([slope, texture])), of(json!([texture])), of(json!([slope])));
+    for k in 0..900 {
+        assert!((both[k] - alone[k] - flat[k]).abs() < 1e-12);
+    }
+    let [x, y] = [0.02 * 100.0, 0.02 * 200.0];
+    assert!((flat[0] - (0.3 * x - 0.1 * y)).abs() < 1e-12);
+}

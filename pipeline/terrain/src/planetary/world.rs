@@ -1,0 +1,266 @@
+//! A world: everything that is the same for all of its patches, and how a patch of it is made.
+
+use super::craters::index::Index;
+use super::craters::population::{Crater, Families, Near, Place};
+use super::craters::shape::EJECTA_RADII;
+use super::craters::{Bombardment, Plane, retained_window};
+use super::levels::Window;
+use super::rocks::Rocks;
+use super::texture::{Amplitudes, interpolate};
+use sastrugi_numeric::Counter;
+use std::cell::RefCell;
+use std::collections::HashMap;
+
+/// Code of sand in the class map.
+pub const SAND: u8 = 0;
+/// Code of rock in the class map.
+pub const ROCK: u8 = 1;
+
+/// Height of a smooth base at a place in lattice units, m.
+pub type Base = Box<dyn Fn([f64; 2]) -> f64 + Send + Sync>;
+
+/// What shapes the ground, in order.
+pub enum Step {
+    /// A smooth surface is added.
+    Base(Base),
+    /// Roughness is added.
+    Texture(Texture),
+    /// Craters strike.
+    Bombardment(Bombardment),
+}
+
+/// Roughness at every scale.
+pub struct Texture {
+    /// Key of its draws.
+    pub counter: Counter,
+    /// Binary logarithm of the spacing of its anchors.
+    pub anchor: u32,
+    /// `s_1`, m.
+    pub roughness_m: f64,
+    /// `d^H`.
+    pub amplitudes: Amplitudes,
+}
+
+/// Albedo of sand and rock.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Albedo {
+    /// Key of the draws of sand.
+    pub counter: Counter,
+    /// Mean and standard deviation of sand.
+    pub sand: [f64; 2],
+    /// Mean and standard deviation of rocks.
+    pub rock: [f64; 2],
+    /// Albedo of the dust, and the share of the ground that it covers.
+    pub dust: [f64; 2],
+}
+
+/// Everything that patches of one world have in common.
+pub struct World {
+    /// What shapes the ground, in order.
+    pub steps: Vec<Step>,
+    /// The rocks, and how many of the steps precede them.
+    pub rocks: Option<(Rocks, usize)>,
+    /// The albedo.
+    pub albedo: Option<Albedo>,
+}
+
+/// Samples of a world at the lattice points of a window, row by row from the south.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Patch {
+    /// The points.
+    pub window: Window,
+    /// Heights, m.
+    pub heights: Vec<f64>,
+    /// Albedo, 0 to 1; 0 in a world without.
+    pub albedo: Vec<f64>,
+    /// [`SAND`] or [`ROCK`].
+    pub class: Vec<u8>,
+    /// Share of the ground that all rocks cover.
+    pub rock_potential: Vec<f64>,
+}
+
+/// What was met on the way to one patch.
+struct Survey<'w> {
+    world: &'w World,
+    planes: RefCell<HashMap<Place, Plane>>,
+    families: Families,
+}
+
+impl World {
+    /// The samples of a window: a pure function of the world, bit by bit the same whatever else is looked at.
+    pub fn patch(&self, window: &Window) -> Patch {
+        let survey = Survey { world: self, planes: RefCell::default(), families: RefCell::default() };
+        let margin = self.rocks.as_ref().map_or(0.0, |(rocks, _)| rocks.reach());
+        let craters = survey.index(&Near { window, margin });
+        let heights = survey.ground(window, &craters);
+        let count = window.len();
+        let mut patch = Patch {
+            window: *window,
+            heights,
+            albedo: vec![0.0; count],
+            class: vec![SAND; count],
+            rock_potential: vec![0.0; count],
+        };
+        if let Some(albedo) = &self.albedo {
+            patch.albedo = albedo.of_sand(window);
+        }
+        if let Some((rocks, after)) = &self.rocks {
+            survey.set_rocks(rocks, &craters[*after..], &craters, &mut patch);
+        }
+        patch
+    }
+
+    /// Expected number of craters and rocks that a patch goes through; time goes with it and with the number of points.
+    pub fn expected_objects(&self, window: &Window) -> f64 {
+        let near = Near { window, margin: 0.0 };
+        let of_step = |step: &Step| match step {
+            Step::Bombardment(b) => b.populations.iter().map(|p| p.expected(&near)).sum(),
+            _ => 0.0,
+        };
+        let rocks = self.rocks.as_ref().map_or(0.0, |(rocks, _)| rocks.expected(window));
+        self.steps.iter().map(of_step).sum::<f64>() + rocks
+    }
+}
+
+impl Albedo {
+    fn of_sand(&self, window: &Window) -> Vec<f64> {
+        let points = (0..window.rows).flat_map(|row| (0..window.cols).map(move |col| (row as i64, col as i64)));
+        let at = |(row, col): (i64, i64)| {
+            let [i, j] = [window.west + col, window.south + row].map(|at| at << window.zoom);
+            self.value(self.sand, self.counter.at(j).at(i))
+        };
+        points.map(at).collect()
+    }
+
+    fn value(&self, [mean, deviation]: [f64; 2], draw: Counter) -> f64 {
+        let clean = (mean + deviation * draw.normal()).clamp(0.0, 1.0);
+        let [dust, cover] = self.dust;
+        clean + cover * (dust - clean)
+    }
+}
+
+impl Survey<'_> {
+    /// For every step, the craters that may reach what is looked at.
+    fn index(&self, near: &Near<'_>) -> Vec<Index> {
+        let of_step = |step: &Step| match step {
+            Step::Bombardment(bombardment) => self.craters(bombardment, near, 0.0),
+            _ => Vec::new(),
+        };
+        self.world.steps.iter().map(|step| Index::new(of_step(step), near)).collect()
+    }
+
+    /// Craters wider than `diameter_min_m` that may reach what is looked at, in order of time.
+    fn craters(&self, bombardment: &Bombardment, near: &Near<'_>, diameter_min_m: f64) -> Vec<Crater> {
+        let mut found = Vec::new();
+        bombardment.populations.iter().for_each(|p| p.find(near, diameter_min_m, &self.families, &mut found));
+        found.sort_unstable_by(Crater::order);
+        found
+    }
+
+    /// Heights of the ground without rocks, m; `craters` by step.
+    fn ground(&self, window: &Window, craters: &[Index]) -> Vec<f64> {
+        let mut heights = vec![0.0; window.len()];
+        for (number, (step, craters)) in self.world.steps.iter().zip(craters).enumerate() {
+            self.act(number, step, window, &mut heights, craters.of(window));
+        }
+        heights
+    }
+
+    /// Heights of the ground just before a crater of step `last` strikes, shaped by wider craters only, m.
+    fn ground_before(&self, last: usize, crater: &Crater, window: &Window) -> Vec<f64> {
+        let mut heights = vec![0.0; window.len()];
+        for (number, step) in self.world.steps[..=last].iter().enumerate() {
+            let mut wider = match step {
+                Step::Bombardment(b) => self.craters(b, &Near { window, margin: 0.0 }, crater.diameter_m),
+                _ => Vec::new(),
+            };
+            wider.retain(|c| number < last || c.order(crater).is_lt());
+            self.act(number, step, window, &mut heights, wider.iter());
+        }
+        heights
+    }
+
+    /// Lets a step act on the heights of a window.
+    fn act<'c>(
+        &self,
+        number: usize,
+        step: &Step,
+        window: &Window,
+        heights: &mut [f64],
+        craters: impl Iterator<Item = &'c Crater>,
+    ) {
+        match step {
+            Step::Base(base) => add_base(base, window, heights),
+            Step::Texture(t) => {
+                let field = interpolate(window, t.anchor, t.counter, t.roughness_m, &t.amplitudes);
+                heights.iter_mut().zip(field).for_each(|(h, f)| *h += f);
+            }
+            Step::Bombardment(b) => craters.for_each(|c| b.strike(window, heights, c, || self.plane(number, c))),
+        }
+    }
+
+    /// The plane that a crater of a step is set on.
+    fn plane(&self, step: usize, crater: &Crater) -> Plane {
+        if let Some(plane) = self.planes.borrow().get(&crater.place) {
+            return *plane;
+        }
+        let window = retained_window(crater);
+        let plane = Plane::fit(crater, &window, &self.ground_before(step, crater, &window));
+        self.planes.borrow_mut().insert(crater.place, plane);
+        plane
+    }
+
+    /// Rock potential, and rocks on the ground; `later` are the craters of the steps after the rocks' place in the list.
+    fn set_rocks(&self, rocks: &Rocks, later: &[Index], all: &[Index], patch: &mut Patch) {
+        let window = patch.window;
+        let alone = rocks.parameters().coverage;
+        patch.rock_potential.fill(alone);
+        later.iter().flat_map(|index| &index.craters).for_each(|crater| change_all(rocks, crater, patch));
+        let coverage =
+            |at: [f64; 2]| later.iter().flat_map(|index| index.at(at)).fold(alone, |f, c| change(rocks, f, c, at));
+        let ground = patch.heights.clone();
+        let mut tops = vec![f64::NEG_INFINITY; ground.len()];
+        for rock in rocks.find(&window, coverage) {
+            let (zoom, i, j) = rocks.base(&rock);
+            let base = match window.find(zoom, i, j) {
+                Some(k) => ground[k],
+                None => self.ground(&Window::point(zoom, i, j), all)[0],
+            };
+            let albedo = self.world.albedo.map(|albedo| albedo.value(albedo.rock, rock.albedo));
+            rocks.cover(&rock, &window, |k, height| {
+                let top = base + height;
+                patch.class[k] = ROCK;
+                if top > tops[k] {
+                    tops[k] = top;
+                    patch.heights[k] = f64::max(ground[k], top);
+                    patch.albedo[k] = albedo.unwrap_or(0.0);
+                }
+            });
+        }
+    }
+}
+
+/// The rock coverage at a place after a crater.
+fn change(rocks: &Rocks, coverage: f64, crater: &Crater, [x, y]: [f64; 2]) -> f64 {
+    let [dx, dy] = [x - crater.centre[0], y - crater.centre[1]];
+    let rho = (dx * dx + dy * dy).sqrt() / crater.radius;
+    if rho < EJECTA_RADII { rocks.parameters().after_crater(coverage, crater, rho) } else { coverage }
+}
+
+/// The rock potential of a patch after a crater.
+fn change_all(rocks: &Rocks, crater: &Crater, patch: &mut Patch) {
+    let window = patch.window;
+    let Some(part) = window.part(crater.centre, EJECTA_RADII * crater.radius) else { return };
+    for row in part.rows {
+        for col in part.cols.clone() {
+            let potential = &mut patch.rock_potential[row * window.cols + col];
+            *potential = change(rocks, *potential, crater, [window.x(col), window.y(row)]);
+        }
+    }
+}
+
+fn add_base(base: &Base, window: &Window, heights: &mut [f64]) {
+    for (k, height) in heights.iter_mut().enumerate() {
+        *height += base([window.x(k % window.cols), window.y(k / window.cols)]);
+    }
+}
