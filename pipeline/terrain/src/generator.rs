@@ -32,6 +32,22 @@ pub trait Generator: Send + Sync {
     /// A [`TerrainError`] where the parameters are possible one by one but give no usable surface together.
     fn generate(&self, streams: &Streams, bases: &[Grid]) -> Result<Terrain, TerrainError>;
 
+    /// As [`Self::generate`], and the heights are finite and not the same everywhere, whatever the parameters.
+    ///
+    /// # Errors
+    /// As [`Self::generate`]; heights beyond all numbers, or without relief.
+    fn generate_checked(&self, streams: &Streams, bases: &[Grid]) -> Result<Terrain, TerrainError> {
+        let made = self.generate(streams, bases)?;
+        let part = "the heights";
+        if let Some(&value) = made.heights.values.iter().find(|z| !z.is_finite()) {
+            return Err(TerrainError::Unrepresentable { part, figure: "one of them", value });
+        }
+        match made.heights.range() {
+            Some((low, high)) if high > low => Ok(made),
+            _ => Err(TerrainError::Level { part }),
+        }
+    }
+
     /// The heights as 16-bit levels, for generators that define them.
     fn levels(&self, _heights: &Grid) -> Option<Levels> {
         None
@@ -110,7 +126,7 @@ pub enum TerrainError {
         part: &'static str,
     },
     /// A figure that cannot be worked with.
-    #[error("make {part}: their {figure} is {value:e}; choose less extreme parameters")]
+    #[error("make {part}: {figure} is {value:e}; choose less extreme parameters")]
     Unrepresentable {
         /// Which values.
         part: &'static str,

@@ -27,7 +27,7 @@ impl Size {
     ///
     /// # Errors
     /// A [`ParameterError`] for a size or a cell that is not positive and finite, fewer than 3 cells along a side, or
-    /// more than 2^32 cells.
+    /// more than 2^28 cells.
     pub fn check(
         size_m: Option<[f64; 2]>,
         size_px: Option<[u32; 2]>,
@@ -62,7 +62,7 @@ impl Size {
             return Err(ParameterError::new(key, format!("gives {x} x {y} cells; it must give at least 3 x 3")));
         }
         if u64::from(x) * u64::from(y) > MAX_CELLS {
-            return Err(ParameterError::new(key, format!("gives {x} x {y} cells; the most is 2^32 in all")));
+            return Err(ParameterError::new(key, format!("gives {x} x {y} cells; the most is 2^28 in all")));
         }
         Ok(self)
     }

@@ -184,13 +184,9 @@ impl TerrainJob {
 /// What a generator makes, checked.
 ///
 /// # Errors
-/// When the generator has no result, or heights that are not finite everywhere (a bug).
+/// When the generator has no result, or heights that are not finite or the same everywhere.
 pub fn generate(generator: &dyn Generator, streams: &Streams, bases: &[Grid]) -> Result<Terrain, JobError> {
-    let made = generator.generate(streams, bases).map_err(|e| JobError::new(format!("failed to {e}")))?;
-    if made.heights.finite_count() != made.heights.values.len() {
-        return Err(JobError::new("internal error: the generator left cells without a finite height"));
-    }
-    Ok(made)
+    generator.generate_checked(streams, bases).map_err(|e| JobError::new(format!("failed to {e}")))
 }
 
 /// Writes heights as 16-bit levels: the generator's own where it has them, else from lowest to highest. Returns how to read

@@ -172,7 +172,7 @@ impl Generator for Cascade {
         if !(rms.is_finite() && rms > 0.0) {
             return Err(TerrainError::Unrepresentable {
                 part: "the cascade's heights",
-                figure: "rms height",
+                figure: "their rms",
                 value: rms,
             });
         }

@@ -28,7 +28,7 @@ mod tests;
 
 pub use params::{Compose, Operation, RawCompose, RawProcess, RawRegion};
 
-use crate::generator::{Base, Generator, Map, Terrain, TerrainError};
+use crate::generator::{Base, Generator, MAP_NAMES, Map, Terrain, TerrainError};
 use params::{Operand, Process, Region, Step};
 use sastrugi_numeric::{Geometry, Grid, Streams, Surface, ops, sums};
 use serde_json::Value;
@@ -102,9 +102,17 @@ impl Running<'_> {
     fn operand(&mut self, operand: &Operand, streams: &Streams) -> Result<Grid, TerrainError> {
         let made = operand.values(&self.geometry, streams, &mut self.bases)?;
         self.maps.retain(|map| made.maps.iter().all(|new| new.name != map.name));
-        self.maps.extend(made.maps);
+        for map in made.maps {
+            let values = self.placed(map.values);
+            self.maps.push(Map { values, ..map });
+        }
         self.notes.extend(made.notes);
-        Ok(made.heights)
+        Ok(self.placed(made.heights))
+    }
+
+    /// Values laid on the cells of the whole, cell for cell: generators may place their samples elsewhere in theirs.
+    fn placed(&self, values: Grid) -> Grid {
+        Grid::new(self.geometry, values.values)
     }
 
     /// The weights of a region, 1 everywhere without one.
@@ -113,7 +121,8 @@ impl Running<'_> {
             None => Ok(Grid::filled(self.geometry, 1.0)),
             Some(region) => {
                 let made = region.operand.values(&self.geometry, &streams.child("region"), &mut self.bases)?;
-                Ok(made.heights.map(|v| region.weight(v)))
+                self.notes.extend(made.notes);
+                Ok(self.placed(made.heights).map(|v| region.weight(v)))
             }
         }
     }
@@ -156,11 +165,9 @@ fn scaled_to_relief(z: &Grid, relief_m: f64) -> Result<Grid, TerrainError> {
     let (low, high) = z.range().unwrap_or((0.0, 0.0));
     let mean = sums::mean(&z.values);
     let scale = relief_m / (high - low);
-    if scale.is_finite() { Ok(z.map(|v| mean + (v - mean) * scale)) } else { Err(FLAT) }
+    let level = || TerrainError::Level { part: "the processes so far" };
+    if scale.is_finite() { Ok(z.map(|v| mean + (v - mean) * scale)) } else { Err(level()) }
 }
-
-/// A composition whose heights are all the same.
-const FLAT: TerrainError = TerrainError::Level { part: "the processes so far" };
 
 impl Generator for Compose {
     fn kind(&self) -> &'static str {
@@ -176,8 +183,9 @@ impl Generator for Compose {
     }
 
     fn memory_bytes(&self) -> u64 {
+        // Heights, an operand, weights, their product and the sum, and the maps so far, beside the largest generator at work.
         let most = self.processes.iter().flat_map(Process::operands).map(Operand::memory_bytes).max();
-        most.unwrap_or(0) + 3 * 8 * self.geometry.len() as u64
+        most.unwrap_or(0) + 8 * (5 + MAP_NAMES.len() as u64) * self.geometry.len() as u64
     }
 
     fn notes(&self) -> Vec<String> {
@@ -195,9 +203,6 @@ impl Generator for Compose {
         for (k, process) in self.processes.iter().enumerate() {
             heights = running.apply(heights, k + 1, process)?;
         }
-        match heights.range() {
-            Some((low, high)) if high > low => Ok(Terrain { heights, maps: running.maps, notes: running.notes }),
-            _ => Err(FLAT),
-        }
+        Ok(Terrain { heights, maps: running.maps, notes: running.notes })
     }
 }

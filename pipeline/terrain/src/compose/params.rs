@@ -223,7 +223,8 @@ impl TryFrom<RawCompose> for Compose {
         let raw = RawCompose { size_m: None, size_px: Some(size.px), ..raw };
         let mut parameters = serde_json::to_value(&raw).unwrap_or_default();
         fill_in(&mut parameters, &processes);
-        Ok(Self { geometry, processes, parameters, notes: size.note().into_iter().collect() })
+        let notes = notes(&size, &processes);
+        Ok(Self { geometry, processes, parameters, notes })
     }
 }
 
@@ -307,10 +308,25 @@ impl Whole {
         if crate::registry::has_parameter(kind, "origin_m") {
             all.insert("origin_m".to_owned(), json!(self.origin_m));
         }
-        crate::prepare(kind, &Value::Object(all)).map_err(|e| match e.key.as_str() {
+        let generator = crate::prepare(kind, &Value::Object(all)).map_err(|e| match e.key.as_str() {
             "kind" => e,
             _ => e.within("parameters"),
-        })
+        })?;
+        self.check_cells(kind, &generator.geometry())?;
+        Ok(generator)
+    }
+
+    /// Published listings may choose cells of their own.
+    fn check_cells(&self, kind: &str, own: &Geometry) -> Result<(), ParameterError> {
+        let whole = self.size.geometry();
+        if (own.rows, own.cols, own.cell) == (whole.rows, whole.cols, whole.cell) {
+            return Ok(());
+        }
+        let message = format!(
+            "make `{kind}` choose {} x {} cells of {} m in place of {} x {} of {} m; leave that to a terrain of its own",
+            own.cols, own.rows, own.cell[0], whole.cols, whole.rows, whole.cell[0]
+        );
+        Err(ParameterError::new("parameters", message))
     }
 }
 
@@ -368,6 +384,17 @@ fn clip(raw: &RawProcess) -> Result<Step, ParameterError> {
 
 fn finite(key: &str, value: f64) -> Result<f64, ParameterError> {
     if value.is_finite() { Ok(value) } else { Err(ParameterError::new(key, format!("is {value}; it must be finite"))) }
+}
+
+/// What the whole and its generators say before they run; a rounded size is said once.
+fn notes(size: &Size, processes: &[Process]) -> Vec<String> {
+    let mut notes: Vec<String> = size.note().into_iter().collect();
+    for operand in processes.iter().flat_map(Process::operands) {
+        let Operand::Generator { generator, .. } = operand else { continue };
+        let said: Vec<String> = generator.notes().into_iter().filter(|note| !notes.contains(note)).collect();
+        notes.extend(said);
+    }
+    notes
 }
 
 /// Writes the full checked parameters of the generators into the raw ones.

@@ -86,7 +86,7 @@ fn val_surfaces_must_reach_the_cells() {
     let error = prepared(json!([{"of": "small"}])).generate(&streams(), &[]).unwrap_err();
     assert!(error.to_string().contains("is not there"));
     let flat = Grid::filled(Geometry::square(40, 40, 0.5), 1.0);
-    let error = prepared(json!([{"of": "flat"}])).generate(&streams(), &[flat]).unwrap_err();
+    let error = prepared(json!([{"of": "flat"}])).generate_checked(&streams(), &[flat]).unwrap_err();
     assert!(error.to_string().contains("same everywhere"), "{error}");
 }
 
@@ -97,6 +97,42 @@ fn val_bases_stand_in_the_order_of_the_processes() {
     let bases: Vec<(String, String)> = generator.bases().into_iter().map(|b| (b.key, b.name)).collect();
     let expected = [("processes.0.of", "a"), ("processes.0.region.of", "b"), ("processes.2.of", "c")];
     assert_eq!(bases, expected.map(|(k, n)| (k.to_owned(), n.to_owned())));
+}
+
+/// Every generator that needs no other surface can take part.
+#[test]
+fn prop_every_generator_composes() {
+    for kind in crate::kinds().iter().filter(|k| k.kind != KIND && crate::prepare(k.kind, &Value::Null).is_ok()) {
+        let params =
+            json!({"size_px": [32, 24], "cell_m": 0.05, "origin_m": [2.0, 1.0], "processes": [{"kind": kind.kind}]});
+        let generator = crate::prepare(KIND, &params).unwrap_or_else(|e| panic!("{}: {e}", kind.kind));
+        if generator.bases().is_empty() {
+            let made = generator.generate(&streams(), &[]).unwrap_or_else(|e| panic!("{}: {e}", kind.kind));
+            assert_eq!(made.heights.geometry, generator.geometry(), "{}", kind.kind);
+            assert!(made.maps.iter().all(|m| m.values.geometry == generator.geometry()), "{}", kind.kind);
+        }
+    }
+}
+
+/// What a process of its own would say is said of the whole.
+#[test]
+fn val_notes_of_generators_go_on() {
+    let listing = json!([{"kind": "mavs_perlin", "parameters": {"compat": true}}, {"kind": "cascade"}]);
+    let generator = prepared(listing);
+    let alone = crate::prepare("mavs_perlin", &json!({"size_px": [30, 20], "cell_m": 0.5, "compat": true})).unwrap();
+    assert!(!alone.notes().is_empty() && alone.notes().iter().all(|note| generator.notes().contains(note)));
+    let wide = json!({"size_px": [70, 64], "processes": [{"kind": "spheroids", "region": {"kind": "cascade", "from": 0, "to": 1}}]});
+    let made = crate::prepare(KIND, &wide).unwrap().generate(&streams(), &[]).unwrap();
+    assert!(made.notes[0].contains("zeta(1)"), "{:?}", made.notes);
+}
+
+/// The listing behind `mavs_gaussian` may choose another cell.
+#[test]
+fn val_cells_of_a_listing_are_refused() {
+    let processes = json!([{"kind": "mavs_gaussian", "parameters": {"compat": true, "hi_len_m": 1.5}}]);
+    let params = json!({"size_px": [5, 5], "cell_m": 3.0, "processes": processes});
+    let error = crate::prepare(KIND, &params).err().unwrap();
+    assert!(error.key == "processes.0.parameters" && error.message.contains("in place of 5 x 5"), "{error}");
 }
 
 #[test]
@@ -155,7 +191,7 @@ proptest! {
         };
         let processes: Vec<Value> = words.into_iter().map(process).collect();
         let generator = crate::prepare(KIND, &json!({"size_px": [9, 8], "processes": processes}));
-        let made = generator.ok().and_then(|g| g.generate(&streams(), &[]).ok());
+        let made = generator.ok().and_then(|g| g.generate_checked(&streams(), &[]).ok());
         if let Some(made) = made {
             let (low, high) = made.heights.range().unwrap();
             prop_assert!(made.heights.finite_count() == 72 && high > low);
