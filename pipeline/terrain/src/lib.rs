@@ -6,6 +6,7 @@
 
 pub mod cascade;
 pub mod compose;
+pub mod elaborate;
 pub mod generator;
 pub mod mavs;
 pub mod multifractal;

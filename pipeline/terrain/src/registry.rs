@@ -2,6 +2,7 @@
 
 use crate::cascade::{Cascade, RawCascade};
 use crate::compose::{Compose, RawCompose};
+use crate::elaborate::{Elaborate, RawElaborate};
 use crate::generator::Generator;
 use crate::mavs;
 use crate::mavs::gap::{Gap, RawGap};
@@ -128,6 +129,13 @@ const ENTRIES: &[Entry] = &[
         source: "JPL synthetic terrain environment, section 2; Golombek and Rapp (1997)",
         parameters: schema_of::<RawPlanetary>,
         prepare: prepare_as::<RawPlanetary, Planetary>,
+    },
+    Entry {
+        kind: crate::elaborate::KIND,
+        summary: "a measured DEM refined below its posts: its own background, fitted texture, bounded craters and rocks",
+        source: "JPL synthetic terrain environment, section 1; Keys (1981)",
+        parameters: schema_of::<RawElaborate>,
+        prepare: prepare_as::<RawElaborate, Elaborate>,
     },
 ];
 

@@ -56,12 +56,12 @@ impl Window {
     }
 
     /// East of a column, lattice units.
-    pub(super) fn x(&self, col: usize) -> f64 {
+    pub fn x(&self, col: usize) -> f64 {
         ((self.west + col as i64) << self.zoom) as f64
     }
 
     /// North of a row, lattice units.
-    pub(super) fn y(&self, row: usize) -> f64 {
+    pub fn y(&self, row: usize) -> f64 {
         ((self.south + row as i64) << self.zoom) as f64
     }
 

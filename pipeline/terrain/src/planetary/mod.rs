@@ -41,9 +41,12 @@ mod tests;
 mod texture;
 mod world;
 
+pub(crate) use assemble::Assembly;
 pub use levels::Window;
 pub use params::{Planetary, RawPlanetary};
+pub(crate) use params::{lattice, window_in_reach};
 pub use processes::RawProcess;
+pub(crate) use processes::{check as check_processes, check_texture};
 pub use rocks::law::Law;
 pub use world::{Patch, ROCK, SAND, World};
 
@@ -97,6 +100,11 @@ fn joined<T: Copy>(window: &Window, tiles: &[Patch], of: fn(&Patch) -> &[T], emp
         }
     }
     all
+}
+
+/// Binary logarithm of the spacing of a grid of lattice points that is nearest to `spacings` in proportion.
+pub(crate) fn nearest_zoom(spacings: f64) -> u32 {
+    levels::floor_log2(spacings * std::f64::consts::SQRT_2)
 }
 
 /// Peak memory of making a patch and of its grids, bytes.

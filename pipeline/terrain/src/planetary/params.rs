@@ -91,9 +91,8 @@ impl TryFrom<RawPlanetary> for Planetary {
         let [west, south] = raw.origin_m.map(|at| column(at, raw.cell_m));
         let window = Window { zoom, west: west?, south: south?, cols: size.cols(), rows: size.rows() };
         let raw = RawPlanetary { size_m: None, size_px: Some(size.px), basic_spacing_m: Some(spacing_m), ..raw };
-        let planetary = Self { raw, size, spacing_m, window };
-        within_reach(&planetary.world(&Streams::for_seed(0, "terrain")), &window)?;
-        Ok(planetary)
+        window_in_reach(&raw.processes, spacing_m, &window)?;
+        Ok(Self { raw, size, spacing_m, window })
     }
 }
 
@@ -105,6 +104,9 @@ impl Planetary {
 }
 
 /// Basic spacing, and how many times it is doubled to the distance of the samples.
+///
+/// # Errors
+/// A distance that is no basic spacing times a power of 2.
 pub fn lattice(basic_spacing_m: Option<f64>, cell_m: f64) -> Result<(f64, u32), ParameterError> {
     let Some(asked_m) = basic_spacing_m else {
         let zoom = (0..62).find(|k| cell_m / spacing(*k) <= SPACING_MAX_M).unwrap_or(0);
@@ -135,12 +137,17 @@ fn column(at_m: f64, cell_m: f64) -> Result<i64, ParameterError> {
     Ok(quotient.round() as i64)
 }
 
-/// Whether a window lies in the world and does not take too much work.
-pub fn within_reach(world: &World, window: &Window) -> Result<(), ParameterError> {
+/// Whether a window lies in the world of some processes and does not take too much work.
+///
+/// # Errors
+/// A window beyond the end of the world, or more craters and rocks than it can be asked to look at.
+pub fn window_in_reach(processes: &[RawProcess], spacing_m: f64, window: &Window) -> Result<(), ParameterError> {
     let ends = [window.x(0), window.y(0), window.x(window.cols), window.y(window.rows)];
     if ends.iter().any(|end| end.abs() > LATTICE_MAX) {
         return Err(ParameterError::new("origin_m", "leads out of the world, which ends at 2^52 basic spacings"));
     }
+    // How many there are does not depend on the seed.
+    let world = assemble::world(processes, spacing_m, 0, &Streams::for_seed(0, "terrain"));
     let objects = world.expected_objects(window);
     if objects <= OBJECTS_MAX {
         return Ok(());

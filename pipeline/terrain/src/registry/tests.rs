@@ -1,5 +1,5 @@
 use super::*;
-use sastrugi_numeric::Streams;
+use sastrugi_numeric::{Geometry, Grid, Streams};
 use serde_json::json;
 
 #[test]
@@ -19,17 +19,29 @@ fn val_part_of_a_layer_leaves_the_rest_at_its_defaults() {
     assert_eq!(all["size_px"], json!([1009, 1009]));
 }
 
+/// Parameters of a small surface of every kind, and what it stands on.
+fn small(kind: &str) -> (Value, Vec<Grid>) {
+    let mut params = json!({"size_m": [1.6, 1.2], "cell_m": 0.05});
+    let mut bases = Vec::new();
+    if kind == "elaborate" {
+        params["dem"] = json!("site");
+        params["origin_m"] = json!([3.0, 3.0]);
+        bases.push(Grid::new(Geometry::square(9, 8, 1.0), (0..72).map(|k| f64::from(k * k % 7)).collect()));
+    }
+    (params, bases)
+}
+
 #[test]
 fn prop_parameters_read_back_to_the_same_generator() {
     for kind in kinds() {
-        let params = json!({"size_m": [1.6, 1.2], "cell_m": 0.05});
+        let (params, bases) = small(kind.kind);
         let first = prepare(kind.kind, &params).unwrap();
         let second = prepare(kind.kind, &first.parameters()).unwrap();
         assert_eq!(first.parameters(), second.parameters());
         assert_eq!(first.geometry(), second.geometry());
         let streams = Streams::for_seed(1, "terrain");
-        let made = first.generate(&streams, &[]).unwrap();
-        assert_eq!(made, second.generate(&streams, &[]).unwrap());
+        let made = first.generate(&streams, &bases).unwrap();
+        assert_eq!(made, second.generate(&streams, &bases).unwrap());
         assert_eq!(made.heights.geometry, first.geometry());
     }
 }

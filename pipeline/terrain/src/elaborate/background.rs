@@ -1,0 +1,82 @@
+//! A smooth surface through the posts of a DEM.
+
+use sastrugi_numeric::Grid;
+
+/// Cubic convolution (Keys, 1981, doi:10.1109/TASSP.1981.1163711, a = -1/2): through every post, without bends, exact on parabolas.
+/// Beyond the outermost posts it goes on at their height.
+pub struct Background {
+    posts: Grid,
+}
+
+impl Background {
+    /// The surface through posts at the centres of a grid's cells; at least 3 x 3, all with data.
+    pub fn new(posts: Grid) -> Self {
+        Self { posts }
+    }
+
+    /// Height at a point, m.
+    pub fn at(&self, [x, y]: [f64; 2]) -> f64 {
+        let g = &self.posts.geometry;
+        let (col, across) = place((x - g.origin[0]) / g.cell[0] - 0.5, g.cols);
+        let (row, up) = place((y - g.origin[1]) / g.cell[1] - 0.5, g.rows);
+        let line = |j: usize| {
+            let values = self.posts.row(g.rows - 1 - j);
+            along(|i| values[i], g.cols, col, across)
+        };
+        along(line, g.rows, row, up)
+    }
+}
+
+/// Post at or before a position, and the share of the way to the next.
+fn place(position: f64, count: usize) -> (usize, f64) {
+    let position = position.clamp(0.0, (count - 1) as f64);
+    let post = (position as usize).min(count - 2);
+    (post, position - post as f64)
+}
+
+/// Between post `at` and the next, from the four around.
+fn along(value: impl Fn(usize) -> f64, count: usize, at: usize, t: f64) -> f64 {
+    let (here, next) = (value(at), value(at + 1));
+    // Keys' condition beyond the ends: the third difference is 0.
+    let before = if at > 0 { value(at - 1) } else { 3.0 * here - 3.0 * next + value(at + 2) };
+    let after = if at + 2 < count { value(at + 2) } else { 3.0 * next - 3.0 * here + value(at - 1) };
+    let (t2, t3) = (t * t, t * t * t);
+    let weights = [t2 - 0.5 * (t + t3), 1.0 - 2.5 * t2 + 1.5 * t3, 0.5 * t + 2.0 * t2 - 1.5 * t3, 0.5 * (t3 - t2)];
+    (weights[0] * before + weights[1] * here) + (weights[2] * next + weights[3] * after)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sastrugi_numeric::Geometry;
+
+    fn of(f: impl Fn(f64, f64) -> f64) -> Background {
+        let g = Geometry { rows: 7, cols: 9, cell: [2.0, 3.0], origin: [10.0, -4.0] };
+        Background::new(Grid::new(g, (0..g.len()).map(|k| f(g.x(k % 9), g.y(k / 9))).collect()))
+    }
+
+    #[test]
+    fn val_parabolas_are_exact() {
+        let f = |x: f64, y: f64| 1.0 + 0.3 * x - 2.0 * y + 0.05 * x * x - 0.02 * y * y + 0.07 * x * y;
+        let background = of(f);
+        for (x, y) in [(11.0, -2.5), (11.7, -2.0), (17.3, 4.4), (26.9, 15.4), (27.0, 15.5)] {
+            assert!((background.at([x, y]) - f(x, y)).abs() < 1e-11, "{x} {y}");
+        }
+    }
+
+    /// Through every post; without steps or bends across the lines of posts; level beyond the ends.
+    #[test]
+    fn prop_smooth_through_the_posts() {
+        let f = |x: f64, y: f64| libm::sin(2.1 * x) * libm::cos(1.3 * y);
+        let background = of(f);
+        let g = background.posts.geometry;
+        for k in 0..g.len() {
+            let place = [g.x(k % 9), g.y(k / 9)];
+            assert_eq!(background.at(place), background.posts.values[k]);
+        }
+        let slope = |x: f64| (background.at([x + 1e-6, 3.3]) - background.at([x - 1e-6, 3.3])) / 2e-6;
+        assert!((slope(15.0 - 2e-6) - slope(15.0 + 2e-6)).abs() < 1e-4);
+        assert_eq!(background.at([-1e9, 3.0]), background.at([11.0, 3.0]));
+        assert!(background.at([1e300, f64::MAX]).is_finite());
+    }
+}

@@ -1,0 +1,114 @@
+//! Parameters of the elaboration.
+
+use crate::planetary::{RawProcess, Window, check_processes, check_texture, lattice, window_in_reach};
+use crate::size::Size;
+use sastrugi_schemas::ParameterError;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Samples when no size is given.
+const DEFAULT_SIZE_PX: [u32; 2] = [1000, 1000];
+/// Offsets of the lattice are whole multiples of this, so that windows of one lattice find the same, m.
+const OFFSET_STEP_M: f64 = 1e-9;
+/// Sample columns and rows are counted up to here.
+const COLUMNS_MAX: f64 = (1u64 << 40) as f64;
+
+/// Finer detail for a measured DEM.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct RawElaborate {
+    /// The DEM: an id in a study, a file on the command line.
+    pub dem: String,
+    /// Size east and north, m; in place of `size_px`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub size_m: Option<[f64; 2]>,
+    /// Samples east and north; 1000 x 1000 when no size is given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub size_px: Option<[u32; 2]>,
+    /// Distance of the samples, m; finer than the DEM.
+    pub cell_m: f64,
+    /// Distance of the lattice points that detail is made on, m: `cell_m` over a power of 2. When absent, over the one that makes it at
+    /// most 0.0125 m. Part of the surface: other spacings give other detail.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub basic_spacing_m: Option<f64>,
+    /// Place of the south-west sample in the DEM's own coordinates, m.
+    pub origin_m: [f64; 2],
+    /// Whether roughness is added; without it (and without processes) the surface is the smooth background.
+    pub texture: bool,
+    /// Hurst exponent of the texture, above 0 to 1; fitted to the DEM when absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub hurst: Option<f64>,
+    /// Standard deviation of a point about the mean of its parents 1 m away, m; fitted to the DEM when absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub roughness_m: Option<f64>,
+    /// Craters, rocks, albedo and dust, in order, as of kind `planetary`: tables with a `kind` of `primary_craters`,
+    /// `secondary_craters`, `rocks`, `albedo`, `dust`. Nothing wider than two posts of the DEM is added: it would show.
+    pub processes: Vec<RawProcess>,
+}
+
+impl Default for RawElaborate {
+    fn default() -> Self {
+        Self {
+            dem: String::new(),
+            size_m: None,
+            size_px: None,
+            cell_m: 0.05,
+            basic_spacing_m: None,
+            origin_m: [0.0; 2],
+            texture: true,
+            hurst: None,
+            roughness_m: None,
+            processes: Vec::new(),
+        }
+    }
+}
+
+/// Checked parameters of the elaboration.
+#[derive(Clone, Debug)]
+pub struct Elaborate {
+    pub(super) raw: RawElaborate,
+    pub(super) size: Size,
+    pub(super) spacing_m: f64,
+    pub(super) window: Window,
+    /// Where lattice point 0 lies in the DEM's coordinates, m.
+    pub(super) offset_m: [f64; 2],
+}
+
+impl TryFrom<RawElaborate> for Elaborate {
+    type Error = ParameterError;
+
+    fn try_from(raw: RawElaborate) -> Result<Self, ParameterError> {
+        if raw.dem.is_empty() {
+            return Err(ParameterError::new("dem", "is missing; it names the DEM to refine"));
+        }
+        let size = Size::check(raw.size_m, raw.size_px, raw.cell_m, DEFAULT_SIZE_PX)?;
+        let (spacing_m, zoom) = lattice(raw.basic_spacing_m, raw.cell_m)?;
+        check_texture(raw.roughness_m.unwrap_or(0.0), raw.hurst.unwrap_or(1.0))?;
+        for (n, process) in raw.processes.iter().enumerate() {
+            if matches!(process, RawProcess::BaseSlope(_) | RawProcess::Texture(_)) {
+                let message = format!("is `{}`; slope and texture of this kind are those of the DEM", process.kind());
+                return Err(ParameterError::new(format!("processes.{n}.kind"), message));
+            }
+        }
+        check_processes(&raw.processes, spacing_m)?;
+        let [west, south] = raw.origin_m.map(|at| column(at, raw.cell_m));
+        let window = Window { zoom, west: west?, south: south?, cols: size.cols(), rows: size.rows() };
+        window_in_reach(&raw.processes, spacing_m, &window)?;
+        let offset_m = [(raw.origin_m[0], window.west), (raw.origin_m[1], window.south)].map(|(at_m, column)| {
+            let beyond_m = at_m - column as f64 * raw.cell_m;
+            (beyond_m / OFFSET_STEP_M).round() * OFFSET_STEP_M
+        });
+        let raw = RawElaborate { size_m: None, size_px: Some(size.px), basic_spacing_m: Some(spacing_m), ..raw };
+        Ok(Self { raw, size, spacing_m, window, offset_m })
+    }
+}
+
+/// The column or row of lattice points that a place is taken for.
+fn column(at_m: f64, cell_m: f64) -> Result<i64, ParameterError> {
+    let column = (at_m / cell_m).round();
+    if column.abs() <= COLUMNS_MAX {
+        Ok(column as i64)
+    } else {
+        Err(ParameterError::new("origin_m", format!("holds {at_m} m; it must lie within 2^40 cells of 0")))
+    }
+}
