@@ -1,6 +1,7 @@
-//! From degrees to metres, crops and thinning.
+//! From degrees to metres, crops, thinning and other numbers of cells.
 
 use crate::grid::{Geometry, Grid};
+use rayon::prelude::*;
 
 /// Semi-major axis of WGS 84, m.
 const SEMI_MAJOR_M: f64 = 6_378_137.0;
@@ -51,9 +52,106 @@ pub fn thin(grid: &Grid, step: usize) -> Grid {
     Grid::new(Geometry { rows, cols, cell, origin: g.origin }, values)
 }
 
+/// The heights at `rows` x `cols` points that lie evenly between the grid's outer cell centres, the outer ones on them:
+/// bilinear, and the grid's own height, bit for bit, where a point is a cell centre. No data spreads to what lies beside it.
+///
+/// # Panics
+/// If either grid has fewer than two rows or columns (a bug of the caller).
+pub fn stretch(grid: &Grid, rows: usize, cols: usize) -> Grid {
+    let g = &grid.geometry;
+    let (from_rows, from_cols) = (places(g.rows, rows), places(g.cols, cols));
+    let values = from_rows.par_iter().flat_map_iter(|&(north, south_share)| {
+        let (upper, lower) = (grid.row(north), grid.row(north + 1));
+        from_cols.iter().map(move |&(west, east_share)| {
+            let across = |row: &[f64]| between(row[west], row[west + 1], east_share);
+            between(across(upper), across(lower), south_share)
+        })
+    });
+    let cell = |axis: usize, from: usize, to: usize| g.cell[axis] * (from - 1) as f64 / (to - 1) as f64;
+    let cell = [cell(0, g.cols, cols), cell(1, g.rows, rows)];
+    let origin = [g.x(0) - 0.5 * cell[0], g.y(g.rows - 1) - 0.5 * cell[1]];
+    Grid::new(Geometry { rows, cols, cell, origin }, values.collect())
+}
+
+/// For each of `to` points along `from` others, the one before it, and how far it lies on the way to the next.
+fn places(from: usize, to: usize) -> Vec<(usize, f64)> {
+    assert!(from >= 2 && to >= 2, "points lie between two outer ones");
+    let place = |k: usize| {
+        let (steps, parts) = (k * (from - 1), to - 1);
+        let before = (steps / parts).min(from - 2);
+        (before, (steps - before * parts) as f64 / parts as f64)
+    };
+    (0..to).map(place).collect()
+}
+
+/// At an end, what is there, whatever the other end holds; a plane stays one.
+fn between(a: f64, b: f64, share: f64) -> f64 {
+    match share {
+        0.0 => a,
+        1.0 => b,
+        _ => a + (b - a) * share,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Surface;
+    use proptest::prelude::*;
+
+    #[test]
+    fn val_stretched_grids_are_bilinear_and_keep_their_outer_centres() {
+        let g = Geometry { rows: 4, cols: 6, cell: [0.5, 0.25], origin: [3.0, -2.0] };
+        let saddle = |x: f64, y: f64| 1.0 + 2.0 * x - 3.0 * y + 0.5 * x * y;
+        let of = |g: Geometry| {
+            let values = (0..g.rows).flat_map(|r| (0..g.cols).map(move |c| saddle(g.x(c), g.y(r)))).collect();
+            Grid::new(g, values)
+        };
+        let wide = stretch(&of(g), 9, 21);
+        let w = &wide.geometry;
+        assert_eq!((w.cell, w.rows, w.cols), ([0.125, 0.09375], 9, 21));
+        assert_eq!([w.x(0), w.x(20), w.y(0), w.y(8)], [g.x(0), g.x(5), g.y(0), g.y(3)]);
+        let largest = wide.values.iter().zip(of(*w).values).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(largest < 1e-12, "{largest}");
+        let plane = stretch(&Grid::filled(Geometry::square(129, 129, 0.5), -3.3), 253, 253);
+        assert!(plane.values.iter().all(|z| *z == -3.3));
+    }
+
+    #[test]
+    fn val_no_data_spreads_to_what_lies_beside_it() {
+        let mut grid = Grid::filled(Geometry::square(3, 3, 1.0), 2.0);
+        grid.values[0] = f64::NAN;
+        let wide = stretch(&grid, 5, 5);
+        assert_eq!(wide.values.iter().filter(|v| v.is_nan()).count(), 4);
+        assert_eq!((wide.at(0, 2), wide.at(2, 0)), (2.0, 2.0));
+    }
+
+    proptest! {
+        /// Where new points fall on cell centres the heights are those, whatever the numbers of rows and columns; elsewhere they
+        /// are the surface's.
+        #[test]
+        fn prop_stretched_grids_lie_on_the_surface(
+            rows in 2usize..9, cols in 2usize..9, times in 1usize..5, more in 2usize..30,
+            heights in prop::collection::vec(-1e3f64..1e3, 64),
+        ) {
+            let grid = Grid::new(Geometry::square(rows, cols, 0.3), heights[..rows * cols].to_vec());
+            let (fine_rows, fine_cols) = (times * (rows - 1) + 1, times * (cols - 1) + 1);
+            let fine = stretch(&grid, fine_rows, fine_cols);
+            for row in 0..rows {
+                for col in 0..cols {
+                    prop_assert_eq!(fine.at(times * row, times * col).to_bits(), grid.at(row, col).to_bits());
+                }
+            }
+            let other = stretch(&grid, more, more);
+            for row in 1..more - 1 {
+                for col in 1..more - 1 {
+                    let (x, y) = (other.geometry.x(col), other.geometry.y(row));
+                    let there = grid.height(x, y).unwrap();
+                    prop_assert!((other.at(row, col) - there).abs() < 1e-9);
+                }
+            }
+        }
+    }
 
     /// Values of the WGS 84 ellipsoid (NGA.STND.0036, 2014): 111 319.49 m per degree of longitude and 110 574.3 m per
     /// degree of latitude at the equator; 111 132.95 m per degree of latitude at 45 degrees.
