@@ -6,7 +6,7 @@ use crate::tables::MissionRow;
 use crate::topics::EventKind;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// `[study]`: the release as a whole.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -164,6 +164,41 @@ pub struct TerrainItem {
     /// Also write a 16-bit PNG of the heights.
     #[serde(default)]
     pub png16: bool,
+    /// Also write folders to import into simulators, `export/<id>/<simulator>/`.
+    #[serde(default)]
+    pub exports: BTreeSet<Simulator>,
+}
+
+/// Program into which a terrain can be imported.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Simulator {
+    /// Unreal Engine: 16-bit PNG of a valid landscape size.
+    Unreal,
+    /// Unity: 16-bit raw heightmap of 2^n + 1 posts a side.
+    Unity,
+    /// Gazebo: SDF model and world with a 16-bit PNG of 2^n + 1 posts a side.
+    Gazebo,
+    /// MuJoCo: MJCF with a height field of 32-bit numbers.
+    Mujoco,
+    /// Isaac Sim and others that read OpenUSD: a mesh with collision.
+    Isaac,
+}
+
+impl Simulator {
+    /// All of them.
+    pub const ALL: [Self; 5] = [Self::Unreal, Self::Unity, Self::Gazebo, Self::Mujoco, Self::Isaac];
+
+    /// Name in studies, on the command line and of folders.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Unreal => "unreal",
+            Self::Unity => "unity",
+            Self::Gazebo => "gazebo",
+            Self::Mujoco => "mujoco",
+            Self::Isaac => "isaac",
+        }
+    }
 }
 
 /// `[[fit]]` around the fit's parameters.

@@ -1,7 +1,9 @@
 //! The command line.
 
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
+use sastrugi_schemas::study::Simulator;
 use sastrugi_store::points::Statistic;
 use std::path::{Path, PathBuf};
 
@@ -104,9 +106,14 @@ pub enum Verb {
         sastrugi compare site.tif synthetic.tif --outer-scale 2\n  \
         sastrugi compare site.json synthetic.json --equivalence-sigma 0.05 --fail-on-difference")]
     Compare(Compare),
-    /// Convert between DEM formats, by file name ending (.tif .asc .hgt .png .npy .obj), and grid point clouds (.las .laz).
+    /// Convert between DEM formats, by file name ending (.tif .asc .hgt .png .npy, meshes .obj .glb .usda), grid point clouds
+    /// (.las .laz), or write a folder to import into a simulator.
     #[command(
-        after_help = "Examples:\n  sastrugi convert N44W072.hgt tile.tif\n  sastrugi convert scan.laz scan.tif --cell 0.05 --fill 2"
+        after_help = "With --for OUT is a folder: the heights, README.md with the steps, import.json with every number. Sizes that the\n\
+        program does not take are resampled (bilinear, over the same ground), and the folder says by how much heights change;\n\
+        with --crop the middle is cut out, and every height stays.\n\n\
+        Examples:\n  sastrugi convert N44W072.hgt tile.tif\n  sastrugi convert scan.laz scan.tif --cell 0.05 --fill 2\n  \
+        sastrugi convert terrain.tif terrain.glb\n  sastrugi convert terrain.tif unreal-terrain --for unreal"
     )]
     Convert(Convert),
     /// Draw a DEM: heights in colours, under a light from the north-west, as PNG.
@@ -577,8 +584,14 @@ pub struct Writing {
 pub struct Convert {
     /// DEM to read.
     pub input: PathBuf,
-    /// DEM to write.
+    /// DEM to write; a folder with --for.
     pub output: PathBuf,
+    /// Write a folder for this simulator.
+    #[arg(long = "for", value_name = "SIMULATOR", value_parser = simulators())]
+    pub simulator: Option<Simulator>,
+    /// Where the simulator takes certain sizes only, cut the largest one out of the middle instead of resampling.
+    #[arg(long, requires = "simulator")]
+    pub crop: bool,
     /// Part of the DEM, x0,y0,x1,y1 in its own coordinates.
     #[arg(long, value_name = "X0,Y0,X1,Y1", allow_hyphen_values = true)]
     pub window: Option<String>,
@@ -591,6 +604,12 @@ pub struct Convert {
     /// How the DEM is written.
     #[command(flatten)]
     pub writing: Writing,
+}
+
+fn simulators() -> impl TypedValueParser<Value = Simulator> {
+    let named =
+        |name: String| Simulator::ALL.into_iter().find(|s| s.name() == name).ok_or("no simulator has this name");
+    PossibleValuesParser::new(Simulator::ALL.map(Simulator::name)).try_map(named)
 }
 
 /// `info`.

@@ -5,7 +5,8 @@ use crate::Verdict;
 use crate::args::{self, Common, Convert, Info};
 use crate::failure::{Code, Failure};
 use crate::output::{columns, print};
-use sastrugi_stages::verbs::{self, Read, Reading, describe_grid, numbers, read_as_it_is, transects};
+use sastrugi_stages::verbs::{self, Read, Reading, describe_grid, numbers, read, read_as_it_is, transects};
+use sastrugi_store::dem::simulators::{self, Fit};
 use sastrugi_store::dem::{self, Dem, DemError};
 use sastrugi_store::mcap;
 use sastrugi_store::release::Release;
@@ -23,18 +24,35 @@ fn failure(error: DemError) -> Failure {
 
 /// `convert`.
 pub fn convert(args: &Convert, common: &Common) -> Verdict {
-    if dem::Format::of_name(&args.output).is_none() {
-        let path = args.output.display();
-        let message = format!("{path}: the ending names no DEM format; .tif, .asc, .hgt, .png, .npy and .obj do");
-        return Err(Failure::usage(message));
-    }
+    let output = args.output.display();
     let options = options(&args.writing, &args.output)?;
+    let format = dem::Format::of_name(&args.output);
+    match (args.simulator, format) {
+        (Some(_), _) if args.output.exists() && !args.output.is_dir() => {
+            return Err(Failure::usage(format!("{output}: is a file; with --for OUT names a folder")));
+        }
+        (None, None) => {
+            let message = format!("{output}: the ending names no DEM format; {} do", dem::WRITTEN_ENDINGS);
+            return Err(Failure::usage(message));
+        }
+        _ => {}
+    }
     let window = args.window.as_deref().map(|w| numbers::<4>("--window", w)).transpose()?;
     let reading = Reading { window, masks: args.masks.all(), ..reading(&args.reading)? };
-    let Read { dem: Dem { grid, info }, notes, .. } = read_as_it_is(&args.input, &reading)?;
-    let lost = dem::write(&args.output, &grid, &info.crs, &options).map_err(failure)?;
+    let in_metres = args.simulator.is_some() || format.is_some_and(dem::Format::in_metres);
+    let read = if in_metres { read } else { read_as_it_is };
+    let Read { dem: Dem { grid, info }, notes, .. } = read(&args.input, &reading)?;
+    let lost = match args.simulator {
+        Some(simulator) => {
+            let fit = if args.crop { Fit::Crop } else { Fit::Resample };
+            let export = simulators::export(&grid, simulator, fit).map_err(failure)?;
+            simulators::write(&args.output, &export).map_err(failure)?;
+            export.notes
+        }
+        None => dem::write(&args.output, &grid, &info.crs, &options).map_err(failure)?,
+    };
     let notes: Vec<&String> = notes.iter().chain(&lost).collect();
-    let mut text = format!("{}: {} x {} cells", args.output.display(), grid.rows(), grid.cols());
+    let mut text = format!("{output}: {} x {} cells", grid.rows(), grid.cols());
     notes.iter().for_each(|note| text.push_str(&format!("\n  note: {note}")));
     let result = json!({ "file": args.output, "grid": describe_grid(&grid), "notes": notes });
     print(common.json, &result, &text)?;

@@ -17,7 +17,7 @@ pub use sastrugi_mobility::metrics::log::LogSettings;
 
 use crate::error::Error;
 use sastrugi_numeric::Grid;
-use sastrugi_store::dem::{DemError, Format};
+use sastrugi_store::dem::{DemError, Format, WRITTEN_ENDINGS};
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -26,8 +26,7 @@ fn check_output(path: &Path) -> Result<(), Error> {
     if Format::of_name(path).is_some() {
         return Ok(());
     }
-    let message =
-        format!("{}: the ending names no DEM format; .tif, .asc, .hgt, .png, .npy and .obj do", path.display());
+    let message = format!("{}: the ending names no DEM format; {WRITTEN_ENDINGS} do", path.display());
     Err(Error::Usage(message))
 }
 

@@ -13,9 +13,10 @@ mod blocks;
 mod crs;
 mod geotiff;
 mod hgt;
+mod mesh;
 mod npy;
-mod obj;
 mod png;
+pub mod simulators;
 mod tiff_writer;
 
 #[cfg(test)]
@@ -36,6 +37,8 @@ use std::path::{Path, PathBuf};
 pub const MAX_CELLS: u64 = 1 << 28;
 /// Bytes that tell a point cloud, which is not read whole.
 const SNIFFED_BYTES: u64 = 4;
+/// Endings of names that [`write`] takes.
+pub const WRITTEN_ENDINGS: &str = ".tif, .asc, .hgt, .png, .npy, .obj, .glb and .usda";
 /// Heights without data in the formats that need a number for it.
 pub const NO_DATA: f64 = -9999.0;
 
@@ -87,6 +90,10 @@ pub enum Format {
     Png,
     /// Wavefront mesh; written only.
     Obj,
+    /// Binary glTF mesh; written only.
+    Glb,
+    /// OpenUSD mesh with collision, as text; written only.
+    Usda,
     /// Point cloud, LAS or LAZ, which is gridded ([`crate::points`]); read only.
     Las,
 }
@@ -101,6 +108,8 @@ impl Format {
             Self::Npy => "npy",
             Self::Png => "png",
             Self::Obj => "obj",
+            Self::Glb => "glb",
+            Self::Usda => "usda",
             Self::Las => "las",
         }
     }
@@ -115,9 +124,16 @@ impl Format {
             "npy" => Some(Self::Npy),
             "png" => Some(Self::Png),
             "obj" => Some(Self::Obj),
+            "glb" => Some(Self::Glb),
+            "usda" => Some(Self::Usda),
             "las" | "laz" => Some(Self::Las),
             _ => None,
         }
+    }
+
+    /// True for formats that state metres, so that a raster in degrees is converted before it is written.
+    pub fn in_metres(self) -> bool {
+        matches!(self, Self::Glb | Self::Usda)
     }
 
     /// The format of a file: by its first bytes, and by its name where those say nothing.
@@ -300,7 +316,7 @@ fn parse(path: &Path, bytes: Vec<u8>, options: &ReadOptions) -> Result<Dem, Refu
         Some(Format::Npy) => npy::parse(&bytes, options),
         Some(Format::Png) => png::parse(&bytes, options),
         Some(Format::Las) => Err(Refusal::new("is no point cloud: LAS and LAZ files start with \"LASF\"")),
-        Some(Format::Obj) | None => Err(Refusal::new(
+        Some(Format::Obj | Format::Glb | Format::Usda) | None => Err(Refusal::new(
             "is no raster that can be read; GeoTIFF, ESRI ASCII, .hgt, .npy, greyscale .png, .las and .laz can",
         )),
     }
@@ -369,8 +385,8 @@ pub struct WriteOptions {
 }
 
 /// Writes heights in the format of the name's ending: `.tif` (float32, tiles of 256, no data -9999, PixelIsArea),
-/// `.asc`, `.npy` (float64), `.hgt` (whole metres, 1201 or 3601 posts), `.png` (16 bit, scaled) or `.obj` (mesh).
-/// Returns sentences on what the format lost.
+/// `.asc`, `.npy` (float64), `.hgt` (whole metres, 1201 or 3601 posts), `.png` (16 bit, scaled), or `.obj`, `.glb`, `.usda`
+/// (meshes). Returns sentences on what the format lost.
 ///
 /// # Errors
 /// [`DemError::Unfit`] when the format cannot hold the grid, [`DemError::Io`] when the file cannot be written.
@@ -382,7 +398,7 @@ pub fn write<'a>(
 ) -> Result<Vec<String>, DemError> {
     let target = target.into();
     let path = target.path;
-    let unfit = |reason: Refusal| DemError::Unfit { path: path.to_owned(), reason: reason.0 };
+    let unfit = |refusal| unfit(path, refusal);
     let (bytes, notes) = match Format::of_name(path) {
         Some(Format::GeoTiff) => (tiff_writer::heights(grid, crs, options).map_err(unfit)?, vec![]),
         Some(Format::EsriAscii) => (ascii::render(grid).map_err(unfit)?, lost_crs(crs)),
@@ -392,11 +408,12 @@ pub fn write<'a>(
             let scale = write_png_heights(target, grid)?;
             return Ok(vec![scale.sentence()]);
         }
-        Some(Format::Obj) => (obj::render(grid), lost_crs(crs)),
+        Some(Format::Obj) => (mesh::obj(grid), lost_crs(crs)),
+        Some(Format::Glb) => (mesh::glb(grid).map_err(unfit)?, shifted(grid, crs)),
+        Some(Format::Usda) => (mesh::usda(grid).map_err(unfit)?, shifted(grid, crs)),
         Some(Format::Las) => return Err(unfit(Refusal::new("point clouds are read, not written"))),
         None => {
-            let reason = "ends in none of .tif, .asc, .hgt, .npy, .png, .obj".to_owned();
-            return Err(DemError::Unfit { path: path.to_owned(), reason });
+            return Err(unfit(Refusal::new(format!("the ending names no DEM format; {WRITTEN_ENDINGS} do"))));
         }
     };
     save(target, &bytes)?;
@@ -406,6 +423,18 @@ pub fn write<'a>(
 fn lost_crs(crs: &Crs) -> Vec<String> {
     let known = *crs != Crs::default();
     known.then(|| "the format keeps no coordinate reference system".to_owned()).into_iter().collect()
+}
+
+/// As [`lost_crs`], for meshes of single precision, whose coordinates must stay small.
+fn shifted(grid: &Grid, crs: &Crs) -> Vec<String> {
+    let [x, y] = grid.geometry.origin;
+    let shift = format!("x and y of the mesh count from the DEM's south-west corner, ({x}, {y})");
+    lost_crs(crs).into_iter().chain(([x, y] != [0.0; 2]).then_some(shift)).collect()
+}
+
+/// A grid that does not fit what was asked for.
+fn unfit(path: &Path, Refusal(reason): Refusal) -> DemError {
+    DemError::Unfit { path: path.to_owned(), reason }
 }
 
 fn save(target: Target<'_>, bytes: &[u8]) -> Result<(), DemError> {
@@ -418,8 +447,7 @@ fn save(target: Target<'_>, bytes: &[u8]) -> Result<(), DemError> {
 /// The file cannot be written.
 pub fn write_classes<'a>(target: impl Into<Target<'a>>, grid: &Grid<u8>, crs: &Crs) -> Result<(), DemError> {
     let target = target.into();
-    let unfit = |reason: Refusal| DemError::Unfit { path: target.path.to_owned(), reason: reason.0 };
-    save(target, &tiff_writer::classes(grid, crs).map_err(unfit)?)
+    save(target, &tiff_writer::classes(grid, crs).map_err(|refusal| unfit(target.path, refusal))?)
 }
 
 /// Reads a class map that [`write_classes`] wrote.

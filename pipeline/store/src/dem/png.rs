@@ -1,11 +1,12 @@
 //! Greyscale PNG: heights as 16-bit levels, for game engines and image programs.
 
-use super::{Claimed, Crs, Dem, DemError, DemInfo, Format, MAX_CELLS, ReadOptions, Refusal, cell_count, geotiff, save};
+use super::{
+    Claimed, Crs, Dem, DemError, DemInfo, Format, MAX_CELLS, ReadOptions, Refusal, cell_count, geotiff, save, unfit,
+};
 use crate::atomic::Target;
 use sastrugi_numeric::Grid;
 use std::fs::File;
 use std::io::{Cursor, Read};
-use std::path::Path;
 
 /// Keyword of the text that tells how to turn levels into heights.
 const KEYWORD: &str = "sastrugi.height";
@@ -63,7 +64,12 @@ pub(super) fn claimed(mut file: File, options: &ReadOptions) -> Option<Claimed> 
 /// The grid is too large for a PNG, or the file cannot be written.
 pub fn write_png16<'a>(target: impl Into<Target<'a>>, grid: &Grid<u16>) -> Result<(), DemError> {
     let target = target.into();
-    save(target, &encode(target.path, grid, None)?)
+    save(target, &levels(grid).map_err(|refusal| unfit(target.path, refusal))?)
+}
+
+/// The bytes of levels as they are.
+pub(super) fn levels(grid: &Grid<u16>) -> Result<Vec<u8>, Refusal> {
+    encode(grid, None)
 }
 
 /// Writes heights as levels from the lowest (1) to the highest (65535) and returns the scale, which is also in the
@@ -74,18 +80,19 @@ pub fn write_png16<'a>(target: impl Into<Target<'a>>, grid: &Grid<u16>) -> Resul
 pub fn write_png_heights<'a>(target: impl Into<Target<'a>>, grid: &Grid) -> Result<HeightScale, DemError> {
     let target = target.into();
     let scale = HeightScale::of(grid);
-    save(target, &encode(target.path, &grid.map(|v| scale.level(v)), Some(scale))?)?;
+    let encoded = encode(&grid.map(|v| scale.level(v)), Some(scale));
+    save(target, &encoded.map_err(|refusal| unfit(target.path, refusal))?)?;
     Ok(scale)
 }
 
-fn encode(path: &Path, grid: &Grid<u16>, scale: Option<HeightScale>) -> Result<Vec<u8>, DemError> {
-    let unfit = |reason: String| DemError::Unfit { path: path.to_owned(), reason };
-    let side = |n: usize| u32::try_from(n).map_err(|_| unfit(format!("{n} pixels a side are too many for a PNG")));
+fn encode(grid: &Grid<u16>, scale: Option<HeightScale>) -> Result<Vec<u8>, Refusal> {
+    let side =
+        |n: usize| u32::try_from(n).map_err(|_| Refusal::new(format!("{n} pixels a side are too many for a PNG")));
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, side(grid.cols())?, side(grid.rows())?);
     encoder.set_color(png::ColorType::Grayscale);
     encoder.set_depth(png::BitDepth::Sixteen);
-    let failed = |e: png::EncodingError| unfit(e.to_string());
+    let failed = |e: png::EncodingError| Refusal::new(e.to_string());
     if let Some(scale) = scale {
         let text = format!("{} {}", scale.offset_m, scale.step_m);
         encoder.add_text_chunk(KEYWORD.to_owned(), text).map_err(failed)?;

@@ -1,0 +1,30 @@
+//! Isaac Sim, and other programs that read OpenUSD: a mesh in metres, z up, whose own triangles collide. Scene coordinates as
+//! they are; cells without data are holes.
+
+use super::posts::Posts;
+use super::{Parts, SAME};
+use crate::dem::{Refusal, mesh};
+use serde_json::json;
+
+const SCENE: &str = "terrain.usda";
+
+pub(super) fn parts(posts: &Posts) -> Result<Parts, Refusal> {
+    Ok(Parts {
+        title: "Isaac Sim",
+        files: vec![(SCENE.to_owned(), mesh::usda(&posts.heights)?)],
+        scene_to_target: SAME,
+        axes: "x east, y north, z up, m",
+        settings: json!({
+            "stage": SCENE,
+            "prim": "/Terrain",
+            "mesh": "/Terrain/Mesh",
+            "meters_per_unit": 1,
+            "up_axis": "Z",
+            "collision": "triangles of the mesh (physics:approximation = none)",
+        }),
+        steps: vec![
+            format!("File, Open `{SCENE}`, or Add Reference in a stage of metres with z up: the prim is /Terrain."),
+            "The mesh collides by its own triangles; a physics scene and a material are the stage's.".to_owned(),
+        ],
+    })
+}

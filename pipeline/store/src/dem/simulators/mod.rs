@@ -1,0 +1,205 @@
+//! Folders to import into simulators: the heights in a form that the program takes, `import.json` with every number that its
+//! import asks for, and `README.md` with the steps.
+//!
+//! Cell centres are posts: the ground reaches from the outer centres to the outer centres, `(cols - 1) x (rows - 1)` cells, and no
+//! height is made up beyond. Scene coordinates (x east, y north, z up, m) are the DEM's less its south-west corner, because
+//! simulators count in single precision; for a generated terrain they are the terrain's own. `scene_to_target` in `import.json`
+//! takes them to those of the program, in whose axes and units all other numbers are.
+//!
+//! Where a program takes certain sizes only, the DEM is resampled or cropped ([`Fit`]), and `import.json` says how; a larger DEM is
+//! refused, not thinned.
+
+mod gazebo;
+mod isaac;
+mod levels;
+mod mujoco;
+mod posts;
+mod unity;
+mod unreal;
+
+#[cfg(test)]
+mod tests;
+
+use super::{DemError, Refusal, mesh, save, unfit};
+use crate::atomic;
+use posts::Posts;
+use sastrugi_numeric::{Geometry, Grid};
+use sastrugi_schemas::study::Simulator;
+use serde_json::{Value, json};
+use std::fmt::Write;
+use std::path::Path;
+
+/// Rough peak of the memory that an export takes for each cell, bytes: four posts, or the text of a mesh.
+pub const BYTES_PER_CELL: u64 = 200;
+
+/// How a DEM of another size is fitted to a simulator that takes certain sizes only.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Fit {
+    /// The smallest size that is large enough, laid over the same ground, bilinear between the cell centres: nothing is cut off,
+    /// peaks lose height.
+    #[default]
+    Resample,
+    /// The largest size that the DEM has, in its middle: every height stays.
+    Crop,
+}
+
+/// What to import into a simulator.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Export {
+    /// Files of the folder: name and bytes.
+    pub files: Vec<(String, Vec<u8>)>,
+    /// Sentences a user must know.
+    pub notes: Vec<String>,
+}
+
+/// What the module of a simulator adds to what all exports have.
+struct Parts {
+    /// The program's name.
+    title: &'static str,
+    files: Vec<(String, Vec<u8>)>,
+    /// Rows of the matrix from scene coordinates (x, y, z, 1) to the program's.
+    scene_to_target: [[f64; 4]; 3],
+    /// Axes and unit of the program's coordinates.
+    axes: &'static str,
+    /// What the import asks for.
+    settings: Value,
+    /// What to do, in order.
+    steps: Vec<String>,
+}
+
+/// Scene coordinates as they are.
+const SAME: [[f64; 4]; 3] = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
+
+/// The sides, in posts, of which a simulator takes square terrains only; ascending.
+const fn sizes(simulator: Simulator) -> Option<&'static [usize]> {
+    match simulator {
+        Simulator::Unreal => Some(&unreal::SIZES),
+        Simulator::Unity => Some(&unity::SIZES),
+        Simulator::Gazebo => Some(&gazebo::SIZES),
+        Simulator::Mujoco | Simulator::Isaac => None,
+    }
+}
+
+/// Refuses a DEM of a size that the simulator does not take.
+///
+/// # Errors
+/// [`DemError::Unfit`] for fewer than two rows or columns; more, or for a crop fewer, than the program takes.
+pub fn check_size(geometry: &Geometry, simulator: Simulator, fit: Fit) -> Result<(), DemError> {
+    size(geometry, simulator, fit).map(drop).map_err(|refusal| unfit(Path::new(simulator.name()), refusal))
+}
+
+/// Posts a side where the simulator takes certain sizes only.
+fn size(g: &Geometry, simulator: Simulator, fit: Fit) -> Result<Option<usize>, Refusal> {
+    let cells = format!("{} x {} cells", g.cols, g.rows);
+    if g.rows < 2 || g.cols < 2 {
+        return Err(Refusal::new(format!("{cells} are no surface, which takes two rows and two columns at least")));
+    }
+    if simulator == Simulator::Isaac && g.len() > mesh::MAX_CELLS {
+        return Err(Refusal::new(format!("{cells} are more than the {} of a mesh; cut a window", mesh::MAX_CELLS)));
+    }
+    let Some(sizes) = sizes(simulator) else { return Ok(None) };
+    let (smallest, largest) = (sizes[0], sizes[sizes.len() - 1]);
+    let (fitting, refusal) = match fit {
+        Fit::Resample => (
+            sizes.iter().find(|&&size| size >= g.cols.max(g.rows)),
+            format!("{cells} are more than {largest} posts a side; cut a window"),
+        ),
+        Fit::Crop => (
+            sizes.iter().rfind(|&&size| size <= g.cols.min(g.rows)),
+            format!("{cells} are fewer than {smallest} posts a side, of which a crop is made; leave --crop out"),
+        ),
+    };
+    fitting.copied().ok_or_else(|| Refusal::new(refusal)).map(Some)
+}
+
+/// The files for a simulator, of heights in metres. The same heights give the same bytes.
+///
+/// # Errors
+/// [`DemError::Unfit`] as [`check_size`], and for cells without data where the program has no holes.
+pub fn export(grid: &Grid, simulator: Simulator, fit: Fit) -> Result<Export, DemError> {
+    let refused = |refusal| unfit(Path::new(simulator.name()), refusal);
+    let posts = posts(grid, simulator, fit).map_err(refused)?;
+    let mut parts = parts(&posts, simulator).map_err(refused)?;
+    let mut files = std::mem::take(&mut parts.files);
+    files.push(("import.json".to_owned(), import_json(&posts, &parts, simulator).into_bytes()));
+    files.push(("README.md".to_owned(), readme(&posts, &parts).into_bytes()));
+    Ok(Export { files, notes: posts.sentence().into_iter().collect() })
+}
+
+/// Writes the files of an export to a folder, which is made where there is none.
+///
+/// # Errors
+/// [`DemError::Io`] when a file cannot be written.
+pub fn write(folder: &Path, export: &Export) -> Result<(), DemError> {
+    atomic::clear_leftovers(&folder.join("README.md"));
+    export.files.iter().try_for_each(|(name, bytes)| save((&folder.join(name)).into(), bytes))
+}
+
+fn posts(grid: &Grid, simulator: Simulator, fit: Fit) -> Result<Posts, Refusal> {
+    match size(&grid.geometry, simulator, fit)? {
+        Some(size) if fit == Fit::Crop => Posts::cropped(grid, size),
+        Some(size) => Posts::resampled(grid, size),
+        None if simulator == Simulator::Mujoco => Posts::without_holes(grid),
+        None => Posts::of(grid),
+    }
+}
+
+fn parts(posts: &Posts, simulator: Simulator) -> Result<Parts, Refusal> {
+    match simulator {
+        Simulator::Unreal => unreal::parts(posts),
+        Simulator::Unity => Ok(unity::parts(posts)),
+        Simulator::Gazebo => gazebo::parts(posts),
+        Simulator::Mujoco => Ok(mujoco::parts(posts)),
+        Simulator::Isaac => isaac::parts(posts),
+    }
+}
+
+fn import_json(posts: &Posts, parts: &Parts, simulator: Simulator) -> String {
+    let g = posts.geometry();
+    let value = json!({
+        "program": crate::PROGRAM,
+        "target": simulator.name(),
+        "scene": {
+            "axes": "x east, y north, z up, m",
+            "dem_minus_scene_m": posts.shift_m,
+            "south_west_post_m": posts.south_west_m(),
+            "ground_m": posts.ground_m(),
+            "height_min_m": posts.low_m,
+            "height_max_m": posts.high_m,
+        },
+        "posts": [g.cols, g.rows],
+        "spacing_m": g.cell,
+        "cells_of_dem": posts.source,
+        "fit": posts.fitting(),
+        "target_axes": parts.axes,
+        "scene_to_target": parts.scene_to_target,
+        "settings": parts.settings,
+    });
+    format!("{value:#}\n")
+}
+
+fn readme(posts: &Posts, parts: &Parts) -> String {
+    let (g, [east, north]) = (posts.geometry(), posts.ground_m());
+    let mut text = format!("# Terrain for {}\n\n", parts.title);
+    // Writing to a string cannot fail.
+    let _ = write!(
+        text,
+        "Ground: {east} m east-west by {north} m north-south between the outer posts, heights {} to {} m. {} x {} posts, {} x {} m \
+         apart; every post is a point of the ground, not a cell.",
+        posts.low_m, posts.high_m, g.cols, g.rows, g.cell[0], g.cell[1]
+    );
+    let _ = match posts.sentence() {
+        Some(sentence) => write!(text, " {sentence}.\n\n"),
+        None => write!(text, " They are the cell centres of the DEM.\n\n"),
+    };
+    let _ = write!(
+        text,
+        "Scene coordinates (x east, y north, z up, m) are the DEM's less ({}, {}); `scene_to_target` in `import.json` takes them to \
+         those of {}: {}. The numbers below stand there too.\n\n",
+        posts.shift_m[0], posts.shift_m[1], parts.title, parts.axes
+    );
+    for (k, step) in parts.steps.iter().enumerate() {
+        let _ = writeln!(text, "{}. {step}", k + 1);
+    }
+    text
+}

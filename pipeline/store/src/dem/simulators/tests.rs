@@ -1,0 +1,140 @@
+use super::*;
+use proptest::prelude::*;
+
+/// Heights that differ under every turn and mirror.
+fn slanted(rows: usize, cols: usize) -> Grid {
+    let geometry = Geometry { rows, cols, cell: [0.5, 0.25], origin: [1000.0, -20.0] };
+    let height = |r: usize, c: usize| 100.0 + 0.3 * c as f64 - 0.7 * r as f64 + 0.01 * (r * c) as f64;
+    Grid::new(geometry, (0..rows).flat_map(|r| (0..cols).map(move |c| height(r, c))).collect())
+}
+
+fn resampled(grid: &Grid, simulator: Simulator) -> Result<Export, DemError> {
+    export(grid, simulator, Fit::Resample)
+}
+
+fn numbers(export: &Export) -> Value {
+    let (_, bytes) = export.files.iter().find(|(name, _)| name == "import.json").unwrap();
+    serde_json::from_slice(bytes).unwrap()
+}
+
+/// A size that the program takes is neither resampled nor stretched; any other keeps its ground.
+#[test]
+fn val_sizes_that_fit_are_not_resampled() {
+    for (simulator, fitting, smallest) in
+        [(Simulator::Unreal, 127, 127), (Simulator::Unity, 65, 65), (Simulator::Gazebo, 129, 129)]
+    {
+        let fits = resampled(&slanted(fitting, fitting), simulator).unwrap();
+        assert_eq!((numbers(&fits)["fit"]["method"].as_str(), fits.notes.len()), (Some("none"), 0));
+        let other = resampled(&slanted(60, 40), simulator).unwrap();
+        let found = numbers(&other);
+        assert_eq!(found["posts"], json!([smallest, smallest]), "{}", simulator.name());
+        assert_eq!(found["scene"]["ground_m"], json!([19.5, 14.75]));
+        assert!(other.notes[0].contains("bilinear between the 40 x 60 cell centres"), "{:?}", other.notes);
+    }
+    for simulator in [Simulator::Mujoco, Simulator::Isaac] {
+        let found = numbers(&resampled(&slanted(60, 40), simulator).unwrap());
+        assert_eq!((found["posts"].clone(), found["fit"]["method"].as_str()), (json!([40, 60]), Some("none")));
+    }
+}
+
+/// A crop is the middle, at its place in the scene; one that the DEM does not hold is refused.
+#[test]
+fn val_crops_keep_heights_and_place() {
+    let grid = slanted(140, 131);
+    for (simulator, size) in [(Simulator::Unreal, 127), (Simulator::Gazebo, 129), (Simulator::Unity, 129)] {
+        let made = export(&grid, simulator, Fit::Crop).unwrap();
+        let (row, col) = ((140 - size) / 2, (131 - size) / 2);
+        let posts = posts(&grid, simulator, Fit::Crop).unwrap();
+        assert_eq!(posts.heights.values, grid.window(row, col, size, size).values);
+        let south_west = [grid.geometry.x(col) - 1000.0, grid.geometry.y(row + size - 1) + 20.0];
+        assert_eq!(posts.south_west_m(), south_west);
+        let found = numbers(&made);
+        assert_eq!((found["fit"]["method"].as_str(), &found["posts"]), (Some("crop"), &json!([size, size])));
+        assert!(made.notes[0].contains("the middle of the 131 x 140 cell centres"), "{:?}", made.notes);
+        let refused = export(&slanted(140, 33), simulator, Fit::Crop);
+        assert_eq!(refused.is_err(), simulator != Simulator::Unity, "{refused:?}");
+    }
+    let fits = export(&slanted(127, 127), Simulator::Unreal, Fit::Crop).unwrap();
+    assert_eq!(fits, resampled(&slanted(127, 127), Simulator::Unreal).unwrap());
+}
+
+/// One sentence each, which names the program and says what would be right.
+#[test]
+fn val_what_cannot_be_exported_is_refused() {
+    let refusal = |grid: &Grid, simulator| resampled(grid, simulator).unwrap_err().to_string();
+    let mut holed = slanted(10, 10);
+    holed.values[17] = f64::NAN;
+    for simulator in [Simulator::Unreal, Simulator::Unity, Simulator::Gazebo, Simulator::Mujoco] {
+        let found = refusal(&holed, simulator);
+        assert!(found.starts_with(simulator.name()) && found.contains("1 cells hold no data"), "{found}");
+    }
+    assert!(resampled(&holed, Simulator::Isaac).is_ok(), "a mesh has holes");
+    holed.values.fill(f64::NAN);
+    let thin = slanted(1, 10);
+    let large = Geometry::square(4098, 8, 1.0);
+    for simulator in Simulator::ALL {
+        assert!(resampled(&holed, simulator).is_err() && resampled(&thin, simulator).is_err());
+        let found = check_size(&large, simulator, Fit::Resample).err().map(|e| e.to_string()).unwrap_or_default();
+        let limited = [Simulator::Unity, Simulator::Gazebo].contains(&simulator);
+        assert_eq!(found.contains("more than 4097 posts a side"), limited, "{found}");
+    }
+    assert!(check_size(&Geometry::square(8130, 8, 1.0), Simulator::Unreal, Fit::Resample).is_err());
+    assert!(check_size(&Geometry::square(4097, 4097, 1.0), Simulator::Isaac, Fit::Resample).is_err());
+}
+
+/// A plane has no relief to scale by.
+#[test]
+fn val_planes_are_exported() {
+    let plane = Grid::filled(Geometry::square(129, 129, 0.5), -3.25);
+    for simulator in Simulator::ALL {
+        let found = numbers(&resampled(&plane, simulator).unwrap());
+        assert!(found["scene"]["height_min_m"] == -3.25 && found["scene"]["height_max_m"] == -3.25);
+    }
+}
+
+/// The cell centres of the triangles' corners, for three formats: counter-clockwise from above, holes left out.
+#[test]
+fn val_meshes_leave_holes_out() {
+    let mut grid = slanted(3, 3);
+    grid.values[0] = f64::NAN;
+    let text = String::from_utf8(mesh::obj(&grid)).unwrap();
+    let lines = |start: &str| text.lines().filter(|l| l.starts_with(start)).map(str::to_owned).collect::<Vec<_>>();
+    assert_eq!(lines("v ")[0], "v 1000.75 -19.375 100.3");
+    assert_eq!((lines("v ").len(), lines("f ").len()), (8, 6));
+    assert_eq!(lines("f ")[0], "f 1 4 5");
+    let usda = String::from_utf8(mesh::usda(&grid).unwrap()).unwrap();
+    assert!(usda.contains("points = [(0.75, 0.625, 100.3), "), "{usda}");
+    let glb = mesh::glb(&grid).unwrap();
+    assert_eq!(u32::from_le_bytes(glb[8..12].try_into().unwrap()) as usize, glb.len());
+    grid.values[2..].fill(f64::NAN);
+    assert!(mesh::usda(&grid).is_err() && mesh::glb(&grid).is_err(), "no triangle is left");
+}
+
+proptest! {
+    /// Any heights: levels span what they must, and a number that a person types is not below what is needed.
+    #[test]
+    fn prop_levels_hold_every_height(
+        heights in prop::collection::vec(-9e3f64..9e3, 9), scale in 1e-3f64..1.0,
+    ) {
+        let grid = Grid::new(Geometry::square(3, 3, 0.1), heights.iter().map(|z| z * scale).collect());
+        for simulator in [Simulator::Unreal, Simulator::Unity, Simulator::Gazebo] {
+            let posts = posts(&grid, simulator, Fit::Resample).unwrap();
+            let found = numbers(&resampled(&grid, simulator).unwrap());
+            let level = &found["settings"]["height_of_level"];
+            let (offset, step) = (level["offset_m"].as_f64().unwrap(), level["step_m"].as_f64().unwrap());
+            let rounding = 1e-9 * posts.high_m.abs().max(posts.low_m.abs());
+            prop_assert!(offset - 0.5 * step <= posts.low_m + rounding);
+            prop_assert!(offset + 65535.5 * step >= posts.high_m - rounding);
+            prop_assert!(step <= 1.001 * (posts.relief_m() + 0.002) / 65534.0);
+        }
+    }
+
+    #[test]
+    fn prop_rounding_up_keeps_six_digits(value in 1e-9f64..1e9) {
+        let rounded = levels::rounded_up(value);
+        prop_assert!(rounded >= value && rounded < value * (1.0 + 3e-5));
+        // A digit, a point and five digits.
+        let text = format!("{rounded:e}");
+        prop_assert!(text.split('e').next().unwrap().len() <= 7);
+    }
+}

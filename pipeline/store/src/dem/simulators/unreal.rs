@@ -1,0 +1,63 @@
+//! Unreal Engine: a heightmap of a landscape. Left-handed: X east, Y south, Z up, in centimetres; the first row of the picture is
+//! the northern one, which lies at the smallest Y.
+//!
+//! Landscapes are of whole components; the sizes are those of the table "Recommended Landscape Sizes" in Epic Games, "Landscape
+//! Technical Guide" (Unreal Engine 5). Level 32768 is height 0, and one level is 1/128 of the scale in centimetres (ibid., at
+//! scale 100 the levels reach from -256 to 256 m).
+
+use super::Parts;
+use super::levels::{Levels, rounded_up, to_millimetres};
+use super::posts::Posts;
+use crate::dem::{Refusal, png};
+use serde_json::json;
+
+/// Posts a side.
+pub(super) const SIZES: [usize; 7] = [127, 253, 505, 1009, 2017, 4033, 8129];
+const ZERO_LEVEL: f64 = 32768.0;
+/// Levels for one unit of the scale's Z in metres: 128 for a hundredth of a metre.
+const LEVELS_PER_SCALE: f64 = 12800.0;
+
+pub(super) fn parts(posts: &Posts) -> Result<Parts, Refusal> {
+    let middle_m = to_millimetres(0.5 * (posts.low_m + posts.high_m));
+    let reach_m = (posts.high_m - middle_m).max(middle_m - posts.low_m);
+    // Levels 1 to 65535; a plane takes any scale.
+    let scale_z = if reach_m > 0.0 { rounded_up(reach_m / 32767.0 * LEVELS_PER_SCALE) } else { 1.0 };
+    let step_m = scale_z / LEVELS_PER_SCALE;
+    let levels = Levels { offset_m: middle_m - ZERO_LEVEL * step_m, step_m };
+    let g = posts.geometry();
+    let north_west = [100.0 * g.x(0), -100.0 * g.y(0), 100.0 * middle_m];
+    let scale = [100.0 * g.cell[0], 100.0 * g.cell[1], scale_z];
+    let (section, per_component) = if g.cols == 8129 { (127, 254) } else { (63, 126) };
+    let components = (g.cols - 1) / per_component;
+    let [sx, sy, sz] = scale;
+    let [x, y, z] = north_west;
+    Ok(Parts {
+        title: "Unreal Engine",
+        files: vec![("heightmap.png".to_owned(), png::levels(&levels.of(posts))?)],
+        scene_to_target: [[100.0, 0.0, 0.0, 0.0], [0.0, -100.0, 0.0, 0.0], [0.0, 0.0, 100.0, 0.0]],
+        axes: "X east, Y south, Z up, cm, left-handed",
+        settings: json!({
+            "heightmap": "heightmap.png",
+            "section_quads": section,
+            "sections_per_component": [2, 2],
+            "components": [components, components],
+            "scale": scale,
+            "location_cm": north_west,
+            "height_of_level": levels.describe(),
+        }),
+        steps: vec![
+            "Landscape mode, Manage, New, Import from File: choose `heightmap.png`.".to_owned(),
+            format!(
+                "Section Size {section} x {section} quads, 2 x 2 sections per component, {components} x {components} components \
+                 (Fit to Data finds them); Overall Resolution must read {0} x {0}.",
+                g.cols
+            ),
+            format!("Scale X = {sx}, Y = {sy}, Z = {sz}. Import."),
+            format!(
+                "In the Details of the Landscape actor set Location X = {x}, Y = {y}, Z = {z}: its north-west post at the height of \
+                 level 32768."
+            ),
+            "A yaw of the scene (counter-clockwise from east) is the negative yaw in Unreal.".to_owned(),
+        ],
+    })
+}
