@@ -60,6 +60,44 @@ fn val_studies_are_refused_with_the_line() {
     study_refused("date = \"2026-01-01\"", "date = \"yesterday\"", &["YYYY-MM-DD"]);
 }
 
+/// Exports that no simulator takes: one sentence with what would be right, and no file.
+#[test]
+fn val_exports_are_refused() {
+    study_refused("count = 2", "exports = [\"unrael\"]", &["unrael", "unreal", "mujoco"]);
+    study_refused(
+        "size_px = [320, 300]",
+        "size_px = [4200, 300]\nexports = [\"unity\"]",
+        &["unity", "4097 posts a side"],
+    );
+    let folder = area();
+    let path = folder.path();
+    let head = "ncols 3\nnrows 3\nxllcorner 0\nyllcorner 0\ncellsize 0.5\nnodata_value -9999\n";
+    write(path, "holed.asc", &format!("{head}1 2 3\n4 -9999 6\n7 8 9\n"));
+    write(path, "row.asc", &format!("{}1 2 3\n", head.replace("nrows 3", "nrows 1")));
+    write(path, "file", "");
+    for target in ["unreal", "unity", "gazebo", "mujoco"] {
+        refused(
+            path,
+            &["convert", "holed.asc", "out", "--for", target],
+            USAGE,
+            &[target, "1 cells hold no data", "--fill"],
+        );
+    }
+    refused(path, &["convert", "row.asc", "out.glb"], USAGE, &["out.glb", "no three neighbouring cells"]);
+    refused(
+        path,
+        &["convert", "holed.asc", "out", "--for", "unreal", "--crop"],
+        USAGE,
+        &["fewer than 127 posts a side"],
+    );
+    refused(path, &["convert", "holed.asc", "out.tif", "--crop"], USAGE, &["--for"]);
+    refused(path, &["convert", "row.asc", "out", "--for", "isaac"], USAGE, &["isaac", "3 x 1 cells are no surface"]);
+    refused(path, &["convert", "holed.asc", "out", "--for", "blender"], USAGE, &["blender", "unreal", "isaac"]);
+    refused(path, &["convert", "holed.asc", "file", "--for", "isaac"], USAGE, &["file: is a file"]);
+    refused(path, &["convert", "holed.asc", "out", "--for", "isaac", "--cog"], USAGE, &["--cog takes a GeoTIFF"]);
+    refused(path, &["convert", "holed.asc", "out"], USAGE, &["the ending names no DEM format", ".usda"]);
+}
+
 /// A hypothesis that cannot be tested is refused before anything runs, with its place.
 #[test]
 fn val_hypotheses_are_refused_with_the_line() {

@@ -1,4 +1,5 @@
-//! Independent readers on our files: rasterio, pyarrow, duckdb, laspy, GSTools and the Python mcap reader see what we say.
+//! Independent readers on our files: rasterio, pyarrow, duckdb, laspy, GSTools, MuJoCo, OpenUSD, trimesh and the Python mcap reader see
+//! what we say.
 //!
 //! The readers live in `.cache/readers`, which `./test` sets up. Without them these tests are skipped with a message; with
 //! CI set that is a failure.
@@ -28,6 +29,11 @@ fn val_readers_agree_with_a_release() {
     let call = sastrugi_in(folder.path(), &["run", "study.toml", "-o", "release", "--quiet"]);
     assert_eq!(call.code, 0, "{}", call.stderr);
     let release = folder.path().join("release");
+    let exports = ["unreal", "unity", "gazebo", "mujoco", "isaac"].map(|name| release.join("export/smooth").join(name));
+    let terrain = release.join("terrain/smooth.tif");
+    let paths: Vec<&Path> = std::iter::once(&terrain).chain(&exports).map(PathBuf::as_path).collect();
+    let call = check(&python, "check_exports.py", &paths);
+    assert_eq!(call.code, 0, "{}{}", call.stdout, call.stderr);
     for script in ["check_dems.py", "check_tables.py", "check_mcap.py", "check_metadata.py", "check_rerun.py"] {
         let call = check(&python, script, &[&release]);
         assert_eq!(call.code, 0, "{script}: {}{}", call.stdout, call.stderr);
@@ -85,6 +91,65 @@ fn val_cloud_optimised_files_are_valid() {
     let compared: Value = serde_json::from_str(&call.stdout).unwrap();
     assert_eq!(compared["answer"], "same");
     assert!(compared["files"]["packaging"].as_array().unwrap().contains(&"terrain/t.tif".into()), "{compared}");
+}
+
+/// Heights, scale and orientation of everything that `convert` writes for simulators, as their own rules and independent readers have
+/// them: an oblong terrain that must be resampled; one of a size that fits; one cropped; a DEM far from its origin, with oblong cells; one with holes.
+#[test]
+fn val_simulators_see_the_terrain() {
+    let Some(python) = python() else { return };
+    let folder = area();
+    let path = folder.path();
+    let run = |arguments: &[&str]| {
+        let call = sastrugi_in(path, arguments);
+        assert_eq!(call.code, 0, "{arguments:?}: {}", call.stderr);
+    };
+    for (dem, size) in
+        [("oblong.tif", "size_px=[90,70]"), ("fits.tif", "size_px=[129,129]"), ("large.tif", "size_px=[150,133]")]
+    {
+        run(&["terrain", "multifractal", "--set", size, "--seed", "3", "-o", dem]);
+    }
+    for (name, hole) in [("far", "2101.25"), ("holed", "-9999")] {
+        let heights: Vec<String> = (0..24 * 30).map(|k| format!("{}", 2100 + (k * k) % 97 - k / 30)).collect();
+        let rows: Vec<String> = heights.chunks(30).map(|row| row.join(" ")).collect();
+        let head =
+            "ncols 30\nnrows 24\nxllcorner 664692.5\nyllcorner 4878903.25\ndx 0.5\ndy 0.25\nnodata_value -9999\n";
+        write(
+            path,
+            &format!("{name}.asc"),
+            &format!("{head}{}\n", rows.join("\n").replace(" 2105 ", &format!(" {hole} "))),
+        );
+        run(&["convert", &format!("{name}.asc"), &format!("{name}.tif")]);
+    }
+    for (name, targets) in [
+        ("oblong", &["unreal", "unity", "gazebo", "mujoco", "isaac"][..]),
+        ("fits", &["unreal", "unity", "gazebo", "mujoco", "isaac"]),
+        ("far", &["unreal", "unity", "gazebo", "mujoco", "isaac"]),
+        ("large", &["unity"]),
+        ("holed", &["isaac"]),
+    ] {
+        let dem = format!("{name}.tif");
+        let mut made = vec![path.join(&dem)];
+        for target in targets {
+            let out = format!("{name}-{target}");
+            run(&["convert", &dem, &out, "--for", target, "--quiet"]);
+            made.push(path.join(out));
+        }
+        if name == "large" {
+            for target in ["unreal", "unity", "gazebo"] {
+                let out = format!("{name}-{target}-crop");
+                run(&["convert", &dem, &out, "--for", target, "--crop", "--quiet"]);
+                made.push(path.join(out));
+            }
+        }
+        for ending in ["glb", "obj", "usda", "npy"] {
+            let out = format!("{name}.{ending}");
+            run(&["convert", &dem, &out, "--quiet"]);
+            made.push(path.join(out));
+        }
+        let call = check(&python, "check_exports.py", &made.iter().map(PathBuf::as_path).collect::<Vec<_>>());
+        assert_eq!(call.code, 0, "{name}: {}{}", call.stdout, call.stderr);
+    }
 }
 
 /// A terrain of more than two tiles a side.
@@ -146,7 +211,8 @@ const MANY_TERRAINS: &str = "[study]\nname = \"many\"\nseed = 7\ndate = \"2026-1
     [[missions]]\nid = \"m\"\nterrains = [\"t\"]\ncount = 1\nlength_m = 4.0\nborder_m = 1.5\n\n\
     [[traverse]]\nid = \"h\"\nmissions = \"m\"\ntimeout_s = 0.5\n";
 
-/// The small study with all that a release can say of itself: version and DOI, terms of its data, a split, methods side by side.
+/// The small study with all that a release can say of itself: version and DOI, terms of its data, a split, methods side by side,
+/// exports.
 fn described_study() -> String {
     let head = "seed = 7\ntitle = \"Small: \\\"rough\\\" & smooth\"\nversion = \"1.0.0\"\ndoi = \"10.5281/zenodo.1234567\"\n\
         creators = [\"Person, A.\", \"A group\"]\norganizations = [\"A group\"]\nsplit = [0.4, 0.3, 0.3]\n";
@@ -155,7 +221,8 @@ fn described_study() -> String {
     let study = small_study().replace("seed = 7\n", head).replace("id = \"site\"\n", dem);
     let methods = "[[texture]]\nid = \"side\"\nfit = \"naive\"\nmethods = [\"fft_ma\", \"gaussians\"]\nrealisations = 2\n\
         size_m = [4500.0, 4500.0]\ncell_m = 90.0\n";
-    study.replace("count = 2\n", "count = 3\n").replace("group = \"b\"\n", "") + methods
+    let exports = "exports = [\"unreal\", \"unity\", \"gazebo\", \"mujoco\", \"isaac\"]\n";
+    study.replace("count = 2\n", "count = 3\n").replace("group = \"b\"\n", exports) + methods
 }
 
 /// Every measured DEM reads as rasterio (or numpy) reads it.

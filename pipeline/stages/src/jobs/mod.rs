@@ -1,6 +1,7 @@
 //! Jobs: one file per stage, each the glue between a kernel and the files of an item.
 
 pub mod dem;
+pub mod exports;
 pub mod fit;
 pub mod mask;
 pub mod missions;

@@ -1,6 +1,7 @@
 //! Stage `terrain`: one generated heightfield.
 
 use super::dem::{HEIGHTS, input_error};
+use super::exports::Exports;
 use super::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work, raster_options, raster_packing};
 use crate::registry::{BuildError, Builder, Heightfield};
 use crate::revision::Room;
@@ -28,6 +29,7 @@ struct TerrainJob {
     base_cells: u64,
     streams: Streams,
     png16: bool,
+    exports: Exports,
     geotiff: GeoTiff,
 }
 
@@ -64,9 +66,10 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
                 geometry: Some(generator.geometry()),
             };
             let geotiff = builder.study.head.geotiff;
+            let exports = Exports::new(&item.exports, &generator.geometry()).map_err(|e| entry.error("exports", e))?;
             let parents = bases.clone().into_iter().collect::<BTreeSet<_>>().into_iter().collect();
             let id = one.id.clone();
-            let job = TerrainJob { id, generator, bases, base_cells, streams, png16: item.png16, geotiff };
+            let job = TerrainJob { id, generator, bases, base_cells, streams, png16: item.png16, exports, geotiff };
             let node = Node {
                 item: field.item.clone(),
                 parents,
@@ -125,7 +128,7 @@ impl Job for TerrainJob {
 
     fn packing(&self) -> Value {
         let raster = raster_packing(self.geotiff);
-        if self.png16 { json!({ "raster": raster, "png16": true }) } else { raster }
+        self.exports.packing(if self.png16 { json!({ "raster": raster, "png16": true }) } else { raster })
     }
 
     fn rooms(&self) -> &'static [Room] {
@@ -133,12 +136,13 @@ impl Job for TerrainJob {
     }
 
     fn memory_bytes(&self) -> u64 {
-        self.generator.memory_bytes() + 8 * self.base_cells
+        let exports = self.exports.memory_bytes(self.generator.geometry().len() as u64);
+        self.generator.memory_bytes() + 8 * self.base_cells + exports
     }
 
     fn estimate(&self) -> Estimate {
         let cells = self.generator.geometry().len() as f64;
-        Estimate { seconds: 4e-7 * cells, bytes: 3.0 * cells }
+        Estimate { seconds: 4e-7 * cells, bytes: 3.0 * cells + self.exports.bytes(cells) }
     }
 
     fn run(&self, work: &Work<'_>) -> Result<Outcome, JobError> {
@@ -156,7 +160,9 @@ impl Job for TerrainJob {
             products.push(Product::released("heights.png", format!("terrain/{}.png", self.id), None));
             notes.push(note);
         }
-        Ok(Outcome { products, notes, ..Outcome::default() })
+        let mut outcome = Outcome { products, notes, ..Outcome::default() };
+        self.exports.write(work, &self.id, &made.heights, &mut outcome)?;
+        Ok(outcome)
     }
 }
 

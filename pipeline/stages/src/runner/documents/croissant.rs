@@ -2,7 +2,7 @@
 //! loaders find its columns with type, unit and description, and its files with their hashes.
 
 use super::{Described, add_terms, citation_line, license, page};
-use crate::jobs::original;
+use crate::jobs::{exports, original};
 use crate::splits::PARTS;
 use sastrugi_schemas::manifest::{Artifact, Source};
 use sastrugi_schemas::study::McapFlavour;
@@ -65,6 +65,13 @@ const DOCUMENTS: [(&str, &[&str], &[&str], &str); 2] = [
         "The report: one offline page, its figures and its numbers",
     ),
 ];
+/// Folders for simulators.
+const EXPORTS: (&str, &[&str], &[&str], &str) = (
+    "exports",
+    &["export/*/*/*"],
+    &["image/png", "application/octet-stream", "application/xml", "text/plain", "application/json", "text/markdown"],
+    "Terrains to import into simulators: heights, README.md with the steps, import.json with the numbers",
+);
 /// Layout of a viewer for recordings of that flavour.
 const LAYOUT: (&str, &[&str], &[&str], &str) = (
     "viewer-layout",
@@ -136,7 +143,8 @@ fn distribution(described: &Described<'_>) -> Vec<Value> {
         files.push(file_set(id, &[&format!("{folder}/{below}*{ending}")], &[media], what));
     }
     let layout = (described.head.mcap == McapFlavour::Viewer && there("mcap", ".mcap")).then_some(LAYOUT);
-    let documents = DOCUMENTS.into_iter().chain(layout);
+    let exports = there(exports::FOLDER.trim_end_matches('/'), "").then_some(EXPORTS);
+    let documents = DOCUMENTS.into_iter().chain(layout).chain(exports);
     files.extend(documents.map(|(id, includes, media, what)| file_set(id, includes, media, what)));
     files
 }

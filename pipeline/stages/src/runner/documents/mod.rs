@@ -27,10 +27,11 @@ pub struct Described<'a> {
 }
 
 /// Folders of a release.
-const FOLDERS: [(&str, &str); 9] = [
+const FOLDERS: [(&str, &str); 10] = [
     ("dem/", "measured inputs, and the same in metres (`.metric.tif`)"),
     ("mask/", "masks of the fits"),
     ("terrain/", "generated heightfields, GeoTIFF, float32 metres, no data -9999"),
+    ("export/", "terrains to import into simulators: `export/<terrain>/<simulator>/README.md` says how"),
     ("texture/", "synthesised textures, GeoTIFF, float32 metres, no data -9999"),
     ("classes/", "roughness classes: 0 low, 1 semi, 2 high, 255 none; `.raw.tif` before closing"),
     ("fit/", "covariance fits (JSON), with background, residual and the cells used"),
