@@ -37,7 +37,7 @@ use std::path::{Path, PathBuf};
 pub const MAX_CELLS: u64 = 1 << 28;
 /// Bytes that tell a point cloud, which is not read whole.
 const SNIFFED_BYTES: u64 = 4;
-/// Endings of names that [`write`] takes.
+/// Endings of names that [`write()`] takes.
 pub const WRITTEN_ENDINGS: &str = ".tif, .asc, .hgt, .png, .npy, .obj, .glb and .usda";
 /// Heights without data in the formats that need a number for it.
 pub const NO_DATA: f64 = -9999.0;
