@@ -224,6 +224,36 @@ fn val_bad_rasters_are_input_errors() {
     }
 }
 
+/// A band that is none, that the DEM does not hold, or whose figures cannot be compared.
+#[test]
+fn val_bands_of_vehicles_are_refused() {
+    let folder = area();
+    let path = folder.path();
+    let level = "1 ".repeat(64 * 64);
+    write(path, "dem.asc", &format!("ncols 64\nnrows 64\nxllcorner 0\nyllcorner 0\ncellsize 0.2\n{level}\n"));
+    let roughness = |more: &[&str], code: i32, words: &[&str]| {
+        refused(path, &[&["roughness", "dem.asc"], more].concat(), code, words);
+    };
+    roughness(&["--vehicle", "wb=2.7"], USAGE, &["wb=WHEELBASE,r=TYRE_RADIUS"]);
+    roughness(&["--vehicle", "wb=2.7,r=big"], USAGE, &["wb=WHEELBASE,r=TYRE_RADIUS"]);
+    roughness(&["--vehicle", "wb=0,r=0.4"], USAGE, &["wheelbase", "above 0"]);
+    roughness(&["--vehicle", "wb=1,r=-0.4"], USAGE, &["tyre radius", "above 0"]);
+    roughness(&["--vehicle", "wb=0.1,r=0.4"], USAGE, &["no band"]);
+    roughness(&["--vehicle", "tank"], USAGE, &["tank", "husky_a200"]);
+    roughness(&["--band", "0.4"], USAGE, &["MIN:MAX"]);
+    roughness(&["--band", "3:0.4"], USAGE, &["no band", "rise"]);
+    roughness(&["--vehicle", "wb=1,r=0.33"], INPUT, &["cells of at most 0.165 m", "--allow-coarse"]);
+    roughness(&["--band", "0.4:4"], INPUT, &["at least 16 m"]);
+    roughness(&["--detrend", "ma"], USAGE, &["--vehicle", "--band"]);
+    roughness(&["--rms-map", "rms.txt"], USAGE, &["--vehicle", "--band"]);
+    roughness(&["--band", "0.4:3", "--vehicle", "husky_a200"], USAGE, &["cannot be used with"]);
+    let map = ["--band", "0.4:3", "--rms-map", "rms.txt", "--rms-predicted", "dem.asc"];
+    roughness(&[&map[..], &["--detrend", "ma"]].concat(), USAGE, &["different detrenders are not comparable"]);
+    write(path, "other.asc", "ncols 3\nnrows 3\nxllcorner 0\nyllcorner 0\ncellsize 0.2\n1 1 1 1 1 1 1 1 1\n");
+    let other = ["--band", "0.4:3", "--rms-map", "rms.txt", "--rms-predicted", "other.asc"];
+    roughness(&other, INPUT, &["other.asc", "cells"]);
+}
+
 #[test]
 fn val_rasters_that_cannot_be_fitted_say_why() {
     let folder = area();

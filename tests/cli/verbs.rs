@@ -122,6 +122,54 @@ fn val_fit_texture_roughness_and_info_work_on_files() {
     assert_eq!(ok_json(path, &["info", "sum.tif"])["rows"], 128);
 }
 
+/// A surface that was scaled to 3 cm in a vehicle's band has that RMS there, by lengths, by name and by band; the map as text
+/// has a prediction beside each measured value.
+#[test]
+fn val_roughness_for_a_vehicle() {
+    let folder = area();
+    let path = folder.path();
+    let set = |pair: &'static str| ["--set", pair];
+    let scaled = set("roughness={wheelbase_m = 2.7, tyre_radius_m = 0.4, rms_m = 0.03}");
+    let mut terrain = vec!["terrain", "van_deusen", "--seed", "7", "-o", "dem.tif"];
+    terrain.extend(scaled);
+    let made = ok_json(path, &terrain);
+    assert_eq!(made["maps"]["rms-predicted"]["file"], "dem.rms-predicted.tif");
+    let ride = |more: &[&str]| {
+        let mut call = vec!["roughness", "dem.tif"];
+        call.extend(more);
+        ok_json(path, &call)["ride"].clone()
+    };
+    let number = |value: &Value| value.as_f64().unwrap();
+    for vehicle in [["--vehicle", "wb=2.7,r=0.4"], ["--vehicle", "ugv_4x4"], ["--band", "0.4:5.4"]] {
+        let ride = ride(&vehicle);
+        assert!((number(&ride["rms_m"]) / 0.03 - 1.0).abs() < 1e-4, "{ride}");
+        assert_eq!((&ride["band_m"], &ride["detrender"]), (&serde_json::json!([0.4, 5.4]), &"band".into()));
+        assert!(
+            (number(&ride["power_law"]["n"]) - 2.0).abs() < 0.3 && number(&ride["power_law"]["r2"]) > 0.9,
+            "{ride}"
+        );
+        assert!(number(&ride["iri"]["along_x_m_km"]) > 1.0 && ride["iso_8608_class"].is_string(), "{ride}");
+    }
+    for detrender in ["ma", "exp"] {
+        assert!(number(&ride(&["--band", "0.4:5.4", "--detrend", detrender])["rms_m"]) > 0.035, "{detrender}");
+    }
+    let map = ["--rms-map", "rms.txt", "--rms-predicted", "dem.rms-predicted.tif"];
+    ride(&[&["--vehicle", "ugv_4x4"][..], &map].concat());
+    let text = std::fs::read_to_string(path.join("rms.txt")).unwrap();
+    let mut lines = text.lines();
+    assert_eq!(
+        lines.next().unwrap(),
+        "# x_m y_m rms_pred_m rms_meas_m; RMS in wavelengths of 0.4 to 5.4 m, detrender band, windows of 16.200 m"
+    );
+    let rows: Vec<Vec<f64>> = lines.map(|l| l.split(' ').map(|w| w.parse().unwrap()).collect()).collect();
+    assert!(rows.len() > 200 && rows.iter().all(|r| r.len() == 4 && r[2] > 0.0 && r[3] > 0.0), "{}", rows.len());
+    ride(&["--vehicle", "ugv_4x4", "--rms-map", "measured.txt"]);
+    let text = std::fs::read_to_string(path.join("measured.txt")).unwrap();
+    assert!(text.starts_with("# x_m y_m rms_meas_m;") && text.lines().nth(1).unwrap().split(' ').count() == 3);
+    assert!(ok(path, &["roughness", "dem.tif", "--vehicle", "ugv_4x4"]).contains("IRI"));
+    assert!(ok_json(path, &["roughness", "dem.tif"]).get("ride").is_none());
+}
+
 #[test]
 fn val_textures_are_tiled_shaped_and_fill_holes() {
     let folder = area();

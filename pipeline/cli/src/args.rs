@@ -73,7 +73,13 @@ pub enum Verb {
     )]
     Texture(Texture),
     /// Classify and describe the roughness of a DEM.
-    #[command(after_help = "Example:\n  sastrugi roughness terrain.tif --classes classes.tif")]
+    #[command(
+        after_help = "With a vehicle or a band: RMS of profiles in that band of wavelengths, power law of their density, class of\n\
+        ISO 8608 and International Roughness Index.\n\n\
+        Examples:\n  sastrugi roughness terrain.tif --classes classes.tif\n  \
+        sastrugi roughness terrain.tif --vehicle wb=2.7,r=0.33 --rms-map rms.txt\n  \
+        sastrugi roughness terrain.tif --band 0.3048:3.048 --detrend ma"
+    )]
     Roughness(Roughness),
     /// Drive missions over one DEM, to a release of their own.
     #[command(after_help = "Examples:\n  sastrugi traverse terrain.tif --vehicle husky_a200 --missions 5 -o drive\n  \
@@ -391,6 +397,25 @@ pub struct Roughness {
     /// Any setting of `[roughness]` (see `schema`), `name=value`.
     #[arg(long = "set", value_name = "K=V")]
     pub set: Vec<String>,
+    /// Wavelengths from the tyre radius to twice the wheelbase: `wb=2.7,r=0.33` in m, a vehicle (see `kinds`), or a vehicle file.
+    #[arg(long, value_name = "V", group = "bumps")]
+    pub vehicle: Option<String>,
+    /// Wavelengths from MIN to MAX, m.
+    #[arg(long, value_name = "MIN:MAX", group = "bumps")]
+    pub band: Option<String>,
+    /// How the local mean is taken off: the band alone, less a moving average over its longest wavelength, or less a mean with
+    /// exponential weights. Their figures are not comparable.
+    #[arg(long, value_enum, default_value_t = Detrend::Band, requires = "bumps")]
+    pub detrend: Detrend,
+    /// Let cells pass that are too large for the shortest wave of the band.
+    #[arg(long, requires = "bumps")]
+    pub allow_coarse: bool,
+    /// Write the RMS in windows of three longest wavelengths, as lines of text.
+    #[arg(long, value_name = "TXT", requires = "bumps")]
+    pub rms_map: Option<PathBuf>,
+    /// Raster of the RMS that was predicted (a terrain's map `rms-predicted`), for a column of `--rms-map`.
+    #[arg(long, value_name = "TIF", requires = "rms_map")]
+    pub rms_predicted: Option<PathBuf>,
     /// How the DEM is read.
     #[command(flatten)]
     pub reading: Reading,
@@ -413,6 +438,17 @@ pub struct Hillshade {
     /// How the DEM is read.
     #[command(flatten)]
     pub reading: Reading,
+}
+
+/// How the local mean is taken off.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum Detrend {
+    /// The band of wavelengths alone.
+    Band,
+    /// Less a moving average.
+    Ma,
+    /// Less a mean with exponential weights.
+    Exp,
 }
 
 /// `traverse`.

@@ -1,5 +1,6 @@
 //! What a surface is like: gradients and roughness classes, heights and slopes, band roughness, spectra, structure
-//! function, areal figures of ISO 25178, scaling exponents.
+//! function, areal figures of ISO 25178, scaling exponents, and what of it shakes a vehicle (RMS in a band of wavelengths, ISO
+//! 8608, IRI).
 //!
 //! Every function takes a DEM in metres with NaN where there is no data, and says what it does with such cells.
 //! Roughness classes are the codes [`LOW`], [`SEMI`], [`HIGH`] and [`NO_CLASS`].
@@ -19,6 +20,7 @@ pub mod multifractality;
 mod plane;
 mod power_law;
 mod profiles;
+mod ride;
 mod spectrum;
 mod structure;
 mod summary;
@@ -38,6 +40,7 @@ pub use lags::{LagSums, PairSum};
 pub use plane::level;
 pub use power_law::{PowerLaw, iso_8608_class};
 pub use profiles::{ProfileBin, profile_spectra};
+pub use ride::Ride;
 pub use spectrum::{SpectralMap, SpectrumBin, default_slope_band, power_spectrum, psd_slope};
 pub use structure::{Autocorrelation, Direction, StructureBin, autocorrelation, lags_of, structure_function};
 pub use summary::{DescribeSettings, Summary, describe};

@@ -2,10 +2,10 @@
 
 use super::{options, reading};
 use crate::Verdict;
-use crate::args::{Common, Fit, Roughness, Terrain, Texture};
+use crate::args::{Common, Detrend, Fit, Roughness, Terrain, Texture};
 use crate::failure::{Code, Failure};
 use crate::output::{columns, print};
-use sastrugi_stages::verbs::roughness::ArealFigures;
+use sastrugi_stages::verbs::roughness::{ArealFigures, Bumps, Detrender, Ride, RideRequest};
 use sastrugi_stages::verbs::{self, Reading, numbers, parameters};
 use serde_json::{Value, json};
 
@@ -145,14 +145,68 @@ fn areal(figures: &ArealFigures) -> [(&'static str, String); 6] {
     ]
 }
 
+/// What shakes a vehicle, as lines.
+fn ride(figures: &Ride) -> Vec<(&'static str, String)> {
+    let known = |value: f64, text: String| if value.is_finite() { text } else { "none".to_owned() };
+    let f = figures;
+    let both = |[x, y]: [f64; 2], digits: usize| {
+        let one = |value: f64| known(value, format!("{value:.digits$}"));
+        format!("{} along x, {} along y", one(x), one(y))
+    };
+    let [min, max] = f.band_m;
+    let along = match f.rms_along_m[..] {
+        [x, y] => format!(" ({})", both([x, y], 5)),
+        _ => String::new(),
+    };
+    let law = f.power_law.as_ref().map_or_else(
+        || "none".to_owned(),
+        |l| {
+            let [low, high] = l.frequencies_cycles_m;
+            let (c, n, error) = (l.c, l.n, l.n_standard_error);
+            format!("{c:.4e} f^-{n:.3} m3 (n +- {error:.3}, r2 {:.4}), f from {low:.3} to {high:.3} cycles/m", l.r2)
+        },
+    );
+    let class = f.iso_8608_class.map_or_else(|| "none".to_owned(), |c| format!("{c}, {:.3e} m3", f.iso_8608_psd_m3));
+    let iri = [f.iri.along_x_m_km, f.iri.along_y_m_km];
+    vec![
+        ("RMS in the band", known(f.rms_m, format!("{:.5} m{along}", f.rms_m))),
+        ("its band", format!("wavelengths of {min} to {max} m, detrender {}", f.detrender.name())),
+        ("density", law),
+        ("ISO 8608 class", format!("{class} at 0.1 cycles/m")),
+        ("IRI", known(iri[0].max(iri[1]), format!("{} m/km", both(iri, 2)))),
+    ]
+}
+
+/// The options about a vehicle.
+fn ride_request(args: &Roughness) -> Option<RideRequest<'_>> {
+    let bumps = match (&args.vehicle, &args.band) {
+        (Some(vehicle), _) => Bumps::Vehicle(vehicle),
+        (None, Some(band)) => Bumps::Band(band),
+        (None, None) => return None,
+    };
+    let detrender = match args.detrend {
+        Detrend::Band => Detrender::Band,
+        Detrend::Ma => Detrender::MovingAverage,
+        Detrend::Exp => Detrender::Exponential,
+    };
+    let (map, predicted) = (args.rms_map.as_deref(), args.rms_predicted.as_deref());
+    Some(RideRequest { bumps, detrender, allow_coarse: args.allow_coarse, map, predicted })
+}
+
 /// `roughness`.
 pub fn roughness(args: &Roughness, common: &Common) -> Verdict {
     let mut params = json!({});
     parameters::assign(&mut params, &args.set)?;
     let reading = reading(&args.reading)?;
-    let request =
-        verbs::roughness::Request { dem: &args.dem, parameters: params, classes: args.classes.as_deref(), reading };
-    let (summary, read_notes) = verbs::roughness::roughness(&request)?;
+    let request = verbs::roughness::Request {
+        dem: &args.dem,
+        parameters: params,
+        classes: args.classes.as_deref(),
+        reading,
+        ride: ride_request(args),
+    };
+    let (described, read_notes) = verbs::roughness::roughness(&request)?;
+    let summary = &described.summary;
     let h = &summary.heights;
     let percent = |share: f64| if share.is_nan() { "none".to_owned() } else { format!("{:.2} %", 100.0 * share) };
     let rows = [
@@ -169,10 +223,10 @@ pub fn roughness(args: &Roughness, common: &Common) -> Verdict {
         ),
         ("PSD slope", format!("{:.3}", summary.psd_slope)),
     ];
-    let rows = rows.into_iter().chain(areal(&summary.areal));
+    let rows = rows.into_iter().chain(areal(&summary.areal)).chain(described.ride.iter().flat_map(ride));
     let rows: Vec<Vec<String>> = rows.map(|(name, value)| vec![name.to_owned(), value]).collect();
     let mut text = columns(&rows);
     read_notes.iter().for_each(|note| text.push_str(&format!("\n  note: {note}")));
-    print(common.json, &serde_json::to_value(&summary).map_err(Failure::failed)?, &text)?;
+    print(common.json, &serde_json::to_value(&described).map_err(Failure::failed)?, &text)?;
     Ok(Code::Done)
 }

@@ -1,15 +1,20 @@
-//! `roughness`: a DEM described and classified.
+//! `roughness`: a DEM described and classified, and what of it shakes a vehicle.
 
 use super::{Read, Reading, parameters, read};
 use crate::error::Error;
 use crate::jobs::roughness::settings;
 use crate::study::check_roughness;
-pub use sastrugi_roughness::ArealFigures;
-use sastrugi_roughness::{Summary, classify, describe, moore_gradient};
+use sastrugi_mobility::vehicle::TraverseParameters;
+use sastrugi_numeric::Grid;
+pub use sastrugi_roughness::{ArealFigures, Detrender, Ride};
+use sastrugi_roughness::{BandError, Summary, WaveBand, classify, describe, moore_gradient};
 use sastrugi_schemas::kind::{read_parameters, schema_of};
 use sastrugi_schemas::study::RoughnessSection;
+use sastrugi_store::atomic;
 use sastrugi_store::dem as store;
-use serde_json::Value;
+use serde::Serialize;
+use serde_json::{Value, json};
+use std::fmt::Write;
 use std::path::Path;
 
 /// What to describe.
@@ -22,21 +27,153 @@ pub struct Request<'a> {
     pub classes: Option<&'a Path>,
     /// How the DEM is read.
     pub reading: Reading,
+    /// What to look at for a vehicle.
+    pub ride: Option<RideRequest<'a>>,
+}
+
+/// Whose band of wavelengths counts.
+pub enum Bumps<'a> {
+    /// A vehicle: `wb=WHEELBASE,r=RADIUS` in m, a name, or a vehicle file.
+    Vehicle(&'a str),
+    /// `MIN:MAX` in m.
+    Band(&'a str),
+}
+
+/// What to look at for a vehicle.
+pub struct RideRequest<'a> {
+    /// The band.
+    pub bumps: Bumps<'a>,
+    /// How the local mean is taken off.
+    pub detrender: Detrender,
+    /// Whether cells may be too large for the shortest wave.
+    pub allow_coarse: bool,
+    /// Map of the RMS to write, as text.
+    pub map: Option<&'a Path>,
+    /// Raster of what was predicted for it.
+    pub predicted: Option<&'a Path>,
+}
+
+/// A DEM described.
+#[derive(Serialize)]
+pub struct Described {
+    /// The surface.
+    #[serde(flatten)]
+    pub summary: Summary,
+    /// What of it shakes a vehicle.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ride: Option<Ride>,
 }
 
 /// Describes a DEM; returns the figures and sentences on how it was read.
 ///
 /// # Errors
-/// Unknown settings, a DEM that cannot be read, a class map that cannot be written.
-pub fn roughness(request: &Request<'_>) -> Result<(Summary, Vec<String>), Error> {
+/// Unknown settings, a DEM that cannot be read or that does not hold the band, a map that cannot be written.
+pub fn roughness(request: &Request<'_>) -> Result<(Described, Vec<String>), Error> {
     parameters::check_schema(&request.parameters, &schema_of::<RoughnessSection>(), "roughness")?;
     let section: RoughnessSection = read_parameters(&request.parameters)?;
     check_roughness(&section)?;
     let settings = settings(&section)?;
+    let band = request.ride.as_ref().map(|ride| band(&ride.bumps)).transpose()?;
     let Read { dem, notes, .. } = read(request.dem, &request.reading)?;
+    let ride = request.ride.as_ref().zip(band).map(|(ride, band)| ride_over(&dem.grid, ride, &band)).transpose()?;
     if let Some(path) = request.classes {
         let classes = classify(&moore_gradient(&dem.grid), &settings.thresholds);
         store::write_classes(path, &classes, &dem.info.crs).map_err(Error::failed)?;
     }
-    Ok((describe(&dem.grid, &settings), notes))
+    Ok((Described { summary: describe(&dem.grid, &settings), ride }, notes))
+}
+
+/// The band that is asked for.
+fn band(bumps: &Bumps<'_>) -> Result<WaveBand, Error> {
+    let refused = |option: &str, text: &str, e: BandError| Error::Usage(format!("`{option} {text}`: {e}"));
+    match bumps {
+        Bumps::Band(text) => {
+            let [min, max] = super::numbers("--band", &text.replacen(':', ",", 1))
+                .map_err(|_| Error::Usage(format!("`--band {text}`: it takes two lengths in m, MIN:MAX")))?;
+            WaveBand::new(min, max).map_err(|e| refused("--band", text, e))
+        }
+        Bumps::Vehicle(text) => {
+            let [wheelbase, radius] = lengths_of_vehicle(text)?;
+            WaveBand::of_vehicle(wheelbase, radius).map_err(|e| refused("--vehicle", text, e))
+        }
+    }
+}
+
+/// Wheelbase and tyre radius, m.
+fn lengths_of_vehicle(text: &str) -> Result<[f64; 2], Error> {
+    if !text.contains('=') {
+        let mut params = json!({});
+        parameters::assign_vehicle(&mut params, text)?;
+        let (vehicle, _) = read_parameters::<TraverseParameters>(&params)?.prepare()?;
+        return Ok([vehicle.wheelbase_m(), vehicle.parameters().wheels.radius_m]);
+    }
+    let mut lengths = [None; 2];
+    for pair in text.split(',') {
+        let (place, value) = match pair.split_once('=').map(|(name, value)| (name.trim(), value.trim().parse())) {
+            Some(("wb", Ok(value))) => (0, value),
+            Some(("r", Ok(value))) => (1, value),
+            _ => return Err(not_a_vehicle(text)),
+        };
+        lengths[place] = Some(value);
+    }
+    match lengths {
+        [Some(wheelbase), Some(radius)] => Ok([wheelbase, radius]),
+        _ => Err(not_a_vehicle(text)),
+    }
+}
+
+fn not_a_vehicle(text: &str) -> Error {
+    Error::Usage(format!(
+        "`--vehicle {text}`: it takes wb=WHEELBASE,r=TYRE_RADIUS in m, the name of a vehicle, or a vehicle file"
+    ))
+}
+
+/// The figures for a vehicle, and their map where it is asked for.
+fn ride_over(dem: &Grid, request: &RideRequest<'_>, band: &WaveBand) -> Result<Ride, Error> {
+    if request.predicted.is_some() && request.detrender != Detrender::Band {
+        let message = "figures of different detrenders are not comparable: what is predicted is of the detrender band";
+        return Err(Error::Usage(format!("`--rms-predicted`: {message}")));
+    }
+    let ride = Ride::of(dem, band, request.detrender, request.allow_coarse).map_err(|e| match e {
+        BandError::Coarse { .. } => Error::Input(format!("{e} (`--allow-coarse` lets it pass)")),
+        e => Error::Input(e.to_string()),
+    })?;
+    if let Some(path) = request.map {
+        let predicted = request.predicted.map(|path| predicted(path, dem)).transpose()?;
+        let text = map_as_text(&ride, predicted.as_ref());
+        atomic::write(path, text.as_bytes()).map_err(|e| Error::failed(format!("{}: {e}", path.display())))?;
+    }
+    Ok(ride)
+}
+
+/// The raster of what was predicted, on the cells of the DEM.
+fn predicted(path: &Path, dem: &Grid) -> Result<Grid, Error> {
+    let grid = read(path, &Reading::default())?.dem.grid;
+    if grid.geometry == dem.geometry {
+        Ok(grid)
+    } else {
+        Err(Error::Input(format!("{}: its cells are not those of the DEM", path.display())))
+    }
+}
+
+/// Lines `x y rms_predicted rms_measured` (the third only where something is predicted), one longest wavelength apart,
+/// where the window is defined, below a line that says what they are.
+fn map_as_text(ride: &Ride, predicted: Option<&Grid>) -> String {
+    let g = ride.map.geometry;
+    let [min, max] = ride.band_m;
+    let columns = if predicted.is_some() { "rms_pred_m rms_meas_m" } else { "rms_meas_m" };
+    let mut text = format!(
+        "# x_m y_m {columns}; RMS in wavelengths of {min} to {max} m, detrender {}, windows of {:.3} m\n",
+        ride.detrender.name(),
+        3.0 * max
+    );
+    let [step_x, step_y] = g.cell.map(|cell| ((max / cell).round() as usize).max(1));
+    for row in (step_y / 2..g.rows).step_by(step_y) {
+        for col in (step_x / 2..g.cols).step_by(step_x).filter(|&col| ride.map.at(row, col).is_finite()) {
+            let before = predicted.map(|p| format!("{:.6} ", p.at(row, col))).unwrap_or_default();
+            // Writing to a string cannot fail.
+            let _ = writeln!(text, "{:.3} {:.3} {before}{:.6}", g.x(col), g.y(row), ride.map.at(row, col));
+        }
+    }
+    text
 }

@@ -1,0 +1,94 @@
+//! What of a surface shakes a vehicle, in one place.
+
+use crate::detrend::{BandError, Detrended, Detrender, WaveBand};
+use crate::iri::{Iri, iri};
+use crate::plane::level;
+use crate::power_law::{PowerLaw, iso_8608_class};
+use crate::profiles::profile_spectra;
+use crate::structure::Direction;
+use sastrugi_numeric::Grid;
+use serde::Serialize;
+
+/// Figures of the profiles of a surface in a band of wavelengths. NaN stands for a figure that the surface does not have.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Ride {
+    /// Shortest and longest wavelength, m.
+    pub band_m: [f64; 2],
+    /// How the local mean was taken off: figures of different detrenders are not comparable.
+    pub detrender: Detrender,
+    /// RMS about the local mean, m.
+    pub rms_m: f64,
+    /// The same of the profiles along x and along y, m; one figure for both under a moving average.
+    pub rms_along_m: Vec<f64>,
+    /// The power law through the density of the profiles in the band.
+    pub power_law: Option<PowerLaw>,
+    /// Density that the law has at 0.1 cycles/m, m3.
+    pub iso_8608_psd_m3: f64,
+    /// Class of ISO 8608 by that density.
+    pub iso_8608_class: Option<char>,
+    /// International Roughness Index.
+    pub iri: Iri,
+    /// RMS in windows of three times the longest wavelength about every cell, m.
+    #[serde(skip)]
+    pub map: Grid,
+}
+
+impl Ride {
+    /// The figures of a DEM; `allow_coarse` lets cells pass that are too large for the shortest wave.
+    ///
+    /// # Errors
+    /// Cells that are too large, a surface that is shorter than four of the longest wave.
+    pub fn of(dem: &Grid, band: &WaveBand, detrender: Detrender, allow_coarse: bool) -> Result<Self, BandError> {
+        let [dx, dy] = dem.geometry.cell;
+        if !allow_coarse {
+            band.fits_cells(dx.max(dy))?;
+        }
+        let [x, y] = dem.geometry.size();
+        band.fits_length(x.max(y))?;
+        let detrended = Detrended::of(dem, band, detrender);
+        let power_law = PowerLaw::fit(&profile_spectra(&level(dem)), Direction::All, band.frequencies());
+        let iso_8608_psd_m3 = power_law.as_ref().map_or(f64::NAN, PowerLaw::iso_8608_psd_m3);
+        Ok(Self {
+            band_m: [band.min_m(), band.max_m()],
+            detrender,
+            rms_m: detrended.rms_m(),
+            rms_along_m: detrended.rms_along_m(),
+            power_law,
+            iso_8608_psd_m3,
+            iso_8608_class: iso_8608_class(iso_8608_psd_m3),
+            iri: iri(dem),
+            map: detrended.rms_map(),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sastrugi_numeric::{Geometry, Streams};
+
+    /// White noise on cells of 0.1 m: flat density, the variance of the band's share of frequencies. n = 400 x 400 and a
+    /// threshold above 10 standard errors.
+    #[test]
+    fn stat_white_noise() {
+        let mut s = Streams::for_seed(1, "ride-test").stream("noise");
+        let g = Geometry::square(400, 400, 0.1);
+        let dem = Grid::new(g, (0..g.len()).map(|_| 0.01 * s.normal()).collect());
+        let ride = Ride::of(&dem, &WaveBand::new(0.2, 5.0).unwrap(), Detrender::Band, false).unwrap();
+        let wanted = 0.01 * ((5.0f64 - 0.2) / 5.0).sqrt();
+        assert!((ride.rms_m / wanted - 1.0).abs() < 0.03, "{}", ride.rms_m);
+        let law = ride.power_law.unwrap();
+        assert!(law.n.abs() < 0.1 && (law.c / (2.0 * 1e-4 * 0.1) - 1.0).abs() < 0.1, "{law:?}");
+        assert!(ride.iso_8608_class == Some('A') && ride.iri.along_x_m_km > 1.0);
+    }
+
+    #[test]
+    fn val_what_does_not_fit_is_refused() {
+        let dem = Grid::filled(Geometry::square(100, 100, 0.2), 1.0);
+        let ride = |min, max, coarse| Ride::of(&dem, &WaveBand::new(min, max).unwrap(), Detrender::Band, coarse);
+        assert!(matches!(ride(0.33, 5.0, false), Err(BandError::Coarse { .. })));
+        assert!(matches!(ride(0.4, 5.1, false), Err(BandError::Short { .. })));
+        let flat = ride(0.33, 5.0, true).unwrap();
+        assert!(flat.rms_m == 0.0 && flat.power_law.is_none() && flat.iso_8608_class.is_none());
+    }
+}
