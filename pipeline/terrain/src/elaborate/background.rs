@@ -1,29 +1,38 @@
 //! A smooth surface through the posts of a DEM.
 
-use sastrugi_numeric::Grid;
+use sastrugi_numeric::{Geometry, Grid};
 
 /// Cubic convolution (Keys, 1981, doi:10.1109/TASSP.1981.1163711, a = -1/2): through every post, without bends, exact on parabolas.
 /// Beyond the outermost posts it goes on at their height.
 pub struct Background {
+    /// Where the posts of the whole DEM lie: places are told by them, so that parts of it agree bit by bit.
+    whole: Geometry,
     posts: Grid,
+    /// Column and row (from the south) of the first of `posts` in the whole.
+    first: [usize; 2],
 }
 
 impl Background {
     /// The surface through posts at the centres of a grid's cells; at least 3 x 3, all with data.
     pub fn new(posts: Grid) -> Self {
-        Self { posts }
+        Self { whole: posts.geometry, posts, first: [0; 2] }
+    }
+
+    /// The surface through some of the posts of a DEM, for places that lie between them.
+    pub fn of_part(whole: Geometry, first: [usize; 2], posts: Grid) -> Self {
+        Self { whole, posts, first }
     }
 
     /// Height at a point, m.
     pub fn at(&self, [x, y]: [f64; 2]) -> f64 {
-        let g = &self.posts.geometry;
+        let (g, posts) = (&self.whole, &self.posts);
         let (col, across) = place((x - g.origin[0]) / g.cell[0] - 0.5, g.cols);
         let (row, up) = place((y - g.origin[1]) / g.cell[1] - 0.5, g.rows);
         let line = |j: usize| {
-            let values = self.posts.row(g.rows - 1 - j);
-            along(|i| values[i], g.cols, col, across)
+            let values = posts.row(posts.rows() - 1 - j);
+            along(|i| values[i], posts.cols(), col - self.first[0], across)
         };
-        along(line, g.rows, row, up)
+        along(line, posts.rows(), row - self.first[1], up)
     }
 }
 
@@ -48,7 +57,6 @@ fn along(value: impl Fn(usize) -> f64, count: usize, at: usize, t: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sastrugi_numeric::Geometry;
 
     fn of(f: impl Fn(f64, f64) -> f64) -> Background {
         let g = Geometry { rows: 7, cols: 9, cell: [2.0, 3.0], origin: [10.0, -4.0] };

@@ -45,6 +45,7 @@ use background::Background;
 use rayon::prelude::*;
 use sastrugi_numeric::{Counter, Geometry, Grid, Streams};
 use serde_json::Value;
+use std::ops::Range;
 use std::sync::Arc;
 
 /// Name in the registry.
@@ -95,7 +96,7 @@ impl Elaborate {
     }
 
     /// Columns and rows (from the south) of the posts that a window's samples lie between, two beyond on either side where there are.
-    fn posts(&self, g: &Geometry) -> Result<[std::ops::Range<usize>; 2], DemError> {
+    fn posts(&self, g: &Geometry) -> Result<[Range<usize>; 2], DemError> {
         let last = [self.window.cols - 1, self.window.rows - 1].map(|n| n as f64 * self.raw.cell_m);
         let [x, y] = self.raw.origin_m;
         let ends = [[x, x + last[0]], [y, y + last[1]]];
@@ -111,11 +112,10 @@ impl Elaborate {
         }))
     }
 
-    fn check_dem(&self, dem: &Grid, [cols, rows]: &[std::ops::Range<usize>; 2]) -> Result<(), DemError> {
+    fn check_dem(&self, dem: &Grid, [cols, rows]: &[Range<usize>; 2]) -> Result<(), DemError> {
         let g = &dem.geometry;
         let margin = if self.raw.processes.is_empty() { 0 } else { CRATER_POSTS };
-        let wide =
-            |r: &std::ops::Range<usize>, count: usize| r.start.saturating_sub(margin)..(r.end + margin).min(count);
+        let wide = |r: &Range<usize>, count: usize| r.start.saturating_sub(margin)..(r.end + margin).min(count);
         for j in wide(rows, g.rows) {
             for i in wide(cols, g.cols) {
                 let row = g.rows - 1 - j;
@@ -176,14 +176,23 @@ impl Elaborate {
         assembly.with(processes, streams)
     }
 
-    /// What the world has at the posts beyond the background.
-    fn residual(&self, world: &World, background: &Background, posts: Geometry) -> Background {
+    /// What the world has at the posts (columns, and rows from the south) beyond the background.
+    fn residual(
+        &self,
+        world: &World,
+        background: &Background,
+        g: Geometry,
+        [cols, rows]: [Range<usize>; 2],
+    ) -> Background {
+        let posts = Geometry::square(rows.len(), cols.len(), 1.0);
         let at = |k: usize| {
-            let [i, j] = self.nearest([posts.x(k % posts.cols), posts.y(k / posts.cols)]);
+            let (row, col) = (g.rows - rows.end + k / posts.cols, cols.start + k % posts.cols);
+            let [i, j] = self.nearest([g.x(col), g.y(row)]);
             let point = Window { zoom: 0, west: i, south: j, cols: 1, rows: 1 };
             world.patch(&point).heights[0] - background.at(self.place([i as f64, j as f64]))
         };
-        Background::new(Grid::new(posts, (0..posts.len()).into_par_iter().map(at).collect()))
+        let values = (0..posts.len()).into_par_iter().map(at).collect();
+        Background::of_part(g, [cols.start, rows.start], Grid::new(posts, values))
     }
 
     fn refine(&self, streams: &Streams, dem: &Grid) -> Result<Terrain, DemError> {
@@ -203,9 +212,7 @@ impl Elaborate {
         let background = Arc::new(Background::new(without_holes(dem)));
         let world = self.world(background.clone(), &processes, texture, anchor, streams);
         let mut patch = world.tiled_patch(&self.window);
-        let [cols, rows] = posts;
-        let residual =
-            self.residual(&world, &background, g.window(g.rows - rows.end, cols.start, rows.len(), cols.len()));
+        let residual = self.residual(&world, &background, *g, posts);
         let window = self.window;
         patch.heights.par_chunks_mut(window.cols).enumerate().for_each(|(row, line)| {
             let take = |(col, z): (usize, &mut f64)| *z -= residual.at(self.place([window.x(col), window.y(row)]));
