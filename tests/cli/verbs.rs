@@ -170,6 +170,31 @@ fn val_roughness_for_a_vehicle() {
     assert!(ok_json(path, &["roughness", "dem.tif"]).get("ride").is_none());
 }
 
+/// A patch of a world with its maps; a measured DEM refined from the file; lists of tables in `kinds`.
+#[test]
+fn val_worlds_are_cut_out_and_dems_refined() {
+    let folder = area();
+    let path = folder.path();
+    let made = ok_json(path, &["terrain", "planetary", "--set", "size_px=[64,48]", "-o", "p.tif"]);
+    for map in ["class", "rock-potential", "albedo"] {
+        assert_eq!(made["maps"][map]["file"], format!("p.{map}.tif"));
+        assert_eq!(ok_json(path, &["info", &format!("p.{map}.tif")])["cols"], 64);
+    }
+    let dem = format!("dem=\"{}\"", sastrugi_fixtures::jacksboro().display());
+    let window = ["--set", "size_px=[120,100]", "--set", "cell_m=0.5"];
+    let refine = |origin: &str| {
+        let own = ["terrain", "elaborate", "--set", &dem, "--set", origin, "-o", "fine.tif"];
+        sastrugi_in(path, &[&own[..], &window].concat())
+    };
+    let call = refine("origin_m=[9000,9000]");
+    assert_eq!(call.code, 0, "{}", call.stderr);
+    assert_eq!(ok_json(path, &["info", "fine.tif"])["rows"], 100);
+    let call = refine("origin_m=[-9000,9000]");
+    assert!(call.code != 0 && call.stderr.contains("do not lie between"), "{} {}", call.code, call.stderr);
+    let kinds = ok(path, &["kinds", "planetary"]);
+    assert!(kinds.contains("processes[texture].hurst") && kinds.contains("processes[rocks].coverage"), "{kinds}");
+}
+
 #[test]
 fn val_textures_are_tiled_shaped_and_fill_holes() {
     let folder = area();

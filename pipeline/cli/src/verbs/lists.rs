@@ -40,22 +40,42 @@ fn describe(kind: &Kind) -> String {
     if rows.is_empty() { text } else { format!("{text}\n{}", columns(&rows)) }
 }
 
-/// Rows `name, default, description` of a schema's properties, tables opened.
+/// Rows `name, default, description` of a schema's properties, tables opened, and lists of tables by the kind of table.
 fn parameters(prefix: &str, schema: &Value, root: &Value, rows: &mut Vec<Vec<String>>) {
     let schema = resolve(schema, root);
     let defaults = schema.get("default");
     for (name, property) in schema.get("properties").and_then(Value::as_object).into_iter().flatten() {
         let default = property.get("default").or_else(|| defaults.and_then(|d| d.get(name)));
         let inner = resolve(property, root);
-        let description = property.get("description").or_else(|| inner.get("description"));
-        let description = description.and_then(Value::as_str).unwrap_or_default().replace('\n', " ");
+        if property.get("const").is_some() {
+            continue;
+        }
+        let description = if property.get("description").is_some() { text_of(property) } else { text_of(inner) };
         let is_table = inner.get("properties").is_some();
-        let default = default.filter(|_| !is_table).map(Value::to_string).unwrap_or_default();
+        let choices = choices(inner, root);
+        let is_plain = !is_table && choices.is_empty();
+        let default = default.filter(|_| is_plain).map(Value::to_string).unwrap_or_default();
         rows.push(vec![format!("  {prefix}{name}"), default, description]);
         if is_table {
             parameters(&format!("{prefix}{name}."), inner, root, rows);
         }
+        for (kind, choice) in choices {
+            rows.push(vec![format!("  {prefix}{name}[{kind}]"), String::new(), text_of(choice)]);
+            parameters(&format!("{prefix}{name}[{kind}]."), choice, root, rows);
+        }
     }
+}
+
+/// Kinds of the tables that a list may hold, with their schemas.
+fn choices<'a>(schema: &'a Value, root: &'a Value) -> Vec<(&'a str, &'a Value)> {
+    let items = schema.get("items").map(|items| resolve(items, root));
+    let all = items.and_then(|i| i.get("oneOf")).and_then(Value::as_array).into_iter().flatten();
+    all.filter_map(|c| Some((c.pointer("/properties/kind/const")?.as_str()?, c))).collect()
+}
+
+/// What a schema says of itself, on one line.
+fn text_of(schema: &Value) -> String {
+    schema.get("description").and_then(Value::as_str).unwrap_or_default().replace('\n', " ")
 }
 
 fn resolve<'a>(schema: &'a Value, root: &'a Value) -> &'a Value {

@@ -142,8 +142,9 @@ fn column(at_m: f64, cell_m: f64) -> Result<i64, ParameterError> {
 /// # Errors
 /// A window beyond the end of the world, or more craters and rocks than it can be asked to look at.
 pub fn window_in_reach(processes: &[RawProcess], spacing_m: f64, window: &Window) -> Result<(), ParameterError> {
-    let ends = [window.x(0), window.y(0), window.x(window.cols), window.y(window.rows)];
-    if ends.iter().any(|end| end.abs() > LATTICE_MAX) {
+    let ends = [(window.west, window.cols), (window.south, window.rows)];
+    let far = |(first, count): (i64, usize)| (first.unsigned_abs() as f64 + count as f64) * spacing(window.zoom);
+    if ends.into_iter().any(|end| far(end) > LATTICE_MAX) {
         return Err(ParameterError::new("origin_m", "leads out of the world, which ends at 2^52 basic spacings"));
     }
     // How many there are does not depend on the seed.

@@ -9,6 +9,8 @@ use serde::{Deserialize, Serialize};
 
 /// Smallest crater, basic spacings: its retained points need a spacing of a quarter of it.
 const CRATER_SPACINGS_MIN: f64 = 4.0;
+/// Largest crater or rock, basic spacings: far above what fits a planet.
+const DIAMETER_SPACINGS_MAX: f64 = (1u64 << 40) as f64;
 
 /// A smooth slope.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -317,13 +319,20 @@ fn within(key: &str, value: f64, low: f64, high: f64) -> Result<(), ParameterErr
     }
 }
 
-/// Two diameters in order, from `least_m` on.
-fn diameters([low, high]: [f64; 2], least_m: f64) -> Result<(), ParameterError> {
+/// Two diameters in order, from `least_m` to what a lattice with points `spacing_m` apart holds.
+fn diameters([low, high]: [f64; 2], least_m: f64, spacing_m: f64) -> Result<(), ParameterError> {
     ParameterError::positive("diameter_min_m", low)?;
     ParameterError::positive("diameter_max_m", high)?;
     if low < least_m {
         let message = format!("is {low} m; the lattice carries none below {least_m} m");
         return Err(ParameterError::new("diameter_min_m", message));
+    }
+    let most_m = DIAMETER_SPACINGS_MAX * spacing_m;
+    if high > most_m {
+        return Err(ParameterError::new(
+            "diameter_max_m",
+            format!("is {high} m; the lattice carries none above {most_m} m"),
+        ));
     }
     if high < low {
         let message = format!("is {high} m; it must not be below `diameter_min_m`, {low} m");
@@ -382,7 +391,7 @@ impl RawPrimaryCraters {
     fn check(&self, spacing_m: f64) -> Result<(), ParameterError> {
         ParameterError::not_negative("density", self.density)?;
         ParameterError::positive("exponent", self.exponent)?;
-        diameters([self.diameter_min_m, self.diameter_max_m], CRATER_SPACINGS_MIN * spacing_m)?;
+        diameters([self.diameter_min_m, self.diameter_max_m], CRATER_SPACINGS_MIN * spacing_m, spacing_m)?;
         check_style(self.depth_ratio, self.floor_roughness)?;
         drawable("density", self.power_law().mean_max(spacing_m))
     }
@@ -426,7 +435,7 @@ impl RawSecondaryCraters {
         let least_m = CRATER_SPACINGS_MIN * spacing_m;
         ParameterError::not_negative("density", self.density)?;
         ParameterError::positive("exponent", self.exponent)?;
-        diameters([self.diameter_min_m, self.diameter_max_m], least_m)?;
+        diameters([self.diameter_min_m, self.diameter_max_m], least_m, spacing_m)?;
         check_style(self.depth_ratio, self.floor_roughness)?;
         drawable("density", self.background().mean_max(spacing_m))?;
         ParameterError::positive("primary_min_m", self.primary_min_m)?;
@@ -469,7 +478,7 @@ impl RawRocks {
 
     fn check(&self, spacing_m: f64) -> Result<(), ParameterError> {
         within("coverage", self.coverage, 0.0, COVERAGE_MAX)?;
-        diameters([self.diameter_min_m, self.diameter_max_m], spacing_m)?;
+        diameters([self.diameter_min_m, self.diameter_max_m], spacing_m, spacing_m)?;
         ParameterError::not_negative("height_ratio", self.height_ratio)?;
         finite("height_gain", &[self.height_gain])?;
         finite("height_offset_m", &[self.height_offset_m])?;

@@ -8,7 +8,7 @@
 //!   gives both bounds; how one passes to the other is our choice.
 //! * Floor: `m = 2 c / d`, a paraboloid for small craters, flatter for large ones.
 //! * Rim: what is dug out lies in the ejecta, `h = d m / ((m + 2)(1 + 2 K))`, `K = int_1^5 w rho^-2 d rho`. For simple craters
-//!   h = 0.0401 diameters; Pike (1977) measured 0.036 to 0.04.
+//!   h = 0.0401 diameters; fresh lunar craters have about 0.036 (Pike, 1977).
 
 /// Reach of the ejecta, radii.
 pub const EJECTA_RADII: f64 = 5.0;
@@ -102,7 +102,7 @@ mod tests {
     fn val_depths_and_rims() {
         let small = Profile::new(10.0, 0.2, false);
         assert!((small.depth_m - 2.0).abs() < 1e-9);
-        // 0.0401 D: Pike (1977), rim heights of fresh simple craters.
+        // Beside about 0.036 D of fresh lunar craters (Pike, 1977).
         assert!((small.rim_m / 10.0 - 0.0401).abs() < 5e-5, "{}", small.rim_m);
         assert!((Profile::new(10.0, 0.2, true).height_m(0.0) + 2.0).abs() < 1e-9);
         for diameter in [1e4, 3e4, 1e5, 4e5] {

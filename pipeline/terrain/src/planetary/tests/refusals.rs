@@ -27,6 +27,7 @@ fn val_bad_lattices_are_refused() {
         ("origin_m", json!({"origin_m": [0.013, 0.0]})),
         ("origin_m", json!({"origin_m": [1e15, 0.0]})),
         ("origin_m", json!({"origin_m": [0.0, 4.6e13], "cell_m": 0.01})),
+        ("origin_m", json!({"origin_m": [1e18, 0.0], "cell_m": 1e15})),
     ] {
         assert_eq!(refused(bad.clone()), key, "{bad}");
     }
@@ -44,6 +45,7 @@ fn val_bad_processes_are_refused() {
         ("diameter_min_m", json!({"kind": "primary_craters", "diameter_min_m": 0.0})),
         ("diameter_min_m", json!({"kind": "primary_craters", "diameter_min_m": 0.03})),
         ("diameter_max_m", json!({"kind": "primary_craters", "diameter_max_m": 0.4})),
+        ("diameter_max_m", json!({"kind": "primary_craters", "diameter_max_m": 1e12})),
         ("depth_ratio", json!({"kind": "primary_craters", "depth_ratio": 1.0})),
         ("exponent", json!({"kind": "secondary_craters", "exponent": -3.5})),
         ("ring_radii", json!({"kind": "secondary_craters", "ring_radii": [5.0, 4.0]})),
