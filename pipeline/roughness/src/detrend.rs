@@ -200,14 +200,16 @@ impl Detrended {
         sums::mean(&squares).sqrt()
     }
 
-    /// RMS in a window of three times the longest wavelength about every cell, m. NaN where the squares themselves are
+    /// RMS in a window of three times the longest wavelength, or of the surface's width, about every cell, m. NaN where the squares themselves are
     /// undefined, and where less than a quarter of the window is defined.
     pub fn rms_map(&self) -> Grid {
         let mean = match &self.squares[..] {
             [x, y] => sastrugi_numeric::ops::combine(x, y, mean_of_defined),
             squares => squares[0].clone(),
         };
-        let window = mean.geometry.cell.map(|c| odd_cells(WINDOW_LENGTHS * self.max_m, c));
+        let g = &mean.geometry;
+        let window = [(g.cell[0], g.cols), (g.cell[1], g.rows)]
+            .map(|(cell, count)| odd_cells(WINDOW_LENGTHS * self.max_m, cell).min(largest_odd(count)));
         // Running sums may leave a rounding error below zero.
         average(&mean, window, WINDOW_SHARE_MIN).map(|square| if square < 0.0 { 0.0 } else { square.sqrt() })
     }
@@ -217,6 +219,11 @@ impl Detrended {
 const WINDOW_LENGTHS: f64 = 3.0;
 /// Share of such a window that must be defined: that of a corner, less what rounding takes.
 const WINDOW_SHARE_MIN: f64 = 0.24;
+
+/// The largest odd number of at most `count` cells: a window no wider than the surface.
+fn largest_odd(count: usize) -> usize {
+    count - usize::from(count.is_multiple_of(2) && count > 0)
+}
 
 fn mean_of_defined(a: f64, b: f64) -> f64 {
     match (a.is_finite(), b.is_finite()) {
@@ -248,7 +255,8 @@ fn detrended(profiles: &[f64], n: usize, cell_m: f64, band: &WaveBand, detrender
     let mut left = vec![f64::NAN; profiles.len()];
     left.par_chunks_mut(n).zip(profiles.par_chunks(n)).for_each(|(out, profile)| {
         for [from, to] in runs(profile, filter.shortest()) {
-            filter.run(&profile[from..to], transforms.get(&(to - from)), &mut out[from..to]);
+            let transform = transforms.get(&filter.continued_length(to - from));
+            filter.run(&profile[from..to], transform, &mut out[from..to]);
         }
     });
     left
@@ -284,18 +292,23 @@ impl Filter {
         3 * self.trim
     }
 
-    /// Transforms of the continued runs, by length of the run.
+    /// Length of a run with what continues it.
+    fn continued_length(&self, run: usize) -> usize {
+        smooth_length(run + FADE_LENGTHS * self.trim)
+    }
+
+    /// Transforms of the continued runs, by their lengths.
     fn transforms(&self, profiles: &[f64], n: usize) -> BTreeMap<usize, Transform> {
         if self.detrender != Detrender::Band {
             return BTreeMap::new();
         }
-        let lengths =
-            profiles.par_chunks(n).flat_map_iter(|p| runs(p, self.shortest()).into_iter().map(|[from, to]| to - from));
+        let lengths = profiles
+            .par_chunks(n)
+            .flat_map_iter(|p| runs(p, self.shortest()).into_iter().map(|[from, to]| self.continued_length(to - from)));
         let mut lengths: Vec<usize> = lengths.collect();
         lengths.sort_unstable();
         lengths.dedup();
-        let transform = |len: usize| Transform::new(smooth_length(len + FADE_LENGTHS * self.trim));
-        lengths.into_par_iter().map(|len| (len, transform(len))).collect()
+        lengths.into_par_iter().map(|len| (len, Transform::new(len))).collect()
     }
 
     /// What is left of one run; its ends stay as they are.

@@ -185,6 +185,22 @@ mod tests {
         assert!(strip.along_x_m_km == 0.0 && strip.along_y_m_km.is_nan());
     }
 
+    /// Coefficients of the published program for heights 0.25 m apart (Sayers, Gillespie and Paterson, World Bank Technical Paper 46, 1986;
+    /// also ASTM E1926): seven digits.
+    #[test]
+    fn val_the_step_has_the_published_coefficients() {
+        let published = [
+            [0.9966071, 0.01091514, -0.002083274, 0.0003190145, 0.005476107],
+            [-0.5563044, 0.9438768, -0.8324718, 0.05064701, 1.388776],
+            [0.02153176, 0.002126763, 0.7508714, 0.008221888, 0.2275968],
+            [3.335013, 0.3376467, -39.12762, 0.4347564, 35.79262],
+        ];
+        let step = step(0.25 / SPEED_M_S);
+        for (ours, theirs) in step.iter().flatten().zip(published.as_flattened()) {
+            assert!((ours - theirs).abs() < 1e-6 * (1.0 + theirs.abs()), "{ours} {theirs}");
+        }
+    }
+
     /// The step of 0.3 m is that of 2^k parts of it, and slow motion follows the ground.
     #[test]
     fn val_the_step_is_an_exponential() {

@@ -2,7 +2,7 @@
 
 use super::frame::Frame;
 use crate::generator::{Map, Terrain, TerrainError};
-use sastrugi_numeric::{Grid, ops};
+use sastrugi_numeric::{Grid, ops, sums};
 use sastrugi_roughness::{BandError, Detrended, Detrender, WaveBand};
 use sastrugi_schemas::ParameterError;
 use schemars::{JsonSchema, Schema};
@@ -126,6 +126,9 @@ impl Roughness {
     }
 }
 
+/// Roughness in the band below this share of the RMS of all heights is what the filter leaks: no surface is scaled by it.
+const ROUGHNESS_SHARE_MIN: f64 = 1e-3;
+
 /// A surface before it is measured.
 pub struct Made<F> {
     /// Heights without their field of scales.
@@ -151,7 +154,9 @@ pub fn finish<F: Fn(&WaveBand) -> f64>(made: Made<F>, asked: Option<&Roughness>)
         Scaling::Measured => measured.rms_m(),
         Scaling::Expected => expected_m2(band).sqrt(),
     };
-    if !(own_m > 0.0 && own_m.is_finite()) {
+    let all_m = sums::variance(&heights.values).sqrt();
+    let there = own_m > ROUGHNESS_SHARE_MIN * all_m && own_m.is_finite();
+    if asked.rms_m.is_some() && !there {
         return Err(TerrainError::NoRoughness { min_m: band.min_m(), max_m: band.max_m() });
     }
     let factor = asked.rms_m.map_or(1.0, |rms| rms / own_m);
