@@ -35,6 +35,23 @@ impl Frame {
         }
     }
 
+    /// Refuses a length, that of the lattice or the correlation behind a parameter, that cells cannot show.
+    ///
+    /// # Errors
+    /// A length that is not finite and above 0, or below a cell.
+    pub fn resolves(&self, key: &str, length_m: f64) -> Result<(), ParameterError> {
+        ParameterError::positive(key, length_m)?;
+        let cell_m = self.size.cell_m;
+        if length_m >= cell_m {
+            Ok(())
+        } else {
+            Err(ParameterError::new(
+                key,
+                format!("makes a length of {length_m} m; it must be at least a cell, {cell_m} m"),
+            ))
+        }
+    }
+
     /// The same cells with their corner at the origin of the world.
     pub fn at_origin(self) -> Self {
         Self { before: [0; 2], ..self }

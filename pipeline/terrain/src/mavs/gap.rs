@@ -82,6 +82,7 @@ impl TryFrom<RawGap> for Gap {
         ParameterError::positive("width_m", raw.width_m)?;
         ParameterError::not_negative("hi_mag_m", raw.hi_mag_m)?;
         ParameterError::positive("hi_len_m", raw.hi_len_m)?;
+        frame.resolves("hi_len_m", 1.25 * PI * raw.hi_len_m)?;
         if !(0.0..90.0).contains(&raw.wall_angle_deg) {
             let message = format!("is {}; it must lie between 0 and 90, 0 included", raw.wall_angle_deg);
             return Err(ParameterError::new("wall_angle_deg", message));

@@ -391,6 +391,10 @@ fn val_impossible_parameters_are_refused() {
         ("mavs_perlin", "hi_mag_m", json!(-0.1)),
         ("mavs_perlin", "hi_mag_m", json!(0.0)),
         ("mavs_perlin", "hi_len_m", json!(0.0)),
+        ("mavs_perlin", "hi_len_m", json!(0.03)),
+        ("mavs_perlin", "lo_len_m", json!(0.1)),
+        ("gap", "hi_len_m", json!(1e-9)),
+        ("mavs_gaussian", "lo_len_m", json!(1e-9)),
         ("mavs_perlin", "lo_mag_m", json!(-0.1)),
         ("mavs_perlin", "lo_len_m", json!(0.0)),
         ("mavs_gaussian", "hi_mag_m", json!(0.0)),
@@ -435,6 +439,32 @@ fn val_impossible_parameters_are_refused() {
     assert_eq!(key("mavs_gaussian", json!({"compat": true, "hi_len_m": 0.07})), "cell_m");
     assert_eq!(key("van_deusen", json!({"hi_mag_m": 0.1, "psd_constant": 1e-4})), "psd_constant");
     assert!(refused("mavs", json!({})).message.contains("van_deusen"));
+}
+
+/// Every number far out of its range: refused, or made without a panic.
+#[test]
+fn prop_extreme_numbers_do_no_harm() {
+    let kinds = crate::registry::kinds();
+    let mut made = 0;
+    for kind in kinds.iter().filter(|k| k.source.contains("MAVS")) {
+        let numbers = kind.parameters["properties"].as_object().unwrap().iter();
+        for (name, _) in numbers.filter(|(_, p)| p["type"].to_string().contains("number")) {
+            for value in [1e-300, 1e-9, 0.5, 1e9, 1e300] {
+                for compat in [false, true] {
+                    let mut params = json!({"size_px": [24, 24]});
+                    params[name] = json!(value);
+                    if kind.parameters["properties"].get("compat").is_some() {
+                        params["compat"] = json!(compat);
+                    }
+                    if let Ok(generator) = prepare(kind.kind, &params) {
+                        assert!(generator.memory_bytes() < 1 << 31, "{} {name} {value}", kind.kind);
+                        made += usize::from(generator.generate(&Streams::for_seed(1, "mavs-test"), &[]).is_ok());
+                    }
+                }
+            }
+        }
+    }
+    assert!(made > 50, "{made}");
 }
 
 /// The listing takes a smaller cell without a word; ours says so.

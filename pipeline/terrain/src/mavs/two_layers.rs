@@ -68,6 +68,13 @@ impl Default for RawTwoLayers {
     }
 }
 
+impl RawTwoLayers {
+    /// Lattice cell of the high layer, m.
+    fn high_lattice_m(&self) -> f64 {
+        if self.true_wavelength { self.hi_len_m } else { 1.25 * PI * self.hi_len_m }
+    }
+}
+
 /// Checked parameters of the two layers.
 #[derive(Clone, Debug)]
 pub struct TwoLayers {
@@ -85,7 +92,8 @@ impl TryFrom<RawTwoLayers> for TwoLayers {
         ParameterError::not_negative("hi_mag_m", raw.hi_mag_m)?;
         ParameterError::positive("hi_len_m", raw.hi_len_m)?;
         ParameterError::not_negative("lo_mag_m", raw.lo_mag_m)?;
-        ParameterError::positive("lo_len_m", raw.lo_len_m)?;
+        frame.resolves("lo_len_m", raw.lo_len_m)?;
+        frame.resolves("hi_len_m", raw.high_lattice_m())?;
         if raw.hi_mag_m + raw.lo_mag_m == 0.0 {
             return Err(ParameterError::new("hi_mag_m", "is 0, and so is `lo_mag_m`; the surface would be flat"));
         }
@@ -99,8 +107,7 @@ impl TwoLayers {
     /// Lattice cell and factor of the high layer, then of the low one.
     fn layers(&self) -> [(&'static str, f64, f64); 2] {
         let p = &self.raw;
-        let stretch = if p.true_wavelength { 1.0 } else { 1.25 * PI };
-        [("high", stretch * p.hi_len_m, 4.0 * p.hi_mag_m), ("low", p.lo_len_m, p.lo_mag_m)]
+        [("high", p.high_lattice_m(), 4.0 * p.hi_mag_m), ("low", p.lo_len_m, p.lo_mag_m)]
     }
 
     fn heights(&self, streams: &Streams) -> Grid {

@@ -124,7 +124,7 @@ impl Default for RawOrnsteinUhlenbeck {
 }
 
 /// Largest correlation length over a cell: the torus holds eight of them.
-const LENGTH_MAX_CELLS: f64 = 2000.0;
+const LENGTH_MAX_CELLS: f64 = 500.0;
 
 /// Checked parameters of a field with a chosen covariance.
 #[derive(Clone, Debug)]
@@ -141,16 +141,16 @@ impl TryFrom<RawOrnsteinUhlenbeck> for OrnsteinUhlenbeck {
         let size = Size::check(raw.size_m, raw.size_px, raw.cell_m, DEFAULT_SIZE_PX)?;
         let frame = Frame::check(size, raw.origin_m)?;
         ParameterError::positive("rms_m", raw.rms_m)?;
-        resolved("correlation_length_m", raw.correlation_length_m, raw.cell_m)?;
+        frame.resolves("correlation_length_m", raw.correlation_length_m)?;
         if raw.mode == Mode::Isotropic && raw.correlation_length_m > LENGTH_MAX_CELLS * raw.cell_m {
-            let message = format!("is {} m; it must be at most 2000 cells", raw.correlation_length_m);
+            let message = format!("is {} m; it must be at most 500 cells", raw.correlation_length_m);
             return Err(ParameterError::new("correlation_length_m", message));
         }
         if raw.mode == Mode::Separable && raw.covariance == Covariance::Gaussian {
             let message = "is gaussian, which recursions do not have; use `mode = \"isotropic\"`";
             return Err(ParameterError::new("covariance", message));
         }
-        rolling(raw.lo_mag_m, raw.lo_len_m)?;
+        check_rolling(&frame, raw.lo_mag_m, raw.lo_len_m)?;
         let roughness = Roughness::check(&raw.roughness, &frame)?;
         let raw = RawOrnsteinUhlenbeck { size_m: None, size_px: Some(size.px), ..raw };
         Ok(Self { raw, frame, roughness })
@@ -179,11 +179,10 @@ impl TryFrom<RawGaussian> for Gaussian {
     fn try_from(raw: RawGaussian) -> Result<Self, ParameterError> {
         ParameterError::positive("hi_mag_m", raw.hi_mag_m)?;
         ParameterError::positive("hi_len_m", raw.hi_len_m)?;
-        rolling(raw.lo_mag_m, raw.lo_len_m)?;
         let mut size = Size::check(raw.size_m, raw.size_px, raw.cell_m, DEFAULT_SIZE_PX)?;
         let mut replaced_cell_m = None;
         if !raw.compat {
-            resolved("hi_len_m", raw.hi_len_m, raw.cell_m)?;
+            Frame::check(size, raw.origin_m)?.resolves("hi_len_m", raw.hi_len_m)?;
         } else if raw.cell_m > 2.0 * raw.hi_len_m {
             let message = format!("is {} m; it must be at most twice `hi_len_m`, {} m", raw.cell_m, 2.0 * raw.hi_len_m);
             return Err(ParameterError::new("cell_m", message));
@@ -192,6 +191,7 @@ impl TryFrom<RawGaussian> for Gaussian {
             size = Size::check(Some(size.geometry().size()), None, cell_m, DEFAULT_SIZE_PX)?;
         }
         let frame = Frame::check(size, raw.origin_m)?;
+        check_rolling(&frame, raw.lo_mag_m, raw.lo_len_m)?;
         let roughness = Roughness::check(&raw.roughness, &frame)?;
         let raw = RawGaussian { size_m: None, size_px: Some(size.px), cell_m: size.cell_m, ..raw };
         Ok(Self { raw, frame, roughness, replaced_cell_m })
@@ -213,18 +213,7 @@ fn smaller_cell_m(size: &Size, length_m: f64) -> Option<f64> {
     (limit < size.cell_m).then_some(limit)
 }
 
-/// A correlation length that cells can show.
-fn resolved(key: &str, length_m: f64, cell_m: f64) -> Result<(), ParameterError> {
-    ParameterError::positive(key, length_m)?;
-    if length_m >= cell_m {
-        Ok(())
-    } else {
-        Err(ParameterError::new(key, format!("is {length_m} m; it must be at least a cell, {cell_m} m")))
-    }
-}
-
-fn rolling(amplitude_m: f64, wavelength_m: f64) -> Result<(), ParameterError> {
+fn check_rolling(frame: &Frame, amplitude_m: f64, wavelength_m: f64) -> Result<(), ParameterError> {
     ParameterError::not_negative("lo_mag_m", amplitude_m)?;
-    ParameterError::positive("lo_len_m", wavelength_m)?;
-    Ok(())
+    frame.resolves("lo_len_m", wavelength_m)
 }
