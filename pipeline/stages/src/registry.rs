@@ -357,3 +357,22 @@ pub fn input_file(path: PathBuf) -> Result<(u64, InputFile), BuildError> {
         Err(e) => Err(BuildError::Input(format!("{}: {e}", path.display()))),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::study::keys::properties;
+
+    /// A key of an envelope would never reach a generator.
+    #[test]
+    fn val_no_parameter_has_the_name_of_an_envelope_key() {
+        for section in &SECTIONS {
+            let envelope = properties(&(section.envelope)());
+            for kind in (section.kinds)() {
+                let own = properties(&kind.parameters);
+                let shared: Vec<&String> = own.iter().filter(|key| envelope.contains(key)).collect();
+                assert!(shared.is_empty(), "[[{}]] {}: {shared:?}", section.name, kind.kind);
+            }
+        }
+    }
+}

@@ -41,10 +41,10 @@ pub struct RawPothole {
     pub diameter_m: f64,
     /// Mean depth, m.
     pub depth_m: f64,
-    /// Centres in the world, m, in place of `count`.
+    /// Centres in the world, m, in place of `holes`.
     pub places_m: Vec<[f64; 2]>,
     /// Holes at places drawn evenly over the surface.
-    pub count: u32,
+    pub holes: u32,
 }
 
 impl Default for RawPothole {
@@ -57,7 +57,7 @@ impl Default for RawPothole {
             diameter_m: 1.0,
             depth_m: 0.1,
             places_m: Vec::new(),
-            count: 1,
+            holes: 1,
         }
     }
 }
@@ -81,11 +81,11 @@ impl TryFrom<RawPothole> for Pothole {
             let message = format!("is {} m; it must be at least three cells of {} m", raw.diameter_m, raw.cell_m);
             return Err(ParameterError::new("diameter_m", message));
         }
-        if raw.places_m.is_empty() && raw.count == 0 {
-            return Err(ParameterError::new("count", "is 0; the surface would be flat"));
+        if raw.places_m.is_empty() && raw.holes == 0 {
+            return Err(ParameterError::new("holes", "is 0; the surface would be flat"));
         }
-        if raw.places_m.len().max(raw.count as usize) > HOLES_MAX {
-            return Err(ParameterError::new("count", format!("gives more than {HOLES_MAX} holes")));
+        if raw.places_m.len().max(raw.holes as usize) > HOLES_MAX {
+            return Err(ParameterError::new("holes", format!("gives more than {HOLES_MAX} holes")));
         }
         let geometry = frame.geometry();
         match raw.places_m.iter().find(|[x, y]| geometry.cell_at(*x, *y).is_none()) {
@@ -120,7 +120,7 @@ impl Pothole {
     fn holes(&self, streams: &Streams) -> Vec<Hole> {
         let (p, mut stream) = (&self.raw, streams.stream("holes"));
         let [[west, south], [length, width]] = [self.frame.origin_m(), self.frame.geometry().size()];
-        let count = if p.places_m.is_empty() { p.count as usize } else { p.places_m.len() };
+        let count = if p.places_m.is_empty() { p.holes as usize } else { p.places_m.len() };
         let hole = |k: usize| {
             let radius_m = p.diameter_m * stream.uniform_in(RADIUS_SHARE[0], RADIUS_SHARE[1]);
             let depth_m = p.depth_m * stream.uniform_in(DEPTH_SHARE[0], DEPTH_SHARE[1]);

@@ -27,11 +27,16 @@ fn torus_length(cells: usize, cell_m: f64, length_m: f64) -> usize {
     smooth_length((2 * cells).max(cells + margin))
 }
 
+/// Cells of the torus.
+pub fn torus_cells(size: &Size, length_m: f64) -> u64 {
+    let along = |cells| torus_length(cells, size.cell_m, length_m) as u64;
+    along(size.rows()).saturating_mul(along(size.cols()))
+}
+
 /// Peak memory of [`field`] without its result, bytes.
 pub fn memory_bytes(size: &Size, length_m: f64) -> u64 {
-    let along = |cells| torus_length(cells, size.cell_m, length_m) as u64;
-    // A quarter of eigenvalues, a half spectrum that becomes the torus.
-    18 * along(size.rows()) * along(size.cols())
+    // A quarter of eigenvalues, and a half spectrum beside the torus that it becomes.
+    18 * torus_cells(size, length_m)
 }
 
 /// The field.

@@ -30,7 +30,7 @@ use crate::generator::{Generator, Terrain, TerrainError};
 use sastrugi_numeric::{Geometry, Grid, Streams, ops};
 use sastrugi_roughness::WaveBand;
 use serde_json::Value;
-use std::f64::consts::{FRAC_2_PI, PI, TAU};
+use std::f64::consts::{FRAC_2_PI, PI};
 
 /// Rolling ground under a field.
 #[derive(Clone, Copy, Debug)]
@@ -55,14 +55,20 @@ impl Rolling {
     }
 }
 
-/// Share of the variance of profiles with covariance `exp(-d / a)` between two frequencies in cycles over a.
-fn exponential_share([low, high]: [f64; 2]) -> f64 {
-    FRAC_2_PI * (libm::atan(TAU * high) - libm::atan(TAU * low))
+/// Share of the variance of profiles with covariance `exp(-d / a)`, sampled in cells, between two frequencies in cycles/m: an
+/// autoregression with ratio `r = exp(-cell / a)`, whose waves beyond the Nyquist frequency appear below it.
+fn exponential_share([low, high]: [f64; 2], length_m: f64, cell_m: f64) -> f64 {
+    let r = libm::exp(-cell_m / length_m);
+    let below = |f: f64| match f * cell_m < 0.5 {
+        true => FRAC_2_PI * libm::atan((1.0 + r) / (1.0 - r) * libm::tan(PI * f * cell_m)),
+        false => 1.0,
+    };
+    below(high) - below(low)
 }
 
-/// The same for `exp(-d^2 / a^2)`.
-fn gaussian_share([low, high]: [f64; 2]) -> f64 {
-    libm::erf(PI * high) - libm::erf(PI * low)
+/// The same for `exp(-d^2 / a^2)`, which has next to no waves as short as two cells.
+fn gaussian_share([low, high]: [f64; 2], length_m: f64, _cell_m: f64) -> f64 {
+    libm::erf(PI * high * length_m) - libm::erf(PI * low * length_m)
 }
 
 /// The terrain of a field over rolling ground.
@@ -113,7 +119,7 @@ impl Generator for OrnsteinUhlenbeck {
             Covariance::Gaussian => gaussian_share,
         };
         let expected_m2 = |band: &WaveBand| {
-            let own = p.rms_m * p.rms_m * share(band.frequencies().map(|f| f * p.correlation_length_m));
+            let own = p.rms_m * p.rms_m * share(band.frequencies(), p.correlation_length_m, p.cell_m);
             own + self.rolling().expected_m2(band)
         };
         finished(plain, expected_m2, self.roughness.as_ref())
@@ -166,7 +172,8 @@ impl Generator for Gaussian {
             self.rolling().under(field, &self.frame, layer)
         };
         let expected_m2 = |band: &WaveBand| {
-            let own = p.hi_mag_m * p.hi_mag_m * exponential_share(band.frequencies().map(|f| f * p.hi_len_m));
+            let own =
+                p.hi_mag_m * p.hi_mag_m * exponential_share(band.frequencies(), p.hi_len_m, self.frame.size.cell_m);
             own + self.rolling().expected_m2(band)
         };
         finished(plain, expected_m2, self.roughness.as_ref())

@@ -1,8 +1,8 @@
 //! Parameters of the Gaussian fields.
 
-use super::Rolling;
+use super::{Rolling, embedding};
 use crate::mavs::frame::Frame;
-use crate::mavs::measure::{RawRoughness, Roughness};
+use crate::mavs::measure::{RawRoughness, Roughness, Scaling};
 use crate::mavs::{DEFAULT_CELL_M, DEFAULT_HI_LEN_M, DEFAULT_HI_MAG_M, DEFAULT_LO_LEN_M, DEFAULT_SIZE_PX};
 use crate::size::Size;
 use sastrugi_schemas::ParameterError;
@@ -126,6 +126,9 @@ impl Default for RawOrnsteinUhlenbeck {
 /// Largest correlation length over a cell: the torus holds eight of them.
 const LENGTH_MAX_CELLS: f64 = 500.0;
 
+/// Most cells of the torus.
+const TORUS_CELLS_MAX: u64 = 1 << 29;
+
 /// Checked parameters of a field with a chosen covariance.
 #[derive(Clone, Debug)]
 pub struct OrnsteinUhlenbeck {
@@ -145,6 +148,11 @@ impl TryFrom<RawOrnsteinUhlenbeck> for OrnsteinUhlenbeck {
         if raw.mode == Mode::Isotropic && raw.correlation_length_m > LENGTH_MAX_CELLS * raw.cell_m {
             let message = format!("is {} m; it must be at most 500 cells", raw.correlation_length_m);
             return Err(ParameterError::new("correlation_length_m", message));
+        }
+        if raw.mode == Mode::Isotropic && embedding::torus_cells(&size, raw.correlation_length_m) > TORUS_CELLS_MAX {
+            let message = "is isotropic: twice the surface, and eight correlation lengths more, would have over 2^29 cells; choose a \
+                           smaller surface, or `mode = \"separable\"`";
+            return Err(ParameterError::new("mode", message));
         }
         if raw.mode == Mode::Separable && raw.covariance == Covariance::Gaussian {
             let message = "is gaussian, which recursions do not have; use `mode = \"isotropic\"`";
@@ -193,6 +201,10 @@ impl TryFrom<RawGaussian> for Gaussian {
         let frame = Frame::check(size, raw.origin_m)?;
         check_rolling(&frame, raw.lo_mag_m, raw.lo_len_m)?;
         let roughness = Roughness::check(&raw.roughness, &frame)?;
+        if raw.compat && raw.roughness.scaling == Scaling::Expected {
+            let message = "is \"expected\", which the published listing does not follow; use \"measured\"";
+            return Err(ParameterError::new("scaling", message).within("roughness"));
+        }
         let raw = RawGaussian { size_m: None, size_px: Some(size.px), cell_m: size.cell_m, ..raw };
         Ok(Self { raw, frame, roughness, replaced_cell_m })
     }
