@@ -241,7 +241,7 @@ fn val_fields_beyond_reason_are_refused() {
     let key = |kind: &str, params: Value| prepare(kind, &params).err().unwrap().key;
     let wide = json!({"mode": "isotropic", "cell_m": 0.01, "size_px": [16384, 16384]});
     assert_eq!(key("ornstein_uhlenbeck", wide), "mode");
-    let long = json!({"mode": "isotropic", "size_px": [80_000_000, 3], "correlation_length_m": 290.0});
+    let long = json!({"mode": "isotropic", "size_px": [80_000_000, 3], "correlation_length_m": 70.0});
     assert_eq!(key("ornstein_uhlenbeck", long), "mode");
     let expected = json!({"compat": true, "roughness": {"band_m": [0.33, 5.4], "rms_m": 0.03, "scaling": "expected"}});
     assert_eq!(key("mavs_gaussian", expected), "roughness.scaling");
