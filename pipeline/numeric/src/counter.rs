@@ -242,7 +242,7 @@ mod tests {
     }
 
     /// Null: values at the points of a lattice are independent standard normals. Moments one to four of 512 x 512 values, and the
-    /// correlations with the eight nearest neighbours and across words, at 5 standard errors each (6e-7 a figure, 18 figures); a
+    /// correlations over eight shifts and across words, at 5 standard errors each (6e-7 a figure, 13 figures); a
     /// correlation of 0.01 would be caught.
     #[test]
     fn stat_lattice_draws_are_normal_and_uncorrelated() {

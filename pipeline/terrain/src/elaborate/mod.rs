@@ -6,14 +6,17 @@
 //! between values at the posts,
 //! $$ z = S - I\left[\, S(\text{posts}) - B(\text{posts}) \,\right] $$
 //! so that z is the DEM's height at every post that is a lattice point, and the DEM's to within the slope times half a basic spacing
-//! at the others. As of `planetary`, any window at any zoom has the same bits wherever it overlaps another.
+//! at the others.
 //!
 //! Texture parameters are fitted to the structure function of the DEM over lags of 1 to 8 posts (`fit`), unless given; its coarsest
 //! points are the lattice spacing nearest to that of the posts.
 //!
 //! # The lattice
 //! Samples lie at `origin_m` and whole cells from it, lattice points whole basic spacings from it, numbered from the origin of the DEM's
-//! coordinates. Windows whose origins differ by whole cells are windows of one surface, and agree bit by bit.
+//! coordinates. The lattice is shifted so that samples lie on it, by half a cell at most. Windows of one cell whose origins differ by whole
+//! cells have the same shift: they are windows of one surface, and agree bit by bit. So do windows of twice the cell with every second
+//! sample, where their origin lies within half of the smaller cell of a whole number of larger ones; elsewhere they are shifted
+//! otherwise, and have other detail.
 //!
 //! # Source
 //! The paper's future work (section 1), and section 5 of Gaskell's scheme: "an interpolated surface begins with digital elevation and
@@ -267,7 +270,7 @@ impl Generator for Elaborate {
     }
 
     fn memory_bytes(&self) -> u64 {
-        planetary::memory_bytes(&self.window)
+        planetary::memory_bytes(&self.window, self.tile_objects)
     }
 
     fn notes(&self) -> Vec<String> {

@@ -1,6 +1,6 @@
 //! Parameters of the elaboration.
 
-use crate::planetary::{RawProcess, Window, check_processes, check_texture, lattice, window_in_reach};
+use crate::planetary::{Lattice, RawProcess, WHOLE_TOLERANCE, Window, check_processes, check_texture, window_in_reach};
 use crate::size::Size;
 use sastrugi_schemas::ParameterError;
 use schemars::JsonSchema;
@@ -72,6 +72,7 @@ pub struct Elaborate {
     pub(super) window: Window,
     /// Where lattice point 0 lies in the DEM's coordinates, m.
     pub(super) offset_m: [f64; 2],
+    pub(super) tile_objects: f64,
 }
 
 impl TryFrom<RawElaborate> for Elaborate {
@@ -81,8 +82,8 @@ impl TryFrom<RawElaborate> for Elaborate {
         if raw.dem.is_empty() {
             return Err(ParameterError::new("dem", "is missing; it names the DEM to refine"));
         }
-        let size = Size::check(raw.size_m, raw.size_px, raw.cell_m, DEFAULT_SIZE_PX)?;
-        let (spacing_m, zoom) = lattice(raw.basic_spacing_m, raw.cell_m)?;
+        let Lattice { spacing_m, zoom, cell_m } = Lattice::check(raw.basic_spacing_m, raw.cell_m)?;
+        let size = Size::check(raw.size_m, raw.size_px, cell_m, DEFAULT_SIZE_PX)?;
         check_texture(raw.roughness_m.unwrap_or(0.0), raw.hurst.unwrap_or(1.0))?;
         for (n, process) in raw.processes.iter().enumerate() {
             if matches!(process, RawProcess::BaseSlope(_) | RawProcess::Texture(_)) {
@@ -91,21 +92,23 @@ impl TryFrom<RawElaborate> for Elaborate {
             }
         }
         check_processes(&raw.processes, spacing_m)?;
-        let [west, south] = raw.origin_m.map(|at| column(at, raw.cell_m));
+        let [west, south] = raw.origin_m.map(|at| column(at, cell_m));
         let window = Window { zoom, west: west?, south: south?, cols: size.cols(), rows: size.rows() };
-        window_in_reach(&raw.processes, spacing_m, &window)?;
+        let tile_objects = window_in_reach(&raw.processes, spacing_m, &window)?;
         let offset_m = [(raw.origin_m[0], window.west), (raw.origin_m[1], window.south)].map(|(at_m, column)| {
-            let beyond_m = at_m - column as f64 * raw.cell_m;
+            let beyond_m = at_m - column as f64 * cell_m;
             (beyond_m / OFFSET_STEP_M).round() * OFFSET_STEP_M
         });
-        let raw = RawElaborate { size_m: None, size_px: Some(size.px), basic_spacing_m: Some(spacing_m), ..raw };
-        Ok(Self { raw, size, spacing_m, window, offset_m })
+        let (size_px, basic_spacing_m) = (Some(size.px), Some(spacing_m));
+        let raw = RawElaborate { size_m: None, size_px, cell_m, basic_spacing_m, ..raw };
+        Ok(Self { raw, size, spacing_m, window, offset_m, tile_objects })
     }
 }
 
-/// The column or row of lattice points that a place is taken for.
+/// The column or row of samples that a place is taken for: the nearest. Halves go up, also those that a quotient just misses, so that
+/// places whole cells apart are taken for columns as far apart.
 fn column(at_m: f64, cell_m: f64) -> Result<i64, ParameterError> {
-    let column = (at_m / cell_m).round();
+    let column = (at_m / cell_m + 0.5 + WHOLE_TOLERANCE).floor();
     if column.abs() <= COLUMNS_MAX {
         Ok(column as i64)
     } else {

@@ -106,6 +106,11 @@ fn prop_windows_agree() {
     let whole = of(0.08, [105.6, 206.4], [121, 101]);
     let part = of(0.08, [105.6 + 0.08 * 30.0, 206.4 + 0.08 * 20.0], [50, 60]);
     let coarse = of(0.16, [105.6, 206.4], [61, 51]);
+    // Origins half a cell off the lattice, whose quotients by the cell fall on either side of a half.
+    let (half, half_part) = (of(0.08, [105.64, 206.44], [60, 60]), of(0.08, [105.64 + 2.4, 206.44 + 1.6], [20, 20]));
+    for (j, i) in (0..20).flat_map(|j| (0..20).map(move |i| (j, i))) {
+        assert_eq!(half_part.heights.at(19 - j, i), half.heights.at(59 - (j + 20), i + 30));
+    }
     let fields = |t: &Terrain| -> Vec<Grid> {
         std::iter::once(&t.heights).chain(t.maps.iter().map(|m| &m.values)).cloned().collect()
     };

@@ -85,18 +85,14 @@ impl Assembly {
                 }
                 RawProcess::SecondaryCraters(p) => self.add_secondaries(p, n, counter),
                 RawProcess::Rocks(p) => {
-                    rocks = Some((p.parameters(dust.map_or(0.0, |d| d.thickness_m)), counter, self.steps.len()));
+                    let parameters = p.parameters(dust.map_or(0.0, |d| d.thickness_m));
+                    rocks = Some((Rocks::new(parameters, self.spacing_m, counter), self.steps.len()));
                     self.same_time = false;
                 }
                 RawProcess::Albedo(p) => albedo = Some(of_surface(p, dust, counter)),
                 RawProcess::Dust(_) => {}
             }
         }
-        let rocks = rocks.map(|(parameters, counter, after)| {
-            let craters = self.steps[after..].iter().any(|s| matches!(s, Step::Bombardment(_)));
-            let strewn = craters && parameters.crater_peak > 0.0;
-            (Rocks::new(parameters, self.spacing_m, counter, strewn), after)
-        });
         World { steps: self.steps, rocks, albedo }
     }
 }

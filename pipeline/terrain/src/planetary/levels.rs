@@ -13,7 +13,7 @@ use std::ops::Range;
 /// A rectangle of lattice points, `2^zoom` apart: columns from `west` and rows from `south` on, counted in that spacing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Window {
-    /// Binary logarithm of the spacing in lattice units, at most 62.
+    /// Binary logarithm of the spacing in lattice units, at most 61.
     pub zoom: u32,
     /// Westernmost column.
     pub west: i64,

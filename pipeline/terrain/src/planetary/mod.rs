@@ -23,8 +23,10 @@
 //! # Cost and memory
 //! A patch costs what its own points and the craters and rocks that reach them cost, plus some tens of points a level: see
 //! `benches/benches/planetary.rs`. Patches are made in tiles of 256 x 256 samples, each by one task with working memory of its
-//! own, and with its own account of craters: a wide crater that reaches many tiles is looked at by each. Working memory does not
-//! depend on the size of the world.
+//! own, and with its own account of craters: a wide crater that reaches many tiles is looked at by each. Working memory goes with
+//! the craters and rocks that a tile is expected to meet, 200 bytes each for every tile at work; it does not depend on the size of
+//! the world. Each crater also needs the heights of some 50 to 200 points under it, made by the wider craters there: the time of dense
+//! fields goes with the square of their density, which is bounded at about 20 times saturation.
 //!
 //! # When not to use it
 //! Coarse patches hold point values: a coarse sample is as rough as a fine one, and may stand on a rock. For means over cells make the
@@ -43,8 +45,8 @@ mod world;
 
 pub(crate) use assemble::Assembly;
 pub use levels::Window;
+pub(crate) use params::{Lattice, WHOLE_TOLERANCE, window_in_reach};
 pub use params::{Planetary, RawPlanetary};
-pub(crate) use params::{lattice, window_in_reach};
 pub use processes::RawProcess;
 pub(crate) use processes::{check as check_processes, check_texture};
 pub use rocks::law::Law;
@@ -62,8 +64,12 @@ pub const KIND: &str = "planetary";
 const TILE: usize = 256;
 /// Working memory of a tile for a sample of it: the patch, heights on the way, and what two levels of a texture need.
 const BYTES_PER_TILE_SAMPLE: u64 = 120;
-/// Room for the craters and rocks of a tile.
-const BYTES_PER_TILE: u64 = 32 << 20;
+/// A crater or rock in the lists of a tile, with its plane.
+const BYTES_PER_OBJECT: f64 = 200.0;
+/// Squares of craters and what else a tile holds.
+const BYTES_PER_TILE: u64 = 1 << 20;
+/// No more tiles are at work at once.
+const TILES_AT_WORK: usize = 64;
 
 impl World {
     /// A patch, made in tiles side by side.
@@ -107,12 +113,22 @@ pub(crate) fn nearest_zoom(spacings: f64) -> u32 {
     levels::floor_log2(spacings * std::f64::consts::SQRT_2)
 }
 
-/// Peak memory of making a patch and of its grids, bytes.
-pub(crate) fn memory_bytes(window: &Window) -> u64 {
-    let samples = window.len() as u64;
-    let tiles = (window.cols.div_ceil(TILE) * window.rows.div_ceil(TILE)) as u64;
-    // Four fields of the patch beside those of its tiles or its grids; no more than 64 tiles are at work at once.
-    8 * 8 * samples + tiles.min(64) * (BYTES_PER_TILE_SAMPLE * (TILE * TILE) as u64 + BYTES_PER_TILE)
+/// How many tiles a window is made in.
+fn tiles(window: &Window) -> usize {
+    window.cols.div_ceil(TILE) * window.rows.div_ceil(TILE)
+}
+
+/// The first tile of a window, which is as wide as any.
+fn widest_tile(window: &Window) -> Window {
+    Window { cols: window.cols.min(TILE), rows: window.rows.min(TILE), ..*window }
+}
+
+/// Peak memory of making a patch and of its grids, bytes; `tile_objects` is what [`window_in_reach`] says.
+pub(crate) fn memory_bytes(window: &Window, tile_objects: f64) -> u64 {
+    let tile_samples = widest_tile(window).len() as u64;
+    let tile = BYTES_PER_TILE_SAMPLE * tile_samples + (BYTES_PER_OBJECT * tile_objects) as u64 + BYTES_PER_TILE;
+    // Four fields of the patch beside those of its tiles or its grids.
+    8 * 8 * window.len() as u64 + tiles(window).min(TILES_AT_WORK) as u64 * tile
 }
 
 /// A grid with row 0 in the north from values with row 0 in the south.
@@ -148,7 +164,7 @@ impl Generator for Planetary {
     }
 
     fn memory_bytes(&self) -> u64 {
-        memory_bytes(&self.window)
+        memory_bytes(&self.window, self.tile_objects)
     }
 
     fn notes(&self) -> Vec<String> {

@@ -4,6 +4,7 @@ use super::assemble;
 use super::levels::{Window, spacing};
 use super::processes::{self, RawAlbedo, RawPrimaryCraters, RawProcess, RawRocks, RawTexture};
 use super::world::World;
+use super::{tiles, widest_tile};
 use crate::size::Size;
 use sastrugi_numeric::Streams;
 use sastrugi_schemas::ParameterError;
@@ -19,8 +20,10 @@ const ANCHOR_LEVEL_MAX: u32 = 40;
 /// Lattice points are counted up to here, so that they are whole numbers in double precision.
 const LATTICE_MAX: f64 = (1u64 << 52) as f64;
 /// A quotient this near to a whole number is that number.
-const WHOLE_TOLERANCE: f64 = 1e-6;
-/// Most craters and rocks that making a surface may have to look at.
+pub const WHOLE_TOLERANCE: f64 = 1e-6;
+/// How often the largest basic spacing chosen unasked is doubled.
+const ZOOM_MAX: u32 = 61;
+/// Most craters and rocks that making a surface may have to look at, those that several tiles look at counted for each.
 const OBJECTS_MAX: f64 = (1u64 << 28) as f64;
 
 /// Planetary surface.
@@ -75,24 +78,27 @@ pub struct Planetary {
     pub(super) size: Size,
     pub(super) spacing_m: f64,
     pub(super) window: Window,
+    pub(super) tile_objects: f64,
 }
 
 impl TryFrom<RawPlanetary> for Planetary {
     type Error = ParameterError;
 
     fn try_from(raw: RawPlanetary) -> Result<Self, ParameterError> {
-        let size = Size::check(raw.size_m, raw.size_px, raw.cell_m, DEFAULT_SIZE_PX)?;
-        let (spacing_m, zoom) = lattice(raw.basic_spacing_m, raw.cell_m)?;
+        let Lattice { spacing_m, zoom, cell_m } = Lattice::check(raw.basic_spacing_m, raw.cell_m)?;
+        let size = Size::check(raw.size_m, raw.size_px, cell_m, DEFAULT_SIZE_PX)?;
         if raw.anchor_level > ANCHOR_LEVEL_MAX {
             let message = format!("is {}; it must be at most {ANCHOR_LEVEL_MAX}", raw.anchor_level);
             return Err(ParameterError::new("anchor_level", message));
         }
         processes::check(&raw.processes, spacing_m)?;
-        let [west, south] = raw.origin_m.map(|at| column(at, raw.cell_m));
+        let [west, south] = raw.origin_m.map(|at| column(at, cell_m));
         let window = Window { zoom, west: west?, south: south?, cols: size.cols(), rows: size.rows() };
-        let raw = RawPlanetary { size_m: None, size_px: Some(size.px), basic_spacing_m: Some(spacing_m), ..raw };
-        window_in_reach(&raw.processes, spacing_m, &window)?;
-        Ok(Self { raw, size, spacing_m, window })
+        let tile_objects = window_in_reach(&raw.processes, spacing_m, &window)?;
+        let origin_m = [window.west, window.south].map(|column| column as f64 * cell_m);
+        let (size_px, basic_spacing_m) = (Some(size.px), Some(spacing_m));
+        let raw = RawPlanetary { size_m: None, size_px, cell_m, basic_spacing_m, origin_m, ..raw };
+        Ok(Self { raw, size, spacing_m, window, tile_objects })
     }
 }
 
@@ -103,22 +109,36 @@ impl Planetary {
     }
 }
 
-/// Basic spacing, and how many times it is doubled to the distance of the samples.
-///
-/// # Errors
-/// A distance that is no basic spacing times a power of 2.
-pub fn lattice(basic_spacing_m: Option<f64>, cell_m: f64) -> Result<(f64, u32), ParameterError> {
-    let Some(asked_m) = basic_spacing_m else {
-        let zoom = (0..62).find(|k| cell_m / spacing(*k) <= SPACING_MAX_M).unwrap_or(0);
-        return Ok((cell_m / spacing(zoom), zoom));
-    };
-    ParameterError::positive("basic_spacing_m", asked_m)?;
-    let ratio = cell_m / asked_m;
-    match (0..40).find(|k| (ratio / spacing(*k) - 1.0).abs() < WHOLE_TOLERANCE) {
-        Some(zoom) => Ok((asked_m, zoom)),
-        None => {
-            let message = format!("is {cell_m} m, {ratio} times the basic spacing; it must be 1, 2, 4, 8 ... times");
-            Err(ParameterError::new("cell_m", message))
+/// Lattice points, and those of them that are samples.
+pub struct Lattice {
+    /// Basic spacing, m.
+    pub spacing_m: f64,
+    /// How many times it is doubled to the distance of the samples.
+    pub zoom: u32,
+    /// Distance of the samples, m: exactly that.
+    pub cell_m: f64,
+}
+
+impl Lattice {
+    /// The lattice of a basic spacing, or the one chosen for the distance of the samples.
+    ///
+    /// # Errors
+    /// A distance that is no basic spacing times a power of 2.
+    pub fn check(basic_spacing_m: Option<f64>, cell_m: f64) -> Result<Self, ParameterError> {
+        ParameterError::positive("cell_m", cell_m)?;
+        let Some(spacing_m) = basic_spacing_m else {
+            let zoom = (0..ZOOM_MAX).find(|k| cell_m / spacing(*k) <= SPACING_MAX_M).unwrap_or(ZOOM_MAX);
+            return Ok(Self { spacing_m: cell_m / spacing(zoom), zoom, cell_m });
+        };
+        ParameterError::positive("basic_spacing_m", spacing_m)?;
+        let ratio = cell_m / spacing_m;
+        match (0..40).find(|k| (ratio / spacing(*k) - 1.0).abs() < WHOLE_TOLERANCE) {
+            Some(zoom) => Ok(Self { spacing_m, zoom, cell_m: spacing_m * spacing(zoom) }),
+            None => {
+                let message =
+                    format!("is {cell_m} m, {ratio} times the basic spacing; it must be 1, 2, 4, 8 ... times");
+                Err(ParameterError::new("cell_m", message))
+            }
         }
     }
 }
@@ -129,7 +149,8 @@ fn column(at_m: f64, cell_m: f64) -> Result<i64, ParameterError> {
     if !quotient.is_finite() || quotient.abs() > LATTICE_MAX {
         return Err(ParameterError::new("origin_m", format!("holds {at_m} m; the world ends at 2^52 basic spacings")));
     }
-    if (quotient - quotient.round()).abs() > WHOLE_TOLERANCE * quotient.abs().max(1.0) {
+    // The quotient is as inexact as its own last digits.
+    if (quotient - quotient.round()).abs() > WHOLE_TOLERANCE + 4.0 * f64::EPSILON * quotient.abs() {
         let nearest_m = quotient.round() * cell_m;
         let message = format!("holds {at_m} m, no whole number of cells of {cell_m} m; the nearest is {nearest_m} m");
         return Err(ParameterError::new("origin_m", message));
@@ -137,11 +158,12 @@ fn column(at_m: f64, cell_m: f64) -> Result<i64, ParameterError> {
     Ok(quotient.round() as i64)
 }
 
-/// Whether a window lies in the world of some processes and does not take too much work.
+/// Whether a window lies in the world of some processes and does not take too much work. Returns how many craters and rocks one of
+/// its tiles is expected to hold in memory.
 ///
 /// # Errors
 /// A window beyond the end of the world, or more craters and rocks than it can be asked to look at.
-pub fn window_in_reach(processes: &[RawProcess], spacing_m: f64, window: &Window) -> Result<(), ParameterError> {
+pub fn window_in_reach(processes: &[RawProcess], spacing_m: f64, window: &Window) -> Result<f64, ParameterError> {
     let ends = [(window.west, window.cols), (window.south, window.rows)];
     let far = |(first, count): (i64, usize)| (first.unsigned_abs() as f64 + count as f64) * spacing(window.zoom);
     if ends.into_iter().any(|end| far(end) > LATTICE_MAX) {
@@ -149,9 +171,10 @@ pub fn window_in_reach(processes: &[RawProcess], spacing_m: f64, window: &Window
     }
     // How many there are does not depend on the seed.
     let world = assemble::world(processes, spacing_m, 0, &Streams::for_seed(0, "terrain"));
-    let objects = world.expected_objects(window);
+    let tile = widest_tile(window);
+    let objects = world.expected_work(&tile) * tiles(window) as f64;
     if objects <= OBJECTS_MAX {
-        return Ok(());
+        return Ok(world.expected_objects(&tile));
     }
     let message = format!(
         "stand for {objects:.1e} craters and rocks that the surface would have to look at; the most is {OBJECTS_MAX:.1e}: \

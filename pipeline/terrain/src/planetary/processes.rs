@@ -2,15 +2,23 @@
 
 use super::craters::population::{PowerLawParameters, SecondaryParameters, Style};
 use super::rocks::{COVERAGE_MAX, RockParameters};
-use sastrugi_numeric::counter::POISSON_MEAN_MAX;
 use sastrugi_schemas::ParameterError;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Smallest crater, basic spacings: its retained points need a spacing of a quarter of it.
 const CRATER_SPACINGS_MIN: f64 = 4.0;
-/// Largest crater or rock, basic spacings: far above what fits a planet.
-const DIAMETER_SPACINGS_MAX: f64 = (1u64 << 40) as f64;
+/// Largest crater, basic spacings: far above what fits a planet.
+const CRATER_SPACINGS_MAX: f64 = (1u64 << 40) as f64;
+/// Largest rock, m: the craters as far around a patch as rocks reach must be known.
+const ROCK_MAX_M: f64 = 50.0;
+/// Most craters of diameters D to 2 D in a diamond, which is ground of 32 D^2, in the mean. For A = 2 they are 24 times the density, so
+/// that this is 20 times saturation. Time goes with its square.
+const CRATERS_PER_DIAMOND_MAX: f64 = 40.0;
+/// Least and largest exponent of a power law: beyond, powers of diameters leave double precision.
+const EXPONENTS: [f64; 2] = [0.1, 20.0];
+/// Least ratio of the smallest to the largest secondary, for the same reason.
+const SMALLEST_SHARE_MIN: f64 = 1e-3;
 
 /// A smooth slope.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -57,7 +65,7 @@ pub struct RawPrimaryCraters {
     /// Craters wider than 1 m per square metre, if the law held there (0.079 is saturation: Trask, 1966; 0.008, a tenth of it, is our
     /// choice).
     pub density: f64,
-    /// Exponent A of N(>D) = density D^-A (the paper: about 2).
+    /// Exponent A of N(>D) = density D^-A, 0.1 to 20 (the paper: about 2).
     pub exponent: f64,
     /// Smallest diameter, m; at least 4 basic spacings.
     pub diameter_min_m: f64,
@@ -96,7 +104,7 @@ pub struct RawSecondaryCraters {
     pub diameter_min_m: f64,
     /// Largest diameter of those, m.
     pub diameter_max_m: f64,
-    /// Exponent A of N(>D) = density D^-A, and around primaries (the paper: 3.5).
+    /// Exponent A of N(>D) = density D^-A, and around primaries, 0.1 to 20 (the paper: 3.5).
     pub exponent: f64,
     /// Secondaries around each wide crater of the nearest `primary_craters` above; 0 for none (our choice: one of the largest size by
     /// the power law).
@@ -105,7 +113,7 @@ pub struct RawSecondaryCraters {
     pub primary_min_m: f64,
     /// Largest secondary over its primary (our choice).
     pub largest_ratio: f64,
-    /// Smallest over largest secondary of a primary (our choice).
+    /// Smallest over largest secondary of a primary, above 0.001 and below 1 (our choice).
     pub smallest_share: f64,
     /// Nearest and farthest secondary, radii of the primary; their density falls with the square of the distance (our choice).
     pub ring_radii: [f64; 2],
@@ -154,15 +162,15 @@ pub struct RawRocks {
     pub coverage: f64,
     /// Smallest diameter, m; at least a basic spacing (our choice).
     pub diameter_min_m: f64,
-    /// Largest diameter, m (our choice).
+    /// Largest diameter, m; at most 50 (our choice).
     pub diameter_max_m: f64,
     /// How many rocks make a coverage.
     pub law: RockLaw,
-    /// Height over diameter where rocks cover 0.069 (Golombek and Rapp, 1997).
+    /// Height over diameter where rocks cover 0.069 (our choice, after Golombek and Rapp, 1997).
     pub height_ratio: f64,
-    /// Growth of that ratio with the coverage (0.506 at 0.176).
+    /// Growth of that ratio with the coverage (0.506 at 0.176; our choice: rockier ground has taller rocks).
     pub height_gain: f64,
-    /// Added to every height, m.
+    /// Added to every height, m (our choice).
     pub height_offset_m: f64,
     /// Share of the ground covered by what a wide crater strews, at its rim (our choice).
     pub crater_peak: f64,
@@ -213,7 +221,7 @@ impl Default for RawAlbedo {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RawDust {
-    /// Thickness, m: rocks stand that much less high, and lower ones vanish (our choice).
+    /// Thickness, m: rocks stand out that much less, cover as much less ground, and lower ones vanish (our choice).
     pub thickness_m: f64,
     /// Albedo of the dust (our choice).
     pub albedo: f64,
@@ -319,20 +327,21 @@ fn within(key: &str, value: f64, low: f64, high: f64) -> Result<(), ParameterErr
     }
 }
 
-/// Two diameters in order, from `least_m` to what a lattice with points `spacing_m` apart holds.
-fn diameters([low, high]: [f64; 2], least_m: f64, spacing_m: f64) -> Result<(), ParameterError> {
+/// Two diameters of craters in order, as a lattice with points `spacing_m` apart carries them.
+fn crater_diameters(both: [f64; 2], spacing_m: f64) -> Result<(), ParameterError> {
+    diameters(both, [CRATER_SPACINGS_MIN * spacing_m, CRATER_SPACINGS_MAX * spacing_m])
+}
+
+/// Two diameters in order, from `least_m` to `most_m`.
+fn diameters([low, high]: [f64; 2], [least_m, most_m]: [f64; 2]) -> Result<(), ParameterError> {
     ParameterError::positive("diameter_min_m", low)?;
     ParameterError::positive("diameter_max_m", high)?;
     if low < least_m {
         let message = format!("is {low} m; the lattice carries none below {least_m} m");
         return Err(ParameterError::new("diameter_min_m", message));
     }
-    let most_m = DIAMETER_SPACINGS_MAX * spacing_m;
     if high > most_m {
-        return Err(ParameterError::new(
-            "diameter_max_m",
-            format!("is {high} m; the lattice carries none above {most_m} m"),
-        ));
+        return Err(ParameterError::new("diameter_max_m", format!("is {high} m; it must be at most {most_m} m")));
     }
     if high < low {
         let message = format!("is {high} m; it must not be below `diameter_min_m`, {low} m");
@@ -341,14 +350,22 @@ fn diameters([low, high]: [f64; 2], least_m: f64, spacing_m: f64) -> Result<(), 
     Ok(())
 }
 
-/// A density whose counts can be drawn.
-fn drawable(key: &str, mean: f64) -> Result<(), ParameterError> {
-    if mean <= POISSON_MEAN_MAX {
-        Ok(())
-    } else {
-        let message = format!("gives {mean:.3e} of one size in one place; at most {POISSON_MEAN_MAX} can be drawn");
-        Err(ParameterError::new(key, message))
+/// Power law of craters: sizes that the lattice carries, no more of one size in one place than time allows for.
+fn check_power_law(law: &PowerLawParameters, spacing_m: f64) -> Result<(), ParameterError> {
+    ParameterError::not_negative("density", law.density)?;
+    within("exponent", law.exponent, EXPONENTS[0], EXPONENTS[1])?;
+    crater_diameters(law.diameters_m, spacing_m)?;
+    ParameterError::between("depth_ratio", law.style.depth_ratio, 0.0, 1.0)?;
+    ParameterError::not_negative("floor_roughness", law.style.floor_roughness)?;
+    let mean = law.mean_max(spacing_m);
+    if mean <= CRATERS_PER_DIAMOND_MAX {
+        return Ok(());
     }
+    let message = format!(
+        "gives {mean:.3e} craters of diameters D to 2 D on every 32 D^2 of ground; the most is {CRATERS_PER_DIAMOND_MAX}, 20 times \
+         saturation"
+    );
+    Err(ParameterError::new("density", message))
 }
 
 impl RawBaseSlope {
@@ -389,22 +406,12 @@ impl RawPrimaryCraters {
     }
 
     fn check(&self, spacing_m: f64) -> Result<(), ParameterError> {
-        ParameterError::not_negative("density", self.density)?;
-        ParameterError::positive("exponent", self.exponent)?;
-        diameters([self.diameter_min_m, self.diameter_max_m], CRATER_SPACINGS_MIN * spacing_m, spacing_m)?;
-        check_style(self.depth_ratio, self.floor_roughness)?;
-        drawable("density", self.power_law().mean_max(spacing_m))
+        check_power_law(&self.power_law(), spacing_m)
     }
 }
 
 fn style(depth_ratio: f64, datum: Datum, floor_roughness: f64) -> Style {
     Style { depth_ratio, below_datum: datum == Datum::Surface, floor_roughness }
-}
-
-fn check_style(depth_ratio: f64, floor_roughness: f64) -> Result<(), ParameterError> {
-    ParameterError::between("depth_ratio", depth_ratio, 0.0, 1.0)?;
-    ParameterError::not_negative("floor_roughness", floor_roughness)?;
-    Ok(())
 }
 
 impl RawSecondaryCraters {
@@ -433,14 +440,10 @@ impl RawSecondaryCraters {
 
     fn check(&self, spacing_m: f64) -> Result<(), ParameterError> {
         let least_m = CRATER_SPACINGS_MIN * spacing_m;
-        ParameterError::not_negative("density", self.density)?;
-        ParameterError::positive("exponent", self.exponent)?;
-        diameters([self.diameter_min_m, self.diameter_max_m], least_m, spacing_m)?;
-        check_style(self.depth_ratio, self.floor_roughness)?;
-        drawable("density", self.background().mean_max(spacing_m))?;
+        check_power_law(&self.background(), spacing_m)?;
         ParameterError::positive("primary_min_m", self.primary_min_m)?;
         ParameterError::between("largest_ratio", self.largest_ratio, 0.0, 1.0)?;
-        ParameterError::between("smallest_share", self.smallest_share, 0.0, 1.0)?;
+        ParameterError::between("smallest_share", self.smallest_share, SMALLEST_SHARE_MIN, 1.0)?;
         within("per_primary", f64::from(self.per_primary), 0.0, 1e5)?;
         let [near, far] = self.ring_radii;
         if !(near >= 1.0 && far > near && far <= 100.0) {
@@ -478,14 +481,14 @@ impl RawRocks {
 
     fn check(&self, spacing_m: f64) -> Result<(), ParameterError> {
         within("coverage", self.coverage, 0.0, COVERAGE_MAX)?;
-        diameters([self.diameter_min_m, self.diameter_max_m], spacing_m, spacing_m)?;
+        diameters([self.diameter_min_m, self.diameter_max_m], [spacing_m, ROCK_MAX_M])?;
         ParameterError::not_negative("height_ratio", self.height_ratio)?;
         finite("height_gain", &[self.height_gain])?;
         finite("height_offset_m", &[self.height_offset_m])?;
         within("crater_peak", self.crater_peak, 0.0, COVERAGE_MAX)?;
         ParameterError::positive("crater_decay_radii", self.crater_decay_radii)?;
         ParameterError::not_negative("crater_min_m", self.crater_min_m)?;
-        drawable("diameter_max_m", self.parameters(0.0).mean_max(spacing_m))
+        Ok(())
     }
 }
 

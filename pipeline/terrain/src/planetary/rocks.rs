@@ -6,11 +6,12 @@
 //! means that of two rocks the higher top is seen.
 //!
 //! A rock is an ellipse of area `pi D^2 / 4` with a random azimuth and the profile of half an ellipsoid, of height
-//! `(0.365 + 1.318 (f - 0.069)) D + 0.008 m`: the more rocks, the less they are buried. It stands at the height of the ground at the
-//! lattice point nearest to its centre, on the coarsest grid of a spacing of half a diameter or less, and has a texture of its own.
+//! `(0.365 + 1.318 (f - 0.069)) D + 0.008 m` (our choice, after Golombek and Rapp, 1997): the more rocks, the taller. It stands at the
+//! height of the ground at the lattice point nearest to its centre, on the coarsest grid of a spacing of half a diameter or less, and
+//! has a texture of its own. Dust buries it from below: the rock ends where its smooth half ellipsoid goes under.
 //!
-//! Placement: candidates strike the diamonds of `levels` by a density that is never below the wanted one, and stay with the
-//! ratio of the two at their place.
+//! Placement: candidates strike the diamonds of `levels` by the density of a coverage of 0.6, which is never below the wanted one, and
+//! stay with the ratio of the two at their place. So rocks stay where they are when craters are added to a world.
 
 pub mod law;
 
@@ -97,7 +98,7 @@ pub struct Rock {
     pub diameter_m: f64,
     /// Centre, lattice units.
     pub centre: [f64; 2],
-    /// Height of the top above its base, m.
+    /// Height of the top above its base, without dust, m.
     pub height_m: f64,
     /// Half axes, lattice units, the longer first.
     axes: [f64; 2],
@@ -114,9 +115,8 @@ impl RockParameters {
         Law { coverage, exact_union: self.exact_union }
     }
 
-    /// `largest` is the largest coverage anywhere.
-    fn bins(&self, spacing_m: f64, largest: f64) -> Vec<Bin> {
-        let law = self.law(largest);
+    fn bins(&self, spacing_m: f64) -> Vec<Bin> {
+        let law = self.law(COVERAGE_MAX);
         let bin = |range: SizeRange| {
             let [from, to] = range.diameters_m;
             // n D^2 falls with D.
@@ -126,11 +126,6 @@ impl RockParameters {
             Bin { zoom: range.zoom, inverse, bound, mean, per_diamond: Poisson::new(mean) }
         };
         size_ranges(self.diameters_m, spacing_m).map(bin).collect()
-    }
-
-    /// The largest mean number of rocks in a diamond, whatever craters strew.
-    pub fn mean_max(&self, spacing_m: f64) -> f64 {
-        self.bins(spacing_m, COVERAGE_MAX).iter().fold(0.0, |most, bin| f64::max(most, bin.mean))
     }
 
     /// The coverage after a crater at `rho` radii from its centre.
@@ -146,10 +141,9 @@ impl RockParameters {
 }
 
 impl Rocks {
-    /// Rocks on a lattice; `strewn` where craters may add to the coverage.
-    pub fn new(parameters: RockParameters, spacing_m: f64, counter: Counter, strewn: bool) -> Self {
-        let largest = if strewn { COVERAGE_MAX } else { parameters.coverage };
-        let bins = if largest > 0.0 { parameters.bins(spacing_m, largest) } else { Vec::new() };
+    /// Rocks on a lattice.
+    pub fn new(parameters: RockParameters, spacing_m: f64, counter: Counter) -> Self {
+        let bins = parameters.bins(spacing_m);
         let coarsest = bins.last().map_or(0, |bin| bin.zoom);
         Self { parameters, counter, spacing_m, bins, amplitudes: Amplitudes::new(ROUGHNESS_HURST, spacing_m, coarsest) }
     }
@@ -212,9 +206,9 @@ impl Rocks {
         if own.at(STAYS).uniform() * bin.bound >= wanted * diameter_m * diameter_m {
             return None;
         }
-        let height_m = self.height_m(diameter_m, here) - self.parameters.buried_m;
+        let height_m = self.height_m(diameter_m, here);
         let (sin, cos) = libm::sincos(PI * own.at(AZIMUTH).uniform());
-        (height_m > 0.0).then(|| Rock {
+        (height_m > self.parameters.buried_m).then(|| Rock {
             diameter_m,
             centre,
             height_m,
@@ -231,8 +225,8 @@ impl Rocks {
         (p.height_ratio + p.height_gain * (coverage - 0.069)) * diameter_m + p.height_offset_m
     }
 
-    /// Calls `f(k, height)` for every point of the window under the rock: its place in the row-major values and the rock's
-    /// height above its base there, m.
+    /// Calls `f(k, height)` for every point of the window under the part of the rock that is not buried: its place in the row-major
+    /// values and the rock's height above its base there, less what is buried, m.
     pub fn cover(&self, rock: &Rock, window: &Window, mut f: impl FnMut(usize, f64)) {
         let Some(part) = window.part(rock.centre, rock.axes[0]) else { return };
         let anchor = floor_log2(0.5 * rock.diameter_m / self.spacing_m);
@@ -245,8 +239,12 @@ impl Rocks {
                 let dx = window.x(col) - rock.centre[0];
                 let (along, across) = ((dx * cos + dy * sin) / rock.axes[0], (dy * cos - dx * sin) / rock.axes[1]);
                 let inside = 1.0 - (along * along + across * across);
-                if inside >= 0.0 {
-                    f(row * window.cols + col, rock.height_m * inside.sqrt() + texture);
+                if inside < 0.0 {
+                    continue;
+                }
+                let smooth_m = rock.height_m * inside.sqrt() - self.parameters.buried_m;
+                if smooth_m >= 0.0 {
+                    f(row * window.cols + col, smooth_m + texture);
                 }
             }
         }
@@ -259,9 +257,9 @@ impl Rocks {
         (zoom, i, j)
     }
 
-    /// Expected number of rocks drawn for a window.
-    pub fn expected(&self, window: &Window) -> f64 {
-        self.bins.iter().map(|bin| (1.0 + bin.mean) * window.diamonds(bin.zoom, self.bin_reach(bin))).sum()
+    /// Expected number of rocks drawn for a window; `diamond` is what looking at a diamond counts for besides.
+    pub fn expected(&self, window: &Window, diamond: f64) -> f64 {
+        self.bins.iter().map(|bin| (diamond + bin.mean) * window.diamonds(bin.zoom, self.bin_reach(bin))).sum()
     }
 }
 

@@ -29,6 +29,20 @@ fn heights(patch: &Patch, cell_m: f64) -> Grid {
     to_grid(Geometry::square(patch.window.rows, patch.window.cols, cell_m), &patch.heights)
 }
 
+/// Secondaries of both kinds in one process, as wide as the primaries, so that their bins are the same.
+fn families() -> Value {
+    json!([
+        {"kind": "texture"},
+        {"kind": "rocks"},
+        {"kind": "primary_craters", "density": 0.08, "diameter_min_m": 0.5, "diameter_max_m": 60.0},
+        {
+            "kind": "secondary_craters", "density": 0.1, "exponent": 2.0, "diameter_min_m": 0.5, "diameter_max_m": 60.0,
+            "per_primary": 200, "primary_min_m": 20.0
+        },
+        {"kind": "albedo"}
+    ])
+}
+
 /// Every process, dense enough that a small patch holds all of them.
 fn everything() -> Value {
     json!([

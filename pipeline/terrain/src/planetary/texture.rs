@@ -6,7 +6,8 @@
 //! in (0, 1]. Averages are linear, so that the field added to a sloping base is the stochastic interpolation of that base.
 //!
 //! Source: the amplitude is "a function of the spacing of the parents and of a random variable"; its form is left free. A power
-//! law gives spectra of profiles that fall with `-(2 H + 1)`.
+//! law gives spectra of profiles that fall with `-(2 H + 1)`. The paper also lets roughness vary from place to place; here `s_1` and `H`
+//! are those of a whole world.
 //!
 //! Cost: a normal number a point, and about twenty a level for a patch of any size.
 

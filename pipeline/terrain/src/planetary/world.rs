@@ -89,18 +89,20 @@ struct Survey<'w> {
 impl World {
     /// The samples of a window: a pure function of the world, bit by bit the same whatever else is looked at.
     pub fn patch(&self, window: &Window) -> Patch {
-        let survey = Survey { world: self, planes: RefCell::default(), families: RefCell::default() };
-        let margin = self.rocks.as_ref().map_or(0.0, |(rocks, _)| rocks.reach());
-        let craters = survey.index(&Near { window, margin });
-        let heights = survey.ground(window, &craters);
         let count = window.len();
         let mut patch = Patch {
             window: *window,
-            heights,
+            heights: vec![0.0; count],
             albedo: vec![0.0; count],
             class: vec![SAND; count],
             rock_potential: vec![0.0; count],
         };
+        if window.is_empty() {
+            return patch;
+        }
+        let survey = Survey { world: self, planes: RefCell::default(), families: RefCell::default() };
+        let craters = survey.index(&self.near(window));
+        patch.heights = survey.ground(window, &craters);
         if let Some(albedo) = &self.albedo {
             patch.albedo = albedo.of_sand(window);
         }
@@ -110,14 +112,29 @@ impl World {
         patch
     }
 
-    /// Expected number of craters and rocks that a patch goes through; time goes with it and with the number of points.
+    /// A window, with what must be known around it to set rocks on its ground.
+    fn near<'a>(&self, window: &'a Window) -> Near<'a> {
+        Near { window, margin: self.rocks.as_ref().map_or(0.0, |(rocks, _)| rocks.reach()) }
+    }
+
+    /// Expected number of craters and rocks that a patch draws: at least those that it holds in memory.
     pub fn expected_objects(&self, window: &Window) -> f64 {
-        let near = Near { window, margin: 0.0 };
+        self.expected(window, 0.0)
+    }
+
+    /// Expected number of craters and rocks that a patch draws, and of the places where it looks for them; time goes with it and
+    /// with the number of points.
+    pub fn expected_work(&self, window: &Window) -> f64 {
+        self.expected(window, 1.0)
+    }
+
+    fn expected(&self, window: &Window, diamond: f64) -> f64 {
+        let near = self.near(window);
         let of_step = |step: &Step| match step {
-            Step::Bombardment(b) => b.populations.iter().map(|p| p.expected(&near)).sum(),
+            Step::Bombardment(b) => b.populations.iter().map(|p| p.expected(&near, diamond)).sum(),
             _ => 0.0,
         };
-        let rocks = self.rocks.as_ref().map_or(0.0, |(rocks, _)| rocks.expected(window));
+        let rocks = self.rocks.as_ref().map_or(0.0, |(rocks, _)| rocks.expected(window, diamond));
         self.steps.iter().map(of_step).sum::<f64>() + rocks
     }
 }

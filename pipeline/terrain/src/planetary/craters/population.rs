@@ -16,7 +16,7 @@ const ACROSS: i64 = 2;
 const TIME: i64 = 3;
 const TEXTURE: i64 = 4;
 
-/// What tells craters of one time apart: process, bin, diamond, number, and number among the secondaries of a primary.
+/// Which crater of all: process, bin, diamond, number, and, from 1 on, number among the secondaries of that primary; else 0.
 pub type Place = (usize, u32, i64, i64, i64, i64);
 
 /// One crater.
@@ -85,8 +85,9 @@ pub trait Population: Send + Sync {
     /// Adds every crater wider than `diameter_min_m` whose ejecta may reach a point that is looked at.
     fn find(&self, near: &Near<'_>, diameter_min_m: f64, families: &Families, found: &mut Vec<Crater>);
 
-    /// Adds to the expected number of craters that [`Self::find`] draws.
-    fn expected(&self, near: &Near<'_>) -> f64;
+    /// Expected number of craters that [`Self::find`] draws, among them those that it finds not to reach; `diamond` is what looking
+    /// at a diamond counts for besides.
+    fn expected(&self, near: &Near<'_>, diamond: f64) -> f64;
 }
 
 /// Craters of one range of diameters, a factor of 2 or less.
@@ -142,9 +143,10 @@ impl PowerLawParameters {
         size_ranges(self.diameters_m, spacing_m).map(bin).collect()
     }
 
-    /// The largest mean number of craters in a diamond.
+    /// The largest mean number of craters in a diamond; infinite where one is no number.
     pub fn mean_max(&self, spacing_m: f64) -> f64 {
-        self.bins(spacing_m).iter().fold(0.0, |most, bin| f64::max(most, bin.mean))
+        let mean = |bin: &Bin| if bin.mean.is_nan() { f64::INFINITY } else { bin.mean };
+        self.bins(spacing_m).iter().map(mean).fold(0.0, f64::max)
     }
 }
 
@@ -191,10 +193,11 @@ impl PowerLaw {
         }
     }
 
-    /// Expected number of craters drawn to find those that reach over `radii` radii.
-    fn expected(&self, near: &Near<'_>, radii: f64, diameter_min_m: f64) -> f64 {
+    /// Expected sum over what [`Self::visit`] goes through: `diamond` for a diamond, `crater` for a crater.
+    fn weighed(&self, near: &Near<'_>, radii: f64, diameter_min_m: f64, [diamond, crater]: [f64; 2]) -> f64 {
         let wide = self.bins.iter().filter(|bin| bin.diameter_max_m > diameter_min_m);
-        wide.map(|bin| (1.0 + bin.mean) * near.window.diamonds(bin.zoom, Self::reach(bin, radii, near))).sum()
+        let of_bin = |bin: &Bin| near.window.diamonds(bin.zoom, Self::reach(bin, radii, near));
+        wide.map(|bin| (diamond + crater * bin.mean) * of_bin(bin)).sum()
     }
 }
 
@@ -203,8 +206,8 @@ impl Population for PowerLaw {
         self.visit(near, EJECTA_RADII, diameter_min_m, |crater| found.push(crater));
     }
 
-    fn expected(&self, near: &Near<'_>) -> f64 {
-        self.expected(near, EJECTA_RADII, 0.0)
+    fn expected(&self, near: &Near<'_>, diamond: f64) -> f64 {
+        self.weighed(near, EJECTA_RADII, 0.0, [diamond, 1.0])
     }
 }
 
@@ -248,11 +251,14 @@ impl SecondaryParameters {
 }
 
 impl Secondaries {
-    /// All secondaries of a primary.
+    /// All secondaries of a primary, the widest first.
     fn family(&self, primary: &Crater) -> Rc<[Crater]> {
         let (_, bin, j, i, n, _) = primary.place;
         let root = self.counter.at(i64::from(bin)).at(j).at(i).at(n);
-        (0..i64::from(self.parameters.count)).map(|m| self.secondary(primary, m, root.at(m))).collect()
+        let members = 0..i64::from(self.parameters.count);
+        let mut family: Vec<Crater> = members.map(|m| self.secondary(primary, m, root.at(m))).collect();
+        family.sort_unstable_by(|a, b| b.diameter_m.total_cmp(&a.diameter_m).then_with(|| a.place.cmp(&b.place)));
+        family.into()
     }
 
     fn secondary(&self, primary: &Crater, m: i64, own: Counter) -> Crater {
@@ -268,7 +274,7 @@ impl Secondaries {
         let (_, bin, j, i, n, _) = primary.place;
         Crater {
             time: primary.time,
-            place: (self.process, bin, j, i, n, m),
+            place: (self.process, bin, j, i, n, 1 + m),
             centre: [primary.centre[0] + distance * cos, primary.centre[1] + distance * sin],
             radius: 0.5 * diameter_m / self.primaries.spacing_m,
             diameter_m,
@@ -286,14 +292,13 @@ impl Population for Secondaries {
             let (_, bin, j, i, n, _) = primary.place;
             let key = (self.process, bin, j, i, n, 0);
             let family = families.borrow_mut().entry(key).or_insert_with(|| self.family(&primary)).clone();
-            let reaching =
-                |c: &&Crater| c.diameter_m > diameter_min_m && near.touches(c.centre, EJECTA_RADII * c.radius);
-            found.extend(family.iter().filter(reaching));
+            let wide = family.iter().take_while(|c| c.diameter_m > diameter_min_m);
+            found.extend(wide.filter(|c| near.touches(c.centre, EJECTA_RADII * c.radius)));
         });
     }
 
-    fn expected(&self, near: &Near<'_>) -> f64 {
+    fn expected(&self, near: &Near<'_>, diamond: f64) -> f64 {
         let p = &self.parameters;
-        self.primaries.expected(near, p.reach_radii(), p.primary_min_m) * f64::from(p.count)
+        self.primaries.weighed(near, p.reach_radii(), p.primary_min_m, [diamond, 1.0 + f64::from(p.count)])
     }
 }

@@ -10,6 +10,8 @@
 //! * Rim: what is dug out lies in the ejecta, `h = d m / ((m + 2)(1 + 2 K))`, `K = int_1^5 w rho^-2 d rho`. For simple craters
 //!   h = 0.0401 diameters; fresh lunar craters have about 0.036 (Pike, 1977).
 
+/// `K = int_1^5 w rho^-2 d rho`: `2/3` up to the fringe, `-17/3 + 45/4 ln(5/3)` in it.
+const EJECTA_INTEGRAL: f64 = 0.746_788_267_367_395_2;
 /// Reach of the ejecta, radii.
 pub const EJECTA_RADII: f64 = 5.0;
 /// Where the fringe of the ejecta begins, radii.
@@ -42,7 +44,7 @@ impl Profile {
             simple_m / libm::pow(1.0 + over * over * over * over, 0.25)
         };
         let exponent = 2.0 * simple_m / capped_m;
-        let rim_share = exponent / ((exponent + 2.0) * (1.0 + 2.0 * ejecta_integral()));
+        let rim_share = exponent / ((exponent + 2.0) * (1.0 + 2.0 * EJECTA_INTEGRAL));
         let depth_m = if below_datum { capped_m / (1.0 - rim_share) } else { capped_m };
         Self { depth_m, rim_m: depth_m * rim_share, exponent }
     }
@@ -56,11 +58,6 @@ impl Profile {
             self.rim_m * fringe(rho) / (rho * rho * rho)
         }
     }
-}
-
-/// `int_1^5 w rho^-2 d rho`: `2/3` up to the fringe, `-17/3 + 45/4 ln(5/3)` in it.
-fn ejecta_integral() -> f64 {
-    11.25 * libm::log(5.0 / 3.0) - 5.0
 }
 
 /// 1 up to where the fringe begins, 0 from where it ends.
@@ -111,6 +108,6 @@ mod tests {
             assert!((profile.height_m(1.0) - profile.rim_m).abs() < 1e-9 * profile.rim_m);
         }
         assert_eq!(small.height_m(EJECTA_RADII), 0.0);
-        assert!((ejecta_integral() - 0.746_788_267).abs() < 1e-9);
+        assert!((EJECTA_INTEGRAL - (11.25 * libm::log(5.0 / 3.0) - 5.0)).abs() < 1e-14);
     }
 }

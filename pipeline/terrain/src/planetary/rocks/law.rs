@@ -16,6 +16,7 @@ use std::f64::consts::PI;
 const Q_BASE_PER_M: f64 = 1.79;
 const Q_COVERAGE_PER_M: f64 = 0.152;
 /// Euler's constant.
+#[cfg(test)]
 const EULER: f64 = 0.577_215_664_901_532_9;
 
 /// Rocks at a place with a given coverage.
@@ -50,6 +51,7 @@ impl Law {
     }
 
     /// `N(>D)` as published, rocks per square metre.
+    #[cfg(test)]
     pub fn published_count_above(&self, diameter_m: f64) -> f64 {
         let q = self.decay_per_m();
         let x = q * diameter_m;
@@ -59,10 +61,12 @@ impl Law {
 
 /// `E1(x) = int_x^inf e^-t / t dt`, x > 0: power series up to 1, continued fraction above (Abramowitz and Stegun, 5.1.11 and
 /// 5.1.22); relative error about 1e-15.
-pub fn exponential_integral(x: f64) -> f64 {
+#[cfg(test)]
+fn exponential_integral(x: f64) -> f64 {
     if x <= 1.0 { by_series(x) } else { by_continued_fraction(x) }
 }
 
+#[cfg(test)]
 fn by_series(x: f64) -> f64 {
     let (mut power, mut sum) = (1.0, 0.0);
     for k in 1..=20 {
@@ -74,6 +78,7 @@ fn by_series(x: f64) -> f64 {
 }
 
 /// `e^-x / (x + 1 - 1 / (x + 3 - 4 / (x + 5 - ...)))`, from the far end back.
+#[cfg(test)]
 fn by_continued_fraction(x: f64) -> f64 {
     let tail = (1..=100).rev().fold(0.0, |tail, k| {
         let k = f64::from(k);

@@ -25,9 +25,13 @@ fn val_bad_lattices_are_refused() {
         ("size_px", json!({"size_px": [2, 2]})),
         ("anchor_level", json!({"anchor_level": 41})),
         ("origin_m", json!({"origin_m": [0.013, 0.0]})),
+        ("origin_m", json!({"origin_m": [10000.01, 0.0]})),
         ("origin_m", json!({"origin_m": [1e15, 0.0]})),
         ("origin_m", json!({"origin_m": [0.0, 4.6e13], "cell_m": 0.01})),
         ("origin_m", json!({"origin_m": [1e18, 0.0], "cell_m": 1e15})),
+        ("origin_m", json!({"origin_m": [81.92 * (1u64 << 51) as f64, 0.0], "cell_m": 81.92, "basic_spacing_m": 0.01})),
+        ("origin_m", json!({"cell_m": 0.0125 * (1u64 << 55) as f64})),
+        ("origin_m", json!({"cell_m": 1e300, "processes": []})),
     ] {
         assert_eq!(refused(bad.clone()), key, "{bad}");
     }
@@ -42,6 +46,11 @@ fn val_bad_processes_are_refused() {
         ("exponent", json!({"kind": "primary_craters", "exponent": 0.0})),
         ("density", json!({"kind": "primary_craters", "density": -1.0})),
         ("density", json!({"kind": "primary_craters", "density": 1e3})),
+        ("density", json!({"kind": "primary_craters", "density": 1.7})),
+        ("density", json!({"kind": "secondary_craters", "density": 5.0})),
+        ("exponent", json!({"kind": "primary_craters", "exponent": 1e3})),
+        ("exponent", json!({"kind": "primary_craters", "exponent": 0.01})),
+        ("smallest_share", json!({"kind": "secondary_craters", "smallest_share": 1e-9})),
         ("diameter_min_m", json!({"kind": "primary_craters", "diameter_min_m": 0.0})),
         ("diameter_min_m", json!({"kind": "primary_craters", "diameter_min_m": 0.03})),
         ("diameter_max_m", json!({"kind": "primary_craters", "diameter_max_m": 0.4})),
@@ -53,6 +62,7 @@ fn val_bad_processes_are_refused() {
         ("coverage", json!({"kind": "rocks", "coverage": 0.61})),
         ("coverage", json!({"kind": "rocks", "coverage": -0.1})),
         ("diameter_min_m", json!({"kind": "rocks", "diameter_min_m": 0.001})),
+        ("diameter_max_m", json!({"kind": "rocks", "diameter_max_m": 1e5})),
         ("sand", json!({"kind": "albedo", "sand": 1.5})),
         ("cover", json!({"kind": "dust", "cover": -0.5})),
     ] {
@@ -75,6 +85,37 @@ fn val_endless_work_is_refused() {
         "processes": [{"kind": "primary_craters", "density": 0.5, "diameter_min_m": 0.05}, {"kind": "rocks"}]
     });
     assert_eq!(refused(crowded), "processes");
+    // Every tile looks at the ten thousands of secondaries around each wide crater anew.
+    let families = |side: u32| {
+        json!({
+            "cell_m": 0.02, "size_px": [side, side],
+            "processes": [{"kind": "primary_craters", "density": 0.16}, {"kind": "secondary_craters", "per_primary": 100_000}]
+        })
+    };
+    assert!(crate::prepare(KIND, &families(256)).is_ok());
+    assert_eq!(refused(families(16_000)), "processes");
+}
+
+/// Means that are no numbers.
+#[test]
+fn val_densities_beyond_double_precision_are_refused() {
+    let tiny = json!({
+        "cell_m": 1e-300, "basic_spacing_m": 1e-300,
+        "processes": [{"kind": "primary_craters", "exponent": 20.0, "diameter_min_m": 1e-299, "diameter_max_m": 1e-298}]
+    });
+    assert_eq!(refused(tiny), "processes.0.density");
+}
+
+/// Craters and rocks of a tile are charged, for each of the tiles at work.
+#[test]
+fn val_memory_goes_with_the_objects() {
+    let of = |per_primary: u32| {
+        let processes = json!([{"kind": "primary_craters"}, {"kind": "secondary_craters", "per_primary": per_primary}]);
+        let params = json!({"cell_m": 0.02, "size_px": [512, 512], "processes": processes});
+        crate::prepare(KIND, &params).unwrap().memory_bytes()
+    };
+    let (none, few, many) = (of(0), of(1000), of(100_000));
+    assert!(many > 10 * few && few > none && none < 200 << 20, "{none} {few} {many}");
 }
 
 /// No rocks is a coverage of 0, not an error; an empty list is a plain.
@@ -83,4 +124,9 @@ fn val_nothing_is_possible() {
     let bare = world(json!([{"kind": "rocks", "coverage": 0.0}]), 1).patch(&window(0, 0, 0, 50, 50));
     assert!(bare.class.iter().all(|c| *c == 0) && bare.heights.iter().all(|z| *z == 0.0));
     assert!(world(json!([]), 1).patch(&window(4, 0, 0, 9, 9)).heights.iter().all(|z| *z == 0.0));
+    let full = world(everything(), 1);
+    for (cols, rows) in [(0, 0), (0, 5), (5, 0)] {
+        let none = window(3, 7, -7, cols, rows);
+        assert!(full.patch(&none).heights.is_empty() && full.tiled_patch(&none).class.is_empty());
+    }
 }

@@ -42,20 +42,21 @@ fn found(world: &World, side: usize, coverage: impl Fn([f64; 2]) -> f64) -> Vec<
     rocks
 }
 
-/// Acceptance 11: cumulative counts within 3 standard deviations (Poisson) of the mode's own law, at 0.1, 0.2 and 0.5 m, over a
-/// hectare: `literal` against the published N(>D); `exact_union` against the integral of n / (1 - F), which exceeds the
-/// published one by 12, 8 and 3 % at 17.6 %. 24 figures at 3 deviations: 6 % by chance; the seed is fixed and was the first.
+/// Acceptance 11: cumulative counts of the mode's own law, at 0.1, 0.2 and 0.5 m: `literal` against the published N(>D) up to 5 m;
+/// `exact_union` against the integral of n / (1 - F), which exceeds the published one by 12, 8 and 3 % at 17.6 %. The bound is the
+/// list's, 3 standard deviations (Poisson) of the count on a hectare, met by the mean of nine hectares: 9 of its own, 1e-18 a figure.
+/// A density wrong by 2 % at 0.1 m would be caught.
 #[test]
 fn stat_rock_counts_follow_the_law() {
     for coverage in COVERAGES {
         for (name, exact_union) in [("literal", false), ("exact_union", true)] {
-            let world = rocky(coverage, name);
-            let rocks = found(&world, 10_000, |_| coverage);
+            let spec = json!([{"kind": "rocks", "coverage": coverage, "law": name, "diameter_min_m": 0.09}]);
+            let rocks = found(&world(spec, 11), 30_000, |_| coverage);
             let law = Law { coverage, exact_union };
             for diameter in [0.1, 0.2, 0.5] {
-                let count = rocks.iter().filter(|r| r.diameter_m > diameter).count() as f64;
+                let count = rocks.iter().filter(|r| r.diameter_m > diameter).count() as f64 / 9.0;
                 let expected = 1e4 * count_above(&law, diameter);
-                eprintln!("f = {coverage}, {name}, D > {diameter}: {count} against {expected:.0}");
+                eprintln!("f = {coverage}, {name}, D > {diameter}: {count:.1} against {expected:.1} on a hectare");
                 assert!((count - expected).abs() < 3.0 * expected.sqrt());
                 if exact_union && coverage == 0.176 {
                     let excess = expected / 1e4 / law.published_count_above(diameter) - 1.0;
@@ -108,7 +109,7 @@ fn val_craters_clear_and_strew_rocks() {
             [] => assert_eq!(f, 0.1),
             [rho] if rho < 1.0 => assert_eq!(f, 0.0),
             // The old rocks are gone, the fringe has not begun: only what the crater strewed.
-            [rho] if rho < 2.5 => assert!((f / (0.3 * libm::exp(1.0 - rho)) - 1.0).abs() < 0.05),
+            [rho] if rho < 2.5 => assert!((f / (0.3 * libm::exp(1.0 - rho)) - 1.0).abs() < 1e-12),
             _ => continue,
         }
         checked[match near[..] {
@@ -157,14 +158,37 @@ fn val_heights_of_rocks() {
         assert!((rock.height_m - (0.506 * rock.diameter_m + 0.008)).abs() < 1e-4 * rock.diameter_m);
     }
     assert_eq!(all.iter().filter(|r| r.height_m > 0.05).count(), buried.len());
-    // A rough half ellipsoid: the highest sample under a rock is its top, but for 5 % of roughness and a cell.
-    let patch = clean.patch(&area);
-    let widest = all.iter().filter(|r| (0..2).all(|a| (100.0..900.0).contains(&r.centre[a]))).take(3);
-    for rock in widest {
+    // The sample nearest to the centre of a wide rock shows its height, but for a roughness of 5 % at distances of the diameter: 10 %.
+    let (patch, dusty_patch) = (clean.patch(&area), dusty.patch(&area));
+    let inside = |r: &&Rock| (0..2).all(|a| (100.0..900.0).contains(&r.centre[a]));
+    for rock in all.iter().filter(inside).take(3) {
         let [col, row] = rock.centre.map(|c| c.round() as usize);
         let z = patch.heights[row * 1000 + col];
-        assert!((z / rock.height_m - 1.0).abs() < 0.2, "{z} {}", rock.height_m);
+        assert!((z / rock.height_m - 1.0).abs() < 0.1, "{z} {}", rock.height_m);
+        // Dust takes off its thickness, and of the ellipse what the smooth half ellipsoid has below it.
+        let points = |of: &World| {
+            let mut count = 0.0;
+            rocks_of(of).cover(rock, &area, |_, _| count += 1.0);
+            count
+        };
+        let share = 1.0 - (0.05 / rock.height_m) * (0.05 / rock.height_m);
+        assert!((points(&dusty) / points(&clean) / share - 1.0).abs() < 0.01);
     }
+    for k in (0..area.len()).filter(|k| patch.heights[*k] > 0.3) {
+        assert!((dusty_patch.heights[k] - (patch.heights[k] - 0.05)).abs() < 1e-12);
+    }
+    let cover = |p: &Patch| p.class.iter().filter(|c| **c == 1).count();
+    assert!(cover(&dusty_patch) < cover(&patch));
+}
+
+/// Craters change no draw of the rocks: those beyond their reach stay.
+#[test]
+fn prop_rocks_stay_when_craters_come() {
+    let rocks = json!({"kind": "rocks", "coverage": 0.118});
+    let crater = json!({"kind": "primary_craters", "density": 0.0001, "diameter_min_m": 1.0});
+    let [without, with] = [json!([rocks]), json!([rocks, crater])].map(|spec| found(&world(spec, 17), 2000, |_| 0.118));
+    assert!(without.len() > 1000 && without.len() == with.len());
+    assert!(without.iter().zip(&with).all(|(a, b)| a.centre == b.centre && a.diameter_m == b.diameter_m));
 }
 
 /// Albedo keeps to its means: 0.25 and 0.16, and dust brightens both towards its own.
