@@ -126,8 +126,18 @@ impl Window {
 
     /// How many diamonds [`Self::visit_diamonds`] goes through, roughly.
     pub(super) fn diamonds(&self, zoom: u32, reach: f64) -> f64 {
+        self.spread(zoom, reach, 1.0)
+    }
+
+    /// The ground within `reach` (lattice units) of a point of the window along either axis, in diamonds of a grid.
+    pub(super) fn ground(&self, zoom: u32, reach: f64) -> f64 {
+        self.spread(zoom, reach, 0.0)
+    }
+
+    /// Diamonds in squares about the window's points, that are `more` grid spacings wider than the reach.
+    fn spread(&self, zoom: u32, reach: f64, more: f64) -> f64 {
         let unit = spacing(zoom);
-        let count = |low: f64, high: f64| (high - low) / unit + 1.0;
+        let count = |low: f64, high: f64| (high - low) / unit + more;
         let apart = spacing(self.zoom) > 2.0 * reach + 1.0;
         let squares = if apart { self.len() as f64 } else { 1.0 };
         let first = self.surroundings(reach).next();

@@ -179,8 +179,12 @@ impl Rocks {
 
     /// How far from the centre of a bin's diamond its rocks reach, lattice units.
     fn bin_reach(&self, bin: &Bin) -> f64 {
-        let diameter = 2.0 * RADIUS_SHARE * spacing(bin.zoom);
-        spacing(bin.zoom) + long_axis(diameter, AXIS_RATIO_MIN)
+        spacing(bin.zoom) + Self::widest_axis(bin)
+    }
+
+    /// Longest half axis in a bin, lattice units.
+    fn widest_axis(bin: &Bin) -> f64 {
+        long_axis(2.0 * RADIUS_SHARE * spacing(bin.zoom), AXIS_RATIO_MIN)
     }
 
     /// The candidate, if it may lie under a point that is looked at, stays, and is not buried.
@@ -257,9 +261,14 @@ impl Rocks {
         (zoom, i, j)
     }
 
-    /// Expected number of rocks drawn for a window; `diamond` is what looking at a diamond counts for besides.
-    pub fn expected(&self, window: &Window, diamond: f64) -> f64 {
-        self.bins.iter().map(|bin| (diamond + bin.mean) * window.diamonds(bin.zoom, self.bin_reach(bin))).sum()
+    /// Expected number of rocks and diamonds looked at for a window.
+    pub fn work(&self, window: &Window) -> f64 {
+        self.bins.iter().map(|bin| (1.0 + bin.mean) * window.diamonds(bin.zoom, self.bin_reach(bin))).sum()
+    }
+
+    /// Expected number of rocks found for a window, were each as wide as the widest of its bin and did all candidates stay.
+    pub fn held(&self, window: &Window) -> f64 {
+        self.bins.iter().map(|bin| bin.mean * window.ground(bin.zoom, Self::widest_axis(bin))).sum()
     }
 }
 

@@ -1,7 +1,7 @@
 //! A world: everything that is the same for all of its patches, and how a patch of it is made.
 
 use super::craters::index::Index;
-use super::craters::population::{Crater, Families, Near, Place};
+use super::craters::population::{Crater, Families, Near, Place, Population};
 use super::craters::shape::EJECTA_RADII;
 use super::craters::{Bombardment, Plane, retained_window};
 use super::levels::Window;
@@ -117,25 +117,24 @@ impl World {
         Near { window, margin: self.rocks.as_ref().map_or(0.0, |(rocks, _)| rocks.reach()) }
     }
 
-    /// Expected number of craters and rocks that a patch draws: at least those that it holds in memory.
+    /// Expected number of craters and rocks that a patch holds in memory, not below the true one.
     pub fn expected_objects(&self, window: &Window) -> f64 {
-        self.expected(window, 0.0)
+        let near = self.near(window);
+        let rocks = self.rocks.as_ref().map_or(0.0, |(rocks, _)| rocks.held(window));
+        self.populations().map(|p| p.held(&near)).sum::<f64>() + rocks
     }
 
     /// Expected number of craters and rocks that a patch draws, and of the places where it looks for them; time goes with it and
     /// with the number of points.
     pub fn expected_work(&self, window: &Window) -> f64 {
-        self.expected(window, 1.0)
+        let near = self.near(window);
+        let rocks = self.rocks.as_ref().map_or(0.0, |(rocks, _)| rocks.work(window));
+        self.populations().map(|p| p.work(&near)).sum::<f64>() + rocks
     }
 
-    fn expected(&self, window: &Window, diamond: f64) -> f64 {
-        let near = self.near(window);
-        let of_step = |step: &Step| match step {
-            Step::Bombardment(b) => b.populations.iter().map(|p| p.expected(&near, diamond)).sum(),
-            _ => 0.0,
-        };
-        let rocks = self.rocks.as_ref().map_or(0.0, |(rocks, _)| rocks.expected(window, diamond));
-        self.steps.iter().map(of_step).sum::<f64>() + rocks
+    fn populations(&self) -> impl Iterator<Item = &dyn Population> {
+        let bombardments = self.steps.iter().filter_map(|s| if let Step::Bombardment(b) = s { Some(b) } else { None });
+        bombardments.flat_map(|b| b.populations.iter().map(|p| &**p))
     }
 }
 

@@ -85,9 +85,11 @@ pub trait Population: Send + Sync {
     /// Adds every crater wider than `diameter_min_m` whose ejecta may reach a point that is looked at.
     fn find(&self, near: &Near<'_>, diameter_min_m: f64, families: &Families, found: &mut Vec<Crater>);
 
-    /// Expected number of craters that [`Self::find`] draws, among them those that it finds not to reach; `diamond` is what looking
-    /// at a diamond counts for besides.
-    fn expected(&self, near: &Near<'_>, diamond: f64) -> f64;
+    /// Expected number of craters and diamonds that [`Self::find`] looks at.
+    fn work(&self, near: &Near<'_>) -> f64;
+
+    /// Expected number of craters that it holds in memory, not below the true one.
+    fn held(&self, near: &Near<'_>) -> f64;
 }
 
 /// Craters of one range of diameters, a factor of 2 or less.
@@ -193,11 +195,17 @@ impl PowerLaw {
         }
     }
 
-    /// Expected sum over what [`Self::visit`] goes through: `diamond` for a diamond, `crater` for a crater.
-    fn weighed(&self, near: &Near<'_>, radii: f64, diameter_min_m: f64, [diamond, crater]: [f64; 2]) -> f64 {
+    /// Expected work of [`Self::visit`] when a crater costs `each` and a diamond 1.
+    fn work_of_visit(&self, near: &Near<'_>, radii: f64, diameter_min_m: f64, each: f64) -> f64 {
         let wide = self.bins.iter().filter(|bin| bin.diameter_max_m > diameter_min_m);
-        let of_bin = |bin: &Bin| near.window.diamonds(bin.zoom, Self::reach(bin, radii, near));
-        wide.map(|bin| (diamond + crater * bin.mean) * of_bin(bin)).sum()
+        wide.map(|bin| (1.0 + each * bin.mean) * near.window.diamonds(bin.zoom, Self::reach(bin, radii, near))).sum()
+    }
+
+    /// Expected number of craters that [`Self::visit`] calls for, were each as wide as the widest of its bin.
+    fn visited(&self, near: &Near<'_>, radii: f64, diameter_min_m: f64) -> f64 {
+        let wide = self.bins.iter().filter(|bin| bin.diameter_max_m > diameter_min_m);
+        let reach = |bin: &Bin| RADIUS_SHARE * radii * spacing(bin.zoom) + near.margin;
+        wide.map(|bin| bin.mean * near.window.ground(bin.zoom, reach(bin))).sum()
     }
 }
 
@@ -206,8 +214,12 @@ impl Population for PowerLaw {
         self.visit(near, EJECTA_RADII, diameter_min_m, |crater| found.push(crater));
     }
 
-    fn expected(&self, near: &Near<'_>, diamond: f64) -> f64 {
-        self.weighed(near, EJECTA_RADII, 0.0, [diamond, 1.0])
+    fn work(&self, near: &Near<'_>) -> f64 {
+        self.work_of_visit(near, EJECTA_RADII, 0.0, 1.0)
+    }
+
+    fn held(&self, near: &Near<'_>) -> f64 {
+        self.visited(near, EJECTA_RADII, 0.0)
     }
 }
 
@@ -297,8 +309,13 @@ impl Population for Secondaries {
         });
     }
 
-    fn expected(&self, near: &Near<'_>, diamond: f64) -> f64 {
+    fn work(&self, near: &Near<'_>) -> f64 {
         let p = &self.parameters;
-        self.primaries.weighed(near, p.reach_radii(), p.primary_min_m, [diamond, 1.0 + f64::from(p.count)])
+        self.primaries.work_of_visit(near, p.reach_radii(), p.primary_min_m, 1.0 + f64::from(p.count))
+    }
+
+    fn held(&self, near: &Near<'_>) -> f64 {
+        let p = &self.parameters;
+        self.primaries.visited(near, p.reach_radii(), p.primary_min_m) * f64::from(p.count)
     }
 }

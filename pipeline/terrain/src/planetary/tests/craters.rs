@@ -34,7 +34,11 @@ impl Population for Listed {
         found.extend(self.0.iter().filter(reaching));
     }
 
-    fn expected(&self, _: &Near<'_>, _: f64) -> f64 {
+    fn work(&self, _: &Near<'_>) -> f64 {
+        self.0.len() as f64
+    }
+
+    fn held(&self, _: &Near<'_>) -> f64 {
         self.0.len() as f64
     }
 }
@@ -298,7 +302,7 @@ fn prop_places_tell_craters_apart() {
     assert!(all > 5000 && places.len() == all, "{} {all}", places.len());
 }
 
-/// What a patch is expected to draw is no less than what it holds in memory, families of secondaries included, and no more than 6 times
+/// What a patch is expected to hold in memory is no less than what it holds, families of secondaries included, and no more than 6 times
 /// as much (squares are looked at, circles found); also with rocks, which ask for craters beyond the window. A count of 1e4 in families
 /// of 200 scatters by 15 %.
 #[test]
@@ -348,7 +352,10 @@ fn visible(density: f64, seed: u64) -> [f64; 2] {
     [own as f64, elsewhere as f64]
 }
 
-/// Acceptance 8: saturation.
+/// Acceptance 8: saturation. Ten times the equilibrium density (10^-1.1 = 0.079), and twice that, leave the same number of craters to
+/// see, within 20 %. Some 5000 of each in 480 patches: the ratio has a standard error of 2.1 %. The first 48 patches gave 0.86 +- 0.07;
+/// were that the true ratio, the bound would be 3 standard errors away (1e-3). The seeds are the first ones; the counts at a tenth of
+/// the equilibrium and at the equilibrium itself are printed.
 #[test]
 #[ignore = "slow: ./test --full"]
 fn stat_crater_fields_saturate() {

@@ -45,7 +45,7 @@ fn found(world: &World, side: usize, coverage: impl Fn([f64; 2]) -> f64) -> Vec<
 /// Acceptance 11: cumulative counts of the mode's own law, at 0.1, 0.2 and 0.5 m: `literal` against the published N(>D) up to 5 m;
 /// `exact_union` against the integral of n / (1 - F), which exceeds the published one by 12, 8 and 3 % at 17.6 %. The bound is the
 /// list's, 3 standard deviations (Poisson) of the count on a hectare, met by the mean of nine hectares: 9 of its own, 1e-18 a figure.
-/// A density wrong by 2 % at 0.1 m would be caught.
+/// A density wrong by 3 % at 0.1 m would be caught.
 #[test]
 fn stat_rock_counts_follow_the_law() {
     for coverage in COVERAGES {
