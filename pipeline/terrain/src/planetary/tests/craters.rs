@@ -353,9 +353,9 @@ fn visible(density: f64, seed: u64) -> [f64; 2] {
 }
 
 /// Acceptance 8: saturation. Ten times the equilibrium density (10^-1.1 = 0.079), and twice that, leave the same number of craters to
-/// see, within 20 %. Some 5000 of each in 480 patches: the ratio has a standard error of 2.1 %. The first 48 patches gave 0.86 +- 0.07;
-/// were that the true ratio, the bound would be 3 standard errors away (1e-3). The seeds are the first ones; the counts at a tenth of
-/// the equilibrium and at the equilibrium itself are printed.
+/// see, within 20 %: 3903 over 4348 in 480 patches, 0.90 with a standard error of 0.022. Were that the true ratio, the bound would be 4.4
+/// standard errors away (5e-6). The seeds are the first ones; the counts at a tenth of the equilibrium and at the equilibrium itself are
+/// printed. Six minutes of one core.
 #[test]
 #[ignore = "slow: ./test --full"]
 fn stat_crater_fields_saturate() {
