@@ -36,7 +36,7 @@ pub struct GaussiansParameters {
     pub scale_m: Option<f64>,
     /// Number G of bumps. Default 10 per area of their half axes.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub count: Option<u64>,
+    pub bumps: Option<u64>,
 }
 
 /// A sum of Gaussians with checked parameters.
@@ -77,9 +77,9 @@ impl Gaussians {
         let across_m = along_m * wanted.ratio;
         let [width_m, height_m] = tile.geometry.size();
         let usual = (DENSITY * width_m * height_m / (along_m * across_m)).ceil();
-        let count = parameters.count.unwrap_or(usual as u64);
+        let count = parameters.bumps.unwrap_or(usual as u64);
         if !(1..=COUNT_MAX).contains(&count) {
-            return Err(ParameterError::new("count", format!("is {count}; it must lie in 1 to {COUNT_MAX}")));
+            return Err(ParameterError::new("bumps", format!("is {count}; it must lie in 1 to {COUNT_MAX}")));
         }
         let class = Class { along_m, across_m, count, variance_m2: wanted.at_distance(0.0) };
         let torus = Torus::new(tile.geometry, wanted.azimuth_deg);
