@@ -48,7 +48,7 @@ impl ParameterError {
         if value.is_finite() && value > 0.0 {
             Ok(value)
         } else {
-            Err(Self::new(key, format!("is {value}; it must be a finite number above 0")))
+            Err(Self::new(key, format!("is {}; it must be a finite number above 0", shown(value))))
         }
     }
 
@@ -57,17 +57,27 @@ impl ParameterError {
         if value.is_finite() && value >= 0.0 {
             Ok(value)
         } else {
-            Err(Self::new(key, format!("is {value}; it must be a finite number, 0 or above")))
+            Err(Self::new(key, format!("is {}; it must be a finite number, 0 or above", shown(value))))
         }
     }
 
-    /// `Ok` when the value lies strictly between the bounds.
+    /// `Ok` when the value lies between the bounds, which are excluded.
     pub fn between(key: &str, value: f64, low: f64, high: f64) -> Result<f64, Self> {
         if value > low && value < high {
             Ok(value)
         } else {
-            Err(Self::new(key, format!("is {value}; it must lie between {low} and {high}")))
+            Err(Self::new(key, format!("is {}; it must lie above {low} and below {high}", shown(value))))
         }
+    }
+}
+
+/// A number for a message: as a person writes it, with an exponent where it would be hundreds of digits.
+pub fn shown(value: f64) -> String {
+    let size = value.abs();
+    if size.is_finite() && size != 0.0 && !(1e-9..1e15).contains(&size) {
+        format!("{value:e}")
+    } else {
+        value.to_string()
     }
 }
 
@@ -82,8 +92,46 @@ pub fn schema_of<T: JsonSchema>() -> Value {
 /// A [`ParameterError`] that names the key that does not fit.
 pub fn read_parameters<T: DeserializeOwned>(value: &Value) -> Result<T, ParameterError> {
     serde_path_to_error::deserialize(value).map_err(|e| {
-        let path = e.path().to_string();
-        let key = if path == "." { String::new() } else { path };
+        let key = dotted(e.path());
         ParameterError::new(key, e.into_inner().to_string())
     })
+}
+
+/// The path with a dot before every name and index, as the keys of a study are written.
+fn dotted(path: &serde_path_to_error::Path) -> String {
+    use serde_path_to_error::Segment;
+    let step = |segment: &Segment| match segment {
+        Segment::Seq { index } => Some(index.to_string()),
+        Segment::Map { key } => Some(key.clone()),
+        Segment::Enum { variant } => Some(variant.clone()),
+        Segment::Unknown => None,
+    };
+    path.iter().filter_map(step).collect::<Vec<_>>().join(".")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde::Deserialize;
+    use serde_json::json;
+
+    #[derive(Debug, Deserialize)]
+    struct Layers {
+        #[serde(rename = "layers")]
+        _layers: Vec<[f64; 2]>,
+    }
+
+    #[test]
+    fn val_keys_have_dots_before_names_and_numbers() {
+        let key = |value: Value| read_parameters::<Layers>(&value).unwrap_err().key;
+        assert_eq!(key(json!({"layers": [[1.0, 2.0], [1.0, "x"]]})), "layers.1.1");
+        assert_eq!(key(json!({"layers": 5})), "layers");
+        assert_eq!(key(json!({})), "");
+    }
+
+    #[test]
+    fn val_numbers_in_messages_are_short() {
+        let text = [0.0, -3.25, 1e300, -2.5e-12, f64::INFINITY].map(shown);
+        assert_eq!(text, ["0", "-3.25", "1e300", "-2.5e-12", "inf"]);
+    }
 }

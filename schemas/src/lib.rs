@@ -14,5 +14,5 @@ pub mod topics;
 
 pub use answer::Answer;
 pub use class::RoughnessClass;
-pub use kind::{Kind, ParameterError};
+pub use kind::{Kind, ParameterError, shown};
 pub use tables::{Cell, Column, ColumnType, Record, Table};
