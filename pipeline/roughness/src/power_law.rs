@@ -9,9 +9,11 @@
 //! Fit: least squares of ln P on ln f over bands of an eighth of an octave, each with the same weight, along x and along y
 //! together.
 //!
-//! Class: ISO 8608:2016, Annex C, by P at 0.1 cycles/m.
+//! Class: ISO 8608:2016, Annex C, by P at 0.1 cycles/m. The standard fits from 0.011 to 2.83 cycles/m; the band of a vehicle starts
+//! at its longest wave (0.185 for one of 5.4 m), and the class is then that of the law carried on to 0.1.
 
 use crate::profiles::ProfileBin;
+use crate::spectrum::RINGS_PER_OCTAVE;
 use crate::structure::Direction;
 use sastrugi_numeric::sums;
 use serde::Serialize;
@@ -75,9 +77,16 @@ impl PowerLaw {
         self.c * libm::pow(frequency_cycles_m, -self.n)
     }
 
-    /// Density by which roads are classed: at 0.1 cycles/m, m3.
+    /// Density by which roads are classed: at 0.1 cycles/m, m3. An extrapolation where [`Self::reaches_iso_8608`] is false.
     pub fn iso_8608_psd_m3(&self) -> f64 {
         self.psd_m3(ISO_FREQUENCY_CYCLES_M)
+    }
+
+    /// Whether 0.1 cycles/m lies among the fitted frequencies, or within a band of them.
+    pub fn reaches_iso_8608(&self) -> bool {
+        let [low, high] = self.frequencies_cycles_m;
+        let band = libm::exp2(1.0 / RINGS_PER_OCTAVE);
+        low <= ISO_FREQUENCY_CYCLES_M * band && high >= ISO_FREQUENCY_CYCLES_M / band
     }
 
     /// Variance of a profile in a band of wavelengths from `min_m` to `max_m`, m2.
@@ -115,6 +124,9 @@ mod tests {
         assert!((law.n - 2.3).abs() < 1e-12 && (law.c / 3e-4 - 1.0).abs() < 1e-12, "{law:?}");
         assert!(law.r2 > 1.0 - 1e-12 && law.n_standard_error < 1e-6);
         assert!(law.frequencies_cycles_m[0] >= 0.1 && law.frequencies_cycles_m[1] <= 1.0 + 1e-12);
+        assert!(law.reaches_iso_8608());
+        let above = PowerLaw::fit(&bins(|f| 3e-4 / f), Direction::All, [0.185, 1.0]).unwrap();
+        assert!(!above.reaches_iso_8608());
         assert!(PowerLaw::fit(&bins(|_| 0.0), Direction::All, [0.1, 1.0]).is_none());
         assert!(PowerLaw::fit(&bins(|f| f), Direction::X, [0.1, 0.11]).is_none());
     }
@@ -133,16 +145,6 @@ mod tests {
         }
         let law = PowerLaw { c: 2e-4, n: 2.0, r2: 1.0, n_standard_error: 0.0, frequencies_cycles_m: [0.1, 3.0] };
         assert!((law.variance_m2([0.33, 5.4]) - 2e-4 * (5.4 - 0.33)).abs() < 1e-18);
-    }
-
-    /// A constant of 1 ft is one of 0.3048 m: the RMS in feet times 0.3048 is that in metres, to rounding.
-    #[test]
-    fn val_feet() {
-        const FOOT_M: f64 = 0.3048;
-        let law = |c| PowerLaw { c, n: 2.0, r2: 1.0, n_standard_error: 0.0, frequencies_cycles_m: [0.1, 3.0] };
-        let in_feet = law(1.0).variance_m2([1.0, 10.0]).sqrt();
-        let in_metres = law(FOOT_M).variance_m2([FOOT_M, 10.0 * FOOT_M]).sqrt();
-        assert!((in_metres / (in_feet * FOOT_M) - 1.0).abs() < 1e-12);
     }
 
     /// ISO 8608, Annex C: geometric means 16, 64, 256 ... 262 144 of the classes, in 1e-6 m3, and the bounds between them.

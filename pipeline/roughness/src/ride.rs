@@ -22,7 +22,7 @@ pub struct Ride {
     pub rms_along_m: Vec<f64>,
     /// The power law through the density of the profiles in the band.
     pub power_law: Option<PowerLaw>,
-    /// Density that the law has at 0.1 cycles/m, m3.
+    /// Density that the law has at 0.1 cycles/m, m3; carried on beyond its frequencies where these do not reach there.
     pub iso_8608_psd_m3: f64,
     /// Class of ISO 8608 by that density.
     pub iso_8608_class: Option<char>,
@@ -80,6 +80,25 @@ mod tests {
         let law = ride.power_law.unwrap();
         assert!(law.n.abs() < 0.1 && (law.c / (2.0 * 1e-4 * 0.1) - 1.0).abs() < 0.1, "{law:?}");
         assert!(ride.iso_8608_class == Some('A') && ride.iri.along_x_m_km > 1.0);
+    }
+
+    /// A surface given in feet: RMS in feet, a density in cubic feet; in metres both are those of the surface in metres.
+    #[test]
+    fn val_feet() {
+        const FOOT_M: f64 = 0.3048;
+        let mut s = Streams::for_seed(2, "ride-test").stream("noise");
+        let metres = Geometry::square(120, 150, 0.15);
+        let feet = Geometry::square(120, 150, 0.15 / FOOT_M);
+        let heights: Vec<f64> = (0..metres.len()).map(|_| 0.01 * s.normal()).collect();
+        let ride = |g: Geometry, unit: f64| {
+            let dem = Grid::new(g, heights.iter().map(|z| z / unit).collect());
+            Ride::of(&dem, &WaveBand::new(0.33 / unit, 5.4 / unit).unwrap(), Detrender::Band, false).unwrap()
+        };
+        let (in_metres, in_feet) = (ride(metres, 1.0), ride(feet, FOOT_M));
+        assert!((in_feet.rms_m * FOOT_M / in_metres.rms_m - 1.0).abs() < 1e-12);
+        let (a, b) = (in_metres.power_law.unwrap(), in_feet.power_law.unwrap());
+        assert!((a.n - b.n).abs() < 1e-9);
+        assert!((b.c * libm::pow(FOOT_M, 3.0 - b.n) / a.c - 1.0).abs() < 1e-9);
     }
 
     #[test]

@@ -33,6 +33,9 @@ pub(crate) const RINGS_PER_OCTAVE: f64 = 8.0;
 const SLOPE_CYCLES_MIN: f64 = 4.0;
 /// Last frequency of the slope's default band over the Nyquist frequency.
 const SLOPE_NYQUIST_SHARE: f64 = 0.5;
+/// Density over the largest of the band below which a ring holds rounding alone: squares of amplitudes near 1e-16 of the largest, and
+/// well above them.
+const SLOPE_NOISE_SHARE: f64 = 1e-12;
 
 /// One ring of the radially averaged spectrum.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -187,13 +190,17 @@ pub fn default_slope_band(g: &Geometry) -> [f64; 2] {
 }
 
 /// Slope of log density over log frequency, by least squares over the rings of the band (inclusive, cycles/m), each with
-/// the same weight; NaN with fewer than two of them. A surface with Hurst exponent H has `-2 (H + 1)`.
+/// the same weight. Rings of rounding noise are left out: a surface that varies along one axis only has no power in rings without a
+/// mode on that axis. NaN with fewer than two rings, or fewer than half of those of the band. A surface with Hurst exponent H has
+/// `-2 (H + 1)`.
 pub fn psd_slope(spectrum: &[SpectrumBin], band_cycles_m: [f64; 2]) -> f64 {
     let [low, high] = band_cycles_m;
-    let inside = spectrum.iter().filter(|b| b.frequency_cycles_m >= low && b.frequency_cycles_m <= high);
-    let points: Vec<[f64; 2]> =
-        inside.filter(|b| b.psd_m4 > 0.0).map(|b| [libm::log(b.frequency_cycles_m), libm::log(b.psd_m4)]).collect();
-    crate::multifractality::line_slope(&points)
+    let inside = |b: &&SpectrumBin| b.frequency_cycles_m >= low && b.frequency_cycles_m <= high;
+    let band: Vec<&SpectrumBin> = spectrum.iter().filter(inside).collect();
+    let noise = SLOPE_NOISE_SHARE * band.iter().map(|b| b.psd_m4).fold(0.0, f64::max);
+    let told = band.iter().filter(|b| b.psd_m4 > noise);
+    let points: Vec<[f64; 2]> = told.map(|b| [libm::log(b.frequency_cycles_m), libm::log(b.psd_m4)]).collect();
+    if 2 * points.len() < band.len() { f64::NAN } else { crate::multifractality::line_slope(&points) }
 }
 
 #[cfg(test)]
@@ -278,6 +285,32 @@ mod tests {
         let spectrum: Vec<SpectrumBin> = (1..50).map(|k| bin(0.1 * f64::from(k))).collect();
         assert!((psd_slope(&spectrum, [0.2, 3.0]) + 3.0).abs() < 1e-12);
         assert!(psd_slope(&spectrum, [9.0, 10.0]).is_nan());
+    }
+
+    /// A wall across the ground: low rings without a mode on the axis of its profile hold rounding alone. Steps fall off as f^-2, and
+    /// the share of modes on the axis in a ring as 1/f: -3, give or take lobes.
+    #[test]
+    fn val_rounding_is_no_slope() {
+        let g = Geometry::square(400, 400, 0.15);
+        let wall = field(g, |_, y| if (y - 30.0).abs() < 1.5 { -1.0 } else { 0.0 });
+        let (spectrum, band) = (power_spectrum(&wall), default_slope_band(&g));
+        let top = spectrum.iter().map(|b| b.psd_m4).fold(0.0, f64::max);
+        let empty = |b: &&SpectrumBin| b.frequency_cycles_m >= band[0] && b.psd_m4 < 1e-20 * top;
+        assert!(spectrum.iter().filter(empty).count() > 2);
+        let slope = psd_slope(&spectrum, band);
+        assert!((slope + 3.0).abs() < 0.6, "{slope}");
+    }
+
+    /// Half of the rings is enough, less is not.
+    #[test]
+    fn val_a_slope_of_few_rings_is_none() {
+        let of = |noisy: usize| {
+            let psd = |k: usize| if k <= noisy { 1e-16 } else { libm::pow(k as f64, -3.0) };
+            let bin = |k| SpectrumBin { frequency_cycles_m: k as f64, psd_m4: psd(k), modes: 1 };
+            psd_slope(&(1..=8).map(bin).collect::<Vec<_>>(), [0.5, 9.0])
+        };
+        assert!([0, 1, 4].iter().all(|&noisy| (of(noisy) + 3.0).abs() < 1e-12));
+        assert!(of(5).is_nan());
     }
 
     #[test]
