@@ -7,7 +7,7 @@ use crate::ReportError;
 use sastrugi_numeric::Grid;
 use sastrugi_schemas::fit::FitFile;
 use sastrugi_schemas::manifest::FailedItem;
-use sastrugi_schemas::study::HypothesisItem;
+use sastrugi_schemas::study::{HypothesisItem, RoughnessSection};
 use sastrugi_schemas::tables::{
     CandidateCurveRow, CandidateRow, CovarianceRow, FitRow, HeightDistributionRow, LikelihoodProfileRow, LogRow,
     MissionRow, ParameterRow, ProfilePsdRow, PsdRow, ReplicateRow, SampleRow, ScoreCovarianceRow, ScoreRow,
@@ -55,6 +55,8 @@ pub struct Study {
     pub creators: Vec<String>,
     /// Claims that it states.
     pub hypotheses: Vec<HypothesisItem>,
+    /// How its heightfields are classified.
+    pub roughness: RoughnessSection,
 }
 
 /// Rows of a release; every table is sorted by its keys.

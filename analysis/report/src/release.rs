@@ -6,7 +6,7 @@ use sastrugi_numeric::Grid;
 use sastrugi_schemas::Record;
 use sastrugi_schemas::fit::FitFile;
 use sastrugi_schemas::manifest::{self, Manifest};
-use sastrugi_schemas::study::HypothesisItem;
+use sastrugi_schemas::study::{HypothesisItem, RoughnessSection};
 use sastrugi_schemas::tables::{LogRow, SampleRow};
 use sastrugi_store::release::{MANIFEST, SHARD, TABLES};
 use sastrugi_store::{dem, digest, parquet};
@@ -183,7 +183,7 @@ fn read_error(path: &str, error: impl Display) -> ReportError {
     ReportError::Read { path: path.to_owned(), reason: error.to_string() }
 }
 
-/// `[study]` and the hypotheses of a study file; what it does not say is empty.
+/// `[study]`, `[roughness]` and the hypotheses of a study file; what it does not say is empty.
 fn study(toml: &str) -> Result<Study, String> {
     let document: toml_edit::DocumentMut = toml.parse().map_err(|e: toml_edit::TomlError| e.to_string())?;
     let item = |key: &str| document.get("study").and_then(|s| s.get(key));
@@ -200,7 +200,16 @@ fn study(toml: &str) -> Result<Study, String> {
         license: text("license"),
         creators: list("creators").unwrap_or_default(),
         hypotheses: hypotheses(&document)?,
+        roughness: roughness(&document)?,
     })
+}
+
+/// `[roughness]` of a study file; keys that it does not state are the defaults.
+fn roughness(document: &toml_edit::DocumentMut) -> Result<RoughnessSection, String> {
+    let table = document.get("roughness").and_then(|item| item.as_table_like());
+    let stated = table.into_iter().flat_map(|table| table.iter());
+    let values = stated.filter_map(|(key, item)| Some((key.to_owned(), json(item.as_value()?))));
+    serde_json::from_value(values.collect()).map_err(|e| format!("[roughness]: {e}"))
 }
 
 /// `[[hypothesis]]` of a study file.

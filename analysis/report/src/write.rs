@@ -140,7 +140,8 @@ fn head(data: &Data) -> Head {
     }
 }
 
-/// What is in the release, in figures; kinds it does not hold are left out.
+/// What is in the release, in figures; kinds it does not hold are left out. Of files those that hold data alone: the report is none of
+/// its own counts, and documents come when the release is sealed.
 fn key_figures(data: &Data) -> Vec<(String, String)> {
     let stage = |name: &str| data.of_stage(name).count();
     let recordings = data.artifacts.iter().filter(|a| a.path.ends_with(".mcap")).count();
@@ -151,14 +152,14 @@ fn key_figures(data: &Data) -> Vec<(String, String)> {
         (stage("texture"), "texture"),
         (data.missions.len(), "mission"),
         (recordings, "MCAP recording"),
-        (data.artifacts.len(), "file"),
+        (data.artifacts.len(), "data file"),
     ];
     let plural = |n: usize, what: &str| if n == 1 { what.to_owned() } else { format!("{what}s") };
     let named = |(n, what): (usize, &str)| (set::count(n), plural(n, what));
     let mut figures: Vec<(String, String)> = counts.into_iter().filter(|(n, _)| *n > 0).map(named).collect();
     let bytes: u64 = data.artifacts.iter().map(|a| a.bytes).sum();
     if bytes > 0 {
-        figures.push((set::bytes(bytes), "in all".into()));
+        figures.push((set::bytes(bytes), "of data".into()));
     }
     figures
 }

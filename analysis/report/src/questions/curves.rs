@@ -38,9 +38,11 @@ pub struct Slope {
     band: [f64; 2],
 }
 
-/// Points of a spectrum.
+/// Points of a spectrum. Beyond a band limit, and in rings without a mode where a surface varies, densities are rounding noise: ten
+/// decades are enough.
 pub fn spectrum(rows: &[&PsdRow]) -> Vec<(f64, f64)> {
-    rows.iter().map(|r| (r.frequency_cycles_m, r.psd_m4)).collect()
+    let least = 1e-10 * rows.iter().map(|r| r.psd_m4).fold(0.0, f64::max);
+    rows.iter().filter(|r| r.psd_m4 >= least).map(|r| (r.frequency_cycles_m, r.psd_m4)).collect()
 }
 
 /// Points of a histogram: the middle of each bin that holds cells.
@@ -80,9 +82,7 @@ pub fn spectra(id: &str, curves: &[Curve], ranges: Ranges, slope: Option<Slope>)
     if slope.is_some() && !legend.is_empty() {
         legend.push((Mark::Line(dashed), "fitted slope".into()));
     }
-    let (low, high) = ranges.y;
-    // Densities can fall to rounding noise beyond a band limit: ten decades are enough.
-    let y = Axis::log(low.max(high * 1e-10) / 1.5, high * 1.5);
+    let y = Axis::log(ranges.y.0 / 1.5, ranges.y.1 * 1.5);
     let x = (Axis::log(ranges.x.0 / 1.1, ranges.x.1 * 1.1), "spatial frequency, cycles/m");
     let mut plot = Plot::new((WIDTH, HEIGHT), x, (y, "power spectral density, m⁴"), &legend);
     draw(&mut plot, id, curves);

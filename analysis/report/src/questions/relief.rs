@@ -42,17 +42,42 @@ pub fn exaggeration_words(exaggeration: f64) -> String {
     }
 }
 
-/// The heights between which nearly all cells of the files lie: 1st and 99th percentile, the widest of all files. `None`
-/// without any data.
+/// Share of its relief that the middle of a surface must have to be coloured alone.
+const MIDDLE_SHARE: f64 = 0.25;
+
+/// The ends of the colours of a surface: the 1st and 99th percentile of its heights, or the lowest and the highest where the percentiles
+/// lie within a quarter of that. What stands out of level ground covers few cells and is all there is to see. `None` without data.
+fn colour_range(grid: &Grid) -> Option<(f64, f64)> {
+    let (lowest, highest) = grid.range()?;
+    let (low, high) = percentiles(grid)?;
+    Some(if high - low < MIDDLE_SHARE * (highest - lowest) { (lowest, highest) } else { (low, high) })
+}
+
+/// 1st and 99th percentile of a grid thinned for display; `None` without data.
+pub fn percentiles(grid: &Grid) -> Option<(f64, f64)> {
+    let thin = thin::block_mean(grid, thin::step(grid.rows(), grid.cols(), 256));
+    let mut values = sums::finite(&thin.values);
+    values.sort_by(f64::total_cmp);
+    let (low, high) = (sums::quantile_sorted(&values, 0.01), sums::quantile_sorted(&values, 0.99));
+    (low.is_finite() && high.is_finite()).then_some((low, high))
+}
+
+/// What a class map is, and with which disk it was closed.
+pub fn class_map_words(data: &Data) -> String {
+    let radius_m = data.study.roughness.closing_radius_m;
+    if radius_m > 0.0 {
+        format!("class map, closed with a disk of radius {} m,", set::plain(radius_m, 3))
+    } else {
+        "class map, not closed,".into()
+    }
+}
+
+/// The heights between which the colours of all files lie: the widest of them. `None` without any data.
 pub fn middle_range(data: &Data, paths: &[&str]) -> Result<Option<(f64, f64)>, ReportError> {
     let mut range: Option<(f64, f64)> = None;
     for path in paths {
         let Some(grid) = data.files.grid(path)? else { continue };
-        let thin = thin::block_mean(&grid, thin::step(grid.rows(), grid.cols(), 256));
-        let mut heights = sums::finite(&thin.values);
-        heights.sort_by(f64::total_cmp);
-        let (low, high) = (sums::quantile_sorted(&heights, 0.01), sums::quantile_sorted(&heights, 0.99));
-        if low.is_finite() && high.is_finite() {
+        if let Some((low, high)) = colour_range(&grid) {
             range = Some(range.map_or((low, high), |(a, b)| (a.min(low), b.max(high))));
         }
     }
@@ -96,6 +121,22 @@ pub fn deviations(
     Ok(Some(figure(words, description, map, numbers(path, grid, own_range))))
 }
 
+/// A raster that stands beside heights, in plain colours over `range`; `title` is the quantity and its unit.
+pub fn values(
+    grid: &Grid,
+    path: &str,
+    (range, title): ((f64, f64), &str),
+    words: Words,
+) -> Result<Option<Figure>, ReportError> {
+    let Some(own_range) = grid.range() else { return Ok(None) };
+    let picture = picture::values(grid, range, 400)?;
+    let absent = (grid.finite_count() < grid.values.len()).then_some((colour::NO_DATA, "no data"));
+    let colours = picture::ramp(&colour::heights(), 40);
+    let map = Map::new(&picture, MAP_WIDTH, &Key::Ramp { colours: &colours, range, title, absent });
+    let description = format!("Map of {path}: {}.", extent(grid));
+    Ok(Some(figure(words, description, map, numbers_of(path, grid, own_range, ""))))
+}
+
 /// Two and a half standard deviations of the cells with data.
 pub fn limit_m(grid: &Grid) -> f64 {
     2.5 * sums::variance(&sums::finite(&grid.values)).sqrt()
@@ -118,7 +159,12 @@ fn figure(words: Words, description: String, map: Map, numbers: Numbers) -> Figu
     Figure { id, title, caption, description, svg: map.svg, numbers }
 }
 
-fn numbers(path: &str, grid: &Grid, (low, high): (f64, f64)) -> Numbers {
+fn numbers(path: &str, grid: &Grid, range_m: (f64, f64)) -> Numbers {
+    numbers_of(path, grid, range_m, "m")
+}
+
+/// Size of a raster, and its lowest and highest value in `unit`: empty where that is no metre.
+fn numbers_of(path: &str, grid: &Grid, (low, high): (f64, f64), unit: &str) -> Numbers {
     let g = grid.geometry;
     let columns = [
         ("file", ""),
@@ -126,8 +172,8 @@ fn numbers(path: &str, grid: &Grid, (low, high): (f64, f64)) -> Numbers {
         ("cols", "1"),
         ("cell_x_m", "m"),
         ("cell_y_m", "m"),
-        ("low_m", "m"),
-        ("high_m", "m"),
+        (if unit == "m" { "low_m" } else { "low" }, unit),
+        (if unit == "m" { "high_m" } else { "high" }, unit),
     ];
     let mut numbers = Numbers::of_file(path, &columns);
     let int = |n: usize| Cell::I64(n as i64);

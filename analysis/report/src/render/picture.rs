@@ -48,11 +48,19 @@ fn shaded(thin: &Grid, range: (f64, f64), exaggeration: f64) -> Result<Vec<u8>, 
     rgb(thin, |i| lit(colour::pick(&map, share(thin.values[i], range)), shade.values[i]))
 }
 
+/// Values coloured over `range`, not shaded.
+pub fn values(grid: &Grid, range: (f64, f64), most: usize) -> Result<Picture, ReportError> {
+    coloured(grid, &colour::heights(), range, most)
+}
+
 /// Deviations coloured over `[-limit, limit]`, not shaded.
 pub fn deviations(grid: &Grid, limit: f64, most: usize) -> Result<Picture, ReportError> {
+    coloured(grid, &colour::deviations(), (-limit, limit), most)
+}
+
+fn coloured(grid: &Grid, map: &Map, range: (f64, f64), most: usize) -> Result<Picture, ReportError> {
     let thin = thinned(grid, most);
-    let map = colour::deviations();
-    let png = rgb(&thin, |i| colour::pick(&map, share(thin.values[i], (-limit, limit))))?;
+    let png = rgb(&thin, |i| colour::pick(map, share(thin.values[i], range)))?;
     Ok(placed(grid, data_uri(&png), [thin.cols(), thin.rows()]))
 }
 

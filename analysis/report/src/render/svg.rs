@@ -6,8 +6,19 @@ use std::fmt::Write;
 
 /// Size of ordinary text in figures, px.
 pub const TEXT: f64 = 12.5;
-/// Mean width of a character over the text size, on the wide side.
-const CHARACTER: f64 = 0.56;
+/// Widths of characters over the text size in DejaVu Sans, the widest of the fonts that `system-ui` stands for, in classes that are
+/// rounded up.
+const WIDTHS: [(&str, f64); 7] = [
+    ("ijlIJ' ,.·/:;\\|", 0.34),
+    ("frt-()[]!¹²³⁰⁴⁵⁶⁷⁸⁹", 0.42),
+    ("ckszLF*_`°–⁻?\"", 0.58),
+    ("abdeghnopquvxyPTYES0123456789{}$µρσ", 0.64),
+    ("ABCKRVXZ", 0.70),
+    ("wDGHNOQU&", 0.82),
+    ("M#+<=>^~±×−≤≥", 0.87),
+];
+/// Width of any other character: `m`, `W`, `%`, a dash, a letter of another script.
+const OTHER: f64 = 1.0;
 
 /// A colour that may follow the theme.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -312,16 +323,25 @@ impl Svg {
 
 /// Width of a text on the page, on the wide side, px.
 pub fn text_width(text: &str, size: f64) -> f64 {
-    CHARACTER * size * text.chars().count() as f64
+    size * text.chars().map(character_width).sum::<f64>()
+}
+
+/// Width over the text size, on the wide side.
+fn character_width(c: char) -> f64 {
+    WIDTHS.iter().find(|(characters, _)| characters.contains(c)).map_or(OTHER, |(_, width)| *width)
 }
 
 /// The text cut to a width, with an ellipsis where something was cut.
 pub fn fitted(text: &str, width: f64, size: f64) -> String {
-    let most = (width / (CHARACTER * size)) as usize;
-    if text.chars().count() <= most {
+    if text_width(text, size) <= width {
         return text.into();
     }
-    let kept: String = text.chars().take(most.saturating_sub(1)).collect();
+    let mut room = width - text_width("…", size);
+    let fits = |c: &char| {
+        room -= size * character_width(*c);
+        room >= 0.0
+    };
+    let kept: String = text.chars().take_while(fits).collect();
     format!("{kept}…")
 }
 
@@ -408,6 +428,18 @@ mod tests {
         assert_eq!(px(-0.001), "0");
         assert_eq!(px(10.256), "10.26");
         assert_eq!(px(100.0), "100");
-        assert_eq!(fitted("abcdefgh", 5.0 * CHARACTER * 10.0 + 0.1, 10.0), "abcd…");
+    }
+
+    /// Advances of DejaVu Sans, from its table `hmtx`, over 2048 units: no class is narrower than its widest character.
+    #[test]
+    fn val_texts_are_as_wide_as_in_dejavu_sans() {
+        let dejavu =
+            [('m', 1995.0), ('w', 1675.0), ('e', 1260.0), ('0', 1303.0), (' ', 651.0), ('+', 1716.0), ('W', 2025.0)];
+        assert!(dejavu.iter().all(|&(c, units)| character_width(c) >= units / 2048.0));
+        // Not so wide that labels are cut in vain: by that table "meadow + snow" has 104.06 px at 12.5 px.
+        let width = text_width("meadow + snow", TEXT);
+        assert!((104.06..108.0).contains(&width), "{width}");
+        assert_eq!(fitted("meadow + snow", width, TEXT), "meadow + snow");
+        assert_eq!(fitted("abcdefgh", 10.0 * (3.0 * 0.64 + 0.58 + 1.0) + 0.1, 10.0), "abcd…");
     }
 }

@@ -9,7 +9,7 @@ use crate::data::{Against, Data};
 use crate::write::{Summary, write};
 use sastrugi_schemas::Cell;
 use sastrugi_schemas::study::HypothesisItem;
-use sastrugi_schemas::tables::{LogRow, MissionRow};
+use sastrugi_schemas::tables::{LogRow, MissionRow, TerrainRow};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -175,6 +175,106 @@ fn prop_unknown_figures_are_absent_not_nan() {
     data.structure.iter_mut().for_each(|s| s.value_m2 = f64::INFINITY);
     data.candidates.iter_mut().for_each(|c| (c.parameters, c.chi2) = ("not JSON".into(), Some(f64::NAN)));
     assert_sound(&report(&data).0);
+}
+
+/// What is compared by colour is alike: another cell, other heights or a relief of another order stand apart.
+#[test]
+fn val_groups_share_colours_where_they_are_alike() {
+    // Ends of the colours of each group, as its figure prints them.
+    let ends = |change: fn(&mut Data, &mut made_up::Shelf)| {
+        let (mut data, mut shelf) = made_up::parts(1, 40);
+        change(&mut data, &mut shelf);
+        data.files = Box::new(shelf);
+        let (files, _) = report(&data);
+        assert_sound(&files);
+        let muted = |svg: &str| -> Vec<String> {
+            let texts = svg.split("class=\"f-muted\"").skip(1).filter_map(|t| t.split_once('>')?.1.split_once('<'));
+            texts.map(|t| t.0.to_owned()).collect()
+        };
+        ["2.30", "2.45", "2.60"].map(|g| muted(&files[&format!("figures/relief-d{g}-0000.svg")]))
+    };
+    let alike = ends(|_, _| ());
+    assert!(alike[0] == alike[1] && alike[1] == alike[2] && alike[0].len() == 2, "{alike:?}");
+    for apart in [
+        ends(|data, shelf| lifted(data, shelf, 1.0, 300.0)),
+        ends(|data, shelf| lifted(data, shelf, 20.0, 0.0)),
+        ends(|data, _| {
+            data.terrains.iter_mut().filter(|t| t.terrain_id == "d2.60-0000").for_each(|t| t.cell_x_m = 9.0)
+        }),
+    ] {
+        assert!(apart[0] == apart[1] && apart[1] != apart[2], "{apart:?}");
+    }
+}
+
+/// The third group's heights, times a factor and shifted.
+fn lifted(data: &mut Data, shelf: &mut made_up::Shelf, factor: f64, shift_m: f64) {
+    for terrain in data.terrains.iter_mut().filter(|t| t.terrain_id == "d2.60-0000") {
+        let grid = shelf.grids.get_mut(&terrain.path).unwrap();
+        grid.values.iter_mut().for_each(|z| *z = factor * *z + shift_m);
+        let (low, high) = grid.range().unwrap();
+        (terrain.height_min_m, terrain.height_max_m, terrain.relief_m) = (low, high, high - low);
+    }
+}
+
+/// A terrain without shares for want of room says so in the text and in place of its bars; one without for want of data does not.
+#[test]
+fn val_surfaces_too_small_for_shares_are_named() {
+    let mut data = made_up::full(1, 24);
+    for t in data.terrains.iter_mut().filter(|t| t.terrain_id.starts_with("d2.60")) {
+        (t.share_low, t.share_semi, t.share_high, t.share_border_m) = (f64::NAN, f64::NAN, f64::NAN, 26.0);
+    }
+    let (files, _) = report(&data);
+    assert_sound(&files);
+    let page = &files["index.html"];
+    assert!(page.contains("No shares of d2.60-0000: surface too small, nothing lies within a border of 26"));
+    assert!(page.contains("shares leave out a border of 5 to 26 m"));
+    assert!(files["figures/class-shares.svg"].contains("surface too small"));
+    data.terrains.iter_mut().for_each(|t| t.share_border_m = 5.0);
+    let page = &report(&data).0["index.html"];
+    assert!(!page.contains("surface too small") && page.contains("leave out a border of 5 m"));
+}
+
+/// Class maps name their disk.
+#[test]
+fn val_class_maps_name_the_radius() {
+    let mut data = made_up::full(1, 24);
+    data.missions.clear();
+    let said = |data: &Data| report(data).0["index.html"].clone();
+    assert!(said(&data).contains("class map, closed with a disk of radius 0.57 m, over"));
+    data.study.roughness.closing_radius_m = 0.1;
+    assert!(said(&data).contains("disk of radius 0.1 m, over"));
+    data.study.roughness.closing_radius_m = 0.0;
+    assert!(said(&data).contains("class map, not closed, over"));
+}
+
+/// A map of each kind that differs over its terrain; holes are far below the 99 % of the ground without any.
+#[test]
+fn val_maps_and_sparse_holes_are_drawn() {
+    let (mut data, mut shelf) = made_up::parts(1, 40);
+    data.terrains.retain(|t| t.terrain_id == "d2.30-0000");
+    let path = data.terrains[0].path.clone();
+    let grid = shelf.grids.get_mut(&path).unwrap();
+    grid.values.iter_mut().enumerate().for_each(|(k, z)| *z = if k == 820 { -3.0 } else { 0.01 * libm::sin(k as f64) });
+    let heights = grid.clone();
+    shelf.grids.insert("terrain/d2.30-0000.albedo.tif".into(), heights.map(|z| 0.2 + z));
+    shelf.grids.insert("terrain/d2.30-0000.rock-potential.tif".into(), heights.map(|_| 0.069));
+    data.files = Box::new(shelf);
+    let (files, summary) = report(&data);
+    assert_sound(&files);
+    assert!(summary.figures.iter().any(|f| f == "map-albedo-d2.30-0000"));
+    assert!(!summary.figures.iter().any(|f| f.starts_with("map-rock-potential")));
+    assert!(files["index.html"].contains("map albedo: albedo."));
+    assert!(files["figures/relief-d2.30-0000.svg"].contains(">−3.00<"));
+}
+
+/// A texture whose covariance the study states is of no fit.
+#[test]
+fn val_stated_covariances_are_no_fit() {
+    let mut data = made_up::full(1, 24);
+    let base = data.terrains.iter().find(|t| t.stage == "terrain").unwrap().clone();
+    let params = format!(r#"{{"fit": {{"model": "exponential"}}, "onto": "{}"}}"#, base.terrain_id);
+    data.terrains.push(TerrainRow { terrain_id: "snow".into(), stage: "texture".into(), params, ..base });
+    assert!(report(&data).0["index.html"].contains("with a texture of its stated covariance; same"));
 }
 
 /// Rows of a file of numbers.

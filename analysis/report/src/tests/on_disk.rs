@@ -104,6 +104,18 @@ fn val_hypotheses_are_read() {
     assert!(error.to_string().contains("margin"), "{error}");
 }
 
+/// The disk of the class maps is that of the study, whole numbers too.
+#[test]
+fn val_roughness_is_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let builder = assembled(&folder.path().join("release"));
+    let staging = builder.staging().to_owned();
+    let radius_m = || crate::data::Data::open(&staging).unwrap().study.roughness.closing_radius_m;
+    assert_eq!(radius_m(), 0.57);
+    fs::write(staging.join("study.toml"), format!("{STUDY}[roughness]\nclosing_radius_m = 1\n")).unwrap();
+    assert_eq!(radius_m(), 1.0);
+}
+
 /// A companion that is not what it should be is refused in one sentence.
 #[test]
 fn val_unusable_companions_are_refused() {

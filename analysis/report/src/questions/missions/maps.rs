@@ -4,7 +4,7 @@ use crate::ReportError;
 use crate::content::{Figure, Numbers, slug};
 use crate::data::{Data, Group};
 use crate::questions::outcome;
-use crate::questions::relief::{MAP_WIDTH, extent};
+use crate::questions::relief::{MAP_WIDTH, class_map_words, extent};
 use crate::questions::sql;
 use crate::render::chart::{Entry, Mark};
 use crate::render::hillshade::exaggeration;
@@ -92,10 +92,11 @@ fn figure(data: &Data, drawn: &Drawn) -> Result<Option<Figure>, ReportError> {
         id,
         title: format!("Missions, group {group}."),
         caption: format!(
-            "{}: {} of {} reached their goal. Closed class map over the relief.",
+            "{}: {} of {} reached their goal. On its {} over the relief.",
             terrain.terrain_id,
             set::count(counts[0]),
-            set::count(missions.len())
+            set::count(missions.len()),
+            class_map_words(data)
         ),
         description: format!("Map of missions, {}; missions by outcome: {}.", extent(&codes), outcomes.join(", ")),
         svg: map.svg,

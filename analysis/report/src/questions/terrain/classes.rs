@@ -1,12 +1,12 @@
 //! Roughness classes: their shares by group, and class maps.
 
-use super::{median, representative};
+use super::{median, representative, too_small};
 use crate::ReportError;
 use crate::content::{Figure, Numbers, count, number, slug, text};
 use crate::data::{Data, Group};
 use crate::papers;
 use crate::questions::clusters::band;
-use crate::questions::relief::{MAP_WIDTH, extent};
+use crate::questions::relief::{MAP_WIDTH, class_map_words, extent};
 use crate::render::axis::Axis;
 use crate::render::chart::{Entry, Mark, RowLabel, Rows, WIDTH};
 use crate::render::hillshade::exaggeration;
@@ -47,12 +47,26 @@ fn shares(data: &Data, groups: &[Group<TerrainRow>]) -> Option<Figure> {
     if known.is_empty() {
         return None;
     }
+    let small: Vec<&Group<TerrainRow>> = groups.iter().filter(|g| all_too_small(g)).collect();
     let label = |g: &&Group<TerrainRow>| RowLabel { name: g.name.clone(), detail: format!("n = {}", g.rows.len()) };
-    let labels: Vec<RowLabel> = known.iter().map(label).collect();
+    let labels: Vec<RowLabel> = known.iter().chain(&small).map(label).collect();
     let bars = bars(data, &known);
     let mut rows = Rows::new(&labels, 84.0, (Axis::linear(0.0, 100.0), "share of the area, %"), &legend(data, &bars));
     bars.iter().for_each(|bar| share_bar(&mut rows, bar));
+    (known.len()..labels.len()).for_each(|row| say_too_small(&mut rows, row));
     Some(shares_figure(data, rows, &known, &bars))
+}
+
+fn all_too_small(group: &Group<TerrainRow>) -> bool {
+    group.rows.iter().all(|t| too_small(t))
+}
+
+/// The words in place of bars.
+fn say_too_small(rows: &mut Rows, row: usize) {
+    if let Some(x) = rows.x.clamped(0.0) {
+        let at = (x + 6.0, rows.centre(row) + 4.3);
+        rows.svg.text(at, Anchor::Start, Paint::Muted, "surface too small: nothing within the border");
+    }
 }
 
 /// Median share of a class in a group, per cent, and what stands beside it.
@@ -199,7 +213,7 @@ fn map(data: &Data, group: &Group<TerrainRow>) -> Result<Option<Figure>, ReportE
     Ok(Some(Figure {
         id: slug(&format!("classes-{}", terrain.terrain_id)),
         title: format!("Classes, group {}.", group.name),
-        caption: format!("{}, closed class map over its relief.", terrain.terrain_id),
+        caption: format!("{}: {} over its relief.", terrain.terrain_id, class_map_words(data)),
         description: format!("Map of roughness classes, {}.", extent(&codes)),
         svg: map.svg,
         numbers,

@@ -1,6 +1,7 @@
 //! Which terrains the release holds: relief, classes, spectra, heights, by group; and the figures of every surface.
 
 mod classes;
+mod maps;
 mod reliefs;
 mod spectra;
 
@@ -11,6 +12,7 @@ use crate::data::{Data, Group};
 use crate::render::number as set;
 use sastrugi_numeric::sums;
 use sastrugi_schemas::tables::TerrainRow;
+use std::collections::BTreeSet;
 
 /// What figures of groups are computed from.
 const TERRAINS: &str = "select * from 'tables/terrains/*.parquet' where stage = 'terrain'";
@@ -20,6 +22,8 @@ pub const QUESTION: Question = Question { id: "terrain", name: "Terrain", title:
 
 /// Groups of one family for which three terrains are drawn; with more, one each.
 const GROUPS_WITH_THREE: usize = 3;
+/// Largest relief over the smallest among groups that share a range of colours.
+const RELIEFS_MAX: f64 = 4.0;
 /// Groups that are drawn at all; every group is in the tables.
 const GROUPS_MAX: usize = 12;
 
@@ -30,34 +34,100 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     }
     let drawn = &groups[..groups.len().min(GROUPS_MAX)];
     let mut blocks = vec![Block::Text(introduction(&groups)), Block::Table(medians(&groups))];
+    blocks.extend(without_shares(&groups).map(Block::Text));
     if drawn.len() < groups.len() {
         blocks.push(Block::Text(format!(
             "The first {GROUPS_MAX} of {} groups are drawn; all are in the tables.",
             groups.len()
         )));
     }
-    let families = families(drawn);
-    push(&mut blocks, "Relief", reliefs::figures(data, &families)?);
+    let (of_shape, of_heights) = (families(drawn, alike_in_shape), families(drawn, alike_in_heights));
+    push(&mut blocks, "Relief", reliefs::figures(data, &of_heights)?);
+    push(&mut blocks, "Maps", maps::figures(data, drawn)?);
     push(&mut blocks, "Roughness classes", classes::figures(data, drawn)?);
-    push(&mut blocks, "Spectra", families.iter().flat_map(|f| spectra::spectra(data, f)).collect());
-    push(&mut blocks, "Heights", families.iter().flat_map(|f| spectra::distributions(data, f)).collect());
+    push(&mut blocks, "Spectra", of_shape.iter().flat_map(|f| spectra::spectra(data, f)).collect());
+    push(&mut blocks, "Heights", of_heights.iter().flat_map(|f| spectra::distributions(data, f)).collect());
     blocks.push(Block::FoldedTable(all(data)));
     blocks.push(Block::FoldedTable(surfaces(data)));
     Ok(blocks)
 }
 
-/// Groups of one raster size and cell: what can be drawn in one range of heights and on common axes.
-fn families<'a>(groups: &[Group<'a, TerrainRow>]) -> Vec<Vec<Group<'a, TerrainRow>>> {
-    let shape =
-        |g: &Group<TerrainRow>| g.rows.first().map(|t| (t.rows, t.cols, t.cell_x_m.to_bits(), t.cell_y_m.to_bits()));
+/// Groups gathered into families: each joins the first family that it is alike to.
+fn families<'a>(
+    groups: &[Group<'a, TerrainRow>],
+    alike: impl Fn(&[Group<TerrainRow>], &Group<TerrainRow>) -> bool,
+) -> Vec<Vec<Group<'a, TerrainRow>>> {
     let mut families: Vec<Vec<Group<TerrainRow>>> = Vec::new();
     for group in groups {
-        match families.iter_mut().find(|f| shape(&f[0]) == shape(group)) {
+        match families.iter_mut().find(|family| alike(family, group)) {
             Some(family) => family.push(group.clone()),
             None => families.push(vec![group.clone()]),
         }
     }
     families
+}
+
+/// Rows, columns and cell of a raster.
+type Shape = (i64, i64, u64, u64);
+
+fn shape(terrain: &TerrainRow) -> Shape {
+    (terrain.rows, terrain.cols, terrain.cell_x_m.to_bits(), terrain.cell_y_m.to_bits())
+}
+
+fn shapes(rows: &[&TerrainRow]) -> BTreeSet<Shape> {
+    rows.iter().map(|t| shape(t)).collect()
+}
+
+/// One raster size and cell, of every terrain: spectra over the same frequencies, on common axes.
+fn alike_in_shape(family: &[Group<TerrainRow>], group: &Group<TerrainRow>) -> bool {
+    family.iter().all(|g| shapes(&g.rows) == shapes(&group.rows))
+}
+
+/// Besides, heights that overlap, over ranges within a factor of each other: what one range of colours shows. A piece of measured ground
+/// hundreds of metres up would leave no colours to terrains about 0, and hills none to potholes among them.
+fn alike_in_heights(family: &[Group<TerrainRow>], group: &Group<TerrainRow>) -> bool {
+    let (a, b) = (heights(family), heights(std::slice::from_ref(group)));
+    let [relief_a, relief_b] = [a, b].map(|[low, high]| high - low);
+    let overlap = a[0] <= b[1] && b[0] <= a[1];
+    alike_in_shape(family, group) && overlap && relief_a.max(relief_b) <= RELIEFS_MAX * relief_a.min(relief_b)
+}
+
+/// Lowest and highest height of all terrains.
+fn heights(groups: &[Group<TerrainRow>]) -> [f64; 2] {
+    let rows = groups.iter().flat_map(|g| &g.rows);
+    rows.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], t| [low.min(t.height_min_m), high.max(t.height_max_m)])
+}
+
+/// True when no cell is as far from the edges as the border that shares leave out.
+fn too_small(terrain: &TerrainRow) -> bool {
+    let side_m = (terrain.rows as f64 * terrain.cell_y_m).min(terrain.cols as f64 * terrain.cell_x_m);
+    !terrain.share_low.is_finite() && 0.5 * side_m < terrain.share_border_m
+}
+
+/// Which terrains have no shares, and why; `None` when all that could have some do.
+fn without_shares(groups: &[Group<TerrainRow>]) -> Option<String> {
+    let small: Vec<&TerrainRow> = groups.iter().flat_map(|g| &g.rows).copied().filter(|t| too_small(t)).collect();
+    let mut names: Vec<String> = small.iter().take(GROUPS_MAX).map(|t| t.terrain_id.clone()).collect();
+    if small.len() > names.len() {
+        names.push(format!("and {} more", small.len() - names.len()));
+    }
+    let border = borders(&small);
+    (!small.is_empty())
+        .then(|| format!("No shares of {}: surface too small, nothing lies within {border}.", names.join(", ")))
+}
+
+/// The borders that the shares of these terrains leave out, in words.
+fn borders(terrains: &[&TerrainRow]) -> String {
+    let mut borders: Vec<f64> = terrains.iter().map(|t| t.share_border_m).filter(|b| b.is_finite()).collect();
+    borders.sort_by(f64::total_cmp);
+    borders.dedup();
+    match borders[..] {
+        [] => "the border".into(),
+        [one] => format!("a border of {} m", set::plain(one, 3)),
+        [least, .., most] => {
+            format!("a border of {} to {} m", set::plain(least, 3), set::plain(most, 3))
+        }
+    }
 }
 
 fn push(blocks: &mut Vec<Block>, heading: &str, figures: Vec<Figure>) {
@@ -70,10 +140,11 @@ fn introduction(groups: &[Group<TerrainRow>]) -> String {
     let n: usize = groups.iter().map(|g| g.rows.len()).sum();
     let names: Vec<String> = groups.iter().map(|g| format!("{} ({})", g.name, g.rows.len())).take(GROUPS_MAX).collect();
     let more = if groups.len() > GROUPS_MAX { " …" } else { "" };
+    let border = borders(&groups.iter().flat_map(|g| &g.rows).copied().collect::<Vec<_>>());
     format!(
         "{} in {}: {}{more}. Roughness classes follow the largest gradient to the eight neighbours of a cell; \
-         shares leave out the border and are taken before the class map is closed. Reliefs are lit from the north-west; \
-         their colours end at the 1st and 99th percentile of the heights.",
+         shares leave out {border} and are taken before the class map is closed. Reliefs are lit from the north-west; \
+         their colours end at the 1st and 99th percentile of the heights, or at the lowest and the highest where these lie far beyond.",
         set::counted(n, "terrain"),
         set::counted(groups.len(), "group"),
         names.join(", ")

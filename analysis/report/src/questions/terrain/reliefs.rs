@@ -1,7 +1,7 @@
-//! Shaded relief: the smoothest, the middle and the roughest terrain of each group, in one light and, for groups of one
-//! raster size, in one range of colours.
+//! Shaded relief: the smoothest, the middle and the roughest terrain of each group, in one light and one range of colours for
+//! rasters of one size with heights alike.
 
-use super::{GROUPS_WITH_THREE, by_slope, median};
+use super::{GROUPS_WITH_THREE, by_slope, median, shape, shapes};
 use crate::ReportError;
 use crate::content::{Figure, slug};
 use crate::data::{Data, Group};
@@ -18,10 +18,20 @@ pub fn figures(data: &Data, families: &[Vec<Group<TerrainRow>>]) -> Result<Vec<F
     let mut figures = Vec::new();
     for family in families {
         let choices: Vec<Choice> = family.iter().flat_map(|g| choices(g, family.len())).collect();
-        let Some(style) = style(data, &choices)? else { continue };
-        for choice in &choices {
-            figures.extend(relief(data, &choice.0.path, Some(style), words(choice, style))?);
+        // A group may hold rasters of several scales: each has its own light and colours.
+        for shape_of in shapes(&choices.iter().map(|c| c.0).collect::<Vec<_>>()) {
+            let alike: Vec<&Choice> = choices.iter().filter(|c| shape(c.0) == shape_of).collect();
+            figures.extend(in_one_style(data, &alike)?);
         }
+    }
+    Ok(figures)
+}
+
+fn in_one_style(data: &Data, choices: &[&Choice]) -> Result<Vec<Figure>, ReportError> {
+    let mut figures = Vec::new();
+    let Some(style) = style(data, choices)? else { return Ok(figures) };
+    for choice in choices {
+        figures.extend(relief(data, &choice.0.path, Some(style), words(choice, style))?);
     }
     Ok(figures)
 }
@@ -39,7 +49,7 @@ fn choices<'a>(group: &Group<'a, TerrainRow>, groups: usize) -> Vec<Choice<'a>> 
 }
 
 /// One style for all; `None` when no terrain has its heightfield in the release.
-fn style(data: &Data, choices: &[Choice]) -> Result<Option<Style>, ReportError> {
+fn style(data: &Data, choices: &[&Choice]) -> Result<Option<Style>, ReportError> {
     let rows: Vec<&TerrainRow> = choices.iter().map(|c| c.0).collect();
     let paths: Vec<&str> = rows.iter().map(|t| t.path.as_str()).collect();
     let exaggeration = exaggeration(median(&rows, |t| t.rms_slope));

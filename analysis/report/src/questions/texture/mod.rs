@@ -90,7 +90,8 @@ fn on_base(data: &Data, texture: &TerrainRow, base: &str, fit: &str) -> Result<V
     };
     let mut figures = Vec::new();
     figures.extend(relief(data, base_path, style, words("base", "Base.", format!("{base}, as it was generated.")))?);
-    let caption = format!("{}: {base} with the texture of fit {fit}; same colours and light.", texture.terrain_id);
+    let covariance = if fit.is_empty() { "of its stated covariance".into() } else { format!("of fit {fit}") };
+    let caption = format!("{}: {base} with a texture {covariance}; same colours and light.", texture.terrain_id);
     figures.extend(relief(data, &texture.path, style, words("textured", "Base with texture.", caption))?);
     Ok(figures)
 }
