@@ -190,9 +190,14 @@ fn val_worlds_are_cut_out_and_dems_refined() {
     assert_eq!(call.code, 0, "{}", call.stderr);
     assert_eq!(ok_json(path, &["info", "fine.tif"])["rows"], 100);
     let call = refine("origin_m=[-9000,9000]");
-    assert!(call.code != 0 && call.stderr.contains("do not lie between"), "{} {}", call.code, call.stderr);
+    assert!(call.code == 65 && call.stderr.contains("do not lie between"), "{} {}", call.code, call.stderr);
     let kinds = ok(path, &["kinds", "planetary"]);
     assert!(kinds.contains("processes[texture].hurst") && kinds.contains("processes[rocks].coverage"), "{kinds}");
+    let kinds = ok(path, &["kinds", "compose"]);
+    for word in ["processes[].operation = \"mask\"", "processes[].region.from", "processes[].high_m"] {
+        assert!(kinds.contains(word), "{word} {kinds}");
+    }
+    assert!(ok(path, &["kinds", "spheroids"]).contains("preset = \"plain\""));
 }
 
 #[test]

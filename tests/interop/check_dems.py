@@ -15,6 +15,17 @@ import rasterio
 from common import ContentHash, expect, manifest, run
 
 
+# Units of the rasters beside the heights, and words of their descriptions.
+MAPS = {
+    "albedo": ("1", "light"),
+    "class": (None, "0 sand, 1 rock"),
+    "flux": ("1", "mean 1"),
+    "rms-measured": ("m", "RMS"),
+    "rms-predicted": ("m", "RMS"),
+    "rock-potential": ("1", "share of the ground"),
+}
+
+
 def read(path):
     """Heights as float64 with NaN for no data, and what the file says of them."""
     if path.suffix == ".npy":
@@ -38,6 +49,7 @@ def read(path):
                 "block": list(raster.block_shapes[0]),
                 "compression": raster.profile.get("compress"),
                 "unit": raster.units[0],
+                "description": raster.descriptions[0],
                 "point": raster.tags().get("AREA_OR_POINT") == "Point",
             }
     return heights, info
@@ -98,7 +110,10 @@ def check_release(release):
         if found["dtype"] != "float32":
             continue
         expect(found["block"] == [256, 256], f"{path} has blocks of {found['block']}")
-        expect(found["unit"] == "m", f"{path} has the unit {found['unit']}")
+        unit, words = next((MAPS[word] for word in MAPS if path.endswith(f".{word}.tif")), ("m", None))
+        expect(found["unit"] == unit, f"{path} has the unit {found['unit']}")
+        said = found["description"]
+        expect(said is None if words is None else words in (said or ""), f"{path} has the description {said}")
         expect(not found["point"], f"{path} is PixelIsPoint")
         recorded = artifact.get("content_sha256")
         expect(recorded in (None, found["heights_sha256"]), f"{path}: heights do not have the manifest's content hash")

@@ -25,6 +25,8 @@ from common import expect, manifest, run
 # Stages that only take files into the release.
 COPIES = {"original", "mask"}
 PARTS = ["train", "validation", "test"]
+# Rasters beside the heights.
+MAPS = ["albedo", "class", "flux", "rms-measured", "rms-predicted", "rock-potential"]
 # Tables of more files are a set of files only; their hashes are in the manifest.
 DESCRIBED_FILES = 64
 
@@ -102,12 +104,15 @@ def check_references(release, sets):
 def check_distribution(release, metadata):
     """Every file of the release is a file object with its hash, or in a set; every set has a file."""
     objects = {file.content_url: file.sha256 for file in metadata.file_objects}
-    patterns = {file_set.id: file_set.includes for file_set in metadata.file_sets}
+    patterns = {file_set.id: (file_set.includes, file_set.excludes or []) for file_set in metadata.file_sets}
     found = set()
     for path in sorted(path for path in release.rglob("*") if path.is_file()):
         name = str(path.relative_to(release))
-        holders = {key for key, includes in patterns.items() if any(fnmatch.fnmatchcase(name, one) for one in includes)}
+        matches = lambda patterns: any(fnmatch.fnmatchcase(name, one) for one in patterns)
+        holders = {key for key, (includes, excludes) in patterns.items() if matches(includes) and not matches(excludes)}
         found |= holders
+        map_of = [word for word in MAPS if name.startswith("terrain/") and name.endswith(f".{word}.tif")]
+        expect(not map_of or holders == {f"map-{map_of[0]}-files"}, f"croissant.json: {name} is in {holders}")
         if name in objects:
             sha256 = hashlib.sha256(path.read_bytes()).hexdigest()
             expect(objects.pop(name) == sha256, f"croissant.json: the hash of {name} is wrong")

@@ -64,7 +64,8 @@ fn val_ros_reads_the_bags() {
     assert_eq!(call.code, 0, "{}{}", call.stdout, call.stderr);
 }
 
-/// `--cog` and `geotiff = "cog"`: valid for rio-cogeo, and the heights of the plain file.
+/// `--cog` and `geotiff = "cog"`: valid for rio-cogeo, and the heights of the plain file; maps beside them with their units, and in file
+/// sets of their own.
 #[test]
 fn val_cloud_optimised_files_are_valid() {
     let Some(python) = python() else { return };
@@ -84,9 +85,16 @@ fn val_cloud_optimised_files_are_valid() {
         let call = sastrugi_in(path, &["run", "study.toml", "-o", name, "--quiet"]);
         assert_eq!(call.code, 0, "{}", call.stderr);
     }
-    let files = ["cog.tif", "plain.tif", "cog/terrain/t.tif", "plain/terrain/t.tif"].map(|name| path.join(name));
-    let call = check(&python, "check_cog.py", &files.each_ref().map(PathBuf::as_path));
+    let released = ["t", "mars", "mars.class", "mars.albedo", "mars.rock-potential"];
+    let released = released.map(|id| ["cog", "plain"].map(|how| path.join(how).join(format!("terrain/{id}.tif"))));
+    let files = [["cog.tif", "plain.tif"].map(|name| path.join(name))].into_iter().chain(released);
+    let files: Vec<PathBuf> = files.flatten().collect();
+    let call = check(&python, "check_cog.py", &files.iter().map(PathBuf::as_path).collect::<Vec<_>>());
     assert_eq!(call.code, 0, "{}{}", call.stdout, call.stderr);
+    for script in ["check_dems.py", "check_metadata.py"] {
+        let call = check(&python, script, &[&path.join("cog")]);
+        assert_eq!(call.code, 0, "{script}: {}{}", call.stdout, call.stderr);
+    }
     let call = sastrugi_in(path, &["compare", "plain", "cog", "--json", "--quiet"]);
     let compared: Value = serde_json::from_str(&call.stdout).unwrap();
     assert_eq!(compared["answer"], "same");
@@ -154,7 +162,9 @@ fn val_simulators_see_the_terrain() {
 
 /// A terrain of more than two tiles a side.
 const LARGE_TERRAIN: &str = "[study]\nname = \"large\"\nseed = 7\ndate = \"2026-11-22\"\ngeotiff = \"HOW\"\n\n\
-    [[terrain]]\nid = \"t\"\nkind = \"weierstrass_mandelbrot\"\nsize_px = [600, 531]\ncell_m = 0.2\nfrequencies = 64\n";
+    [[terrain]]\nid = \"t\"\nkind = \"weierstrass_mandelbrot\"\nsize_px = [600, 531]\ncell_m = 0.2\nfrequencies = 64\n\n\
+    [[terrain]]\nid = \"mars\"\nkind = \"planetary\"\nsize_px = [600, 531]\ncell_m = 0.05\n\
+    processes = [{ kind = \"texture\" }, { kind = \"rocks\" }, { kind = \"albedo\" }]\n";
 
 /// More terrains than Croissant describes files of one table: `samples` is a set of files, and every record is still found.
 #[test]

@@ -1,5 +1,6 @@
 //! Exit codes and the one message of a failure.
 
+use crate::output::warn;
 use miette::{GraphicalReportHandler, GraphicalTheme, LabeledSpan, MietteDiagnostic, NamedSource, Report};
 use sastrugi_stages::Error;
 use std::io::IsTerminal;
@@ -65,7 +66,7 @@ impl Failure {
         let code = self.code();
         match self.0 {
             Error::Study { name, text, error } => print_study_error(&name, &text, &error),
-            Error::Usage(m) | Error::Input(m) | Error::Failed(m) | Error::Retry(m) => eprintln!("sastrugi: {m}"),
+            Error::Usage(m) | Error::Input(m) | Error::Failed(m) | Error::Retry(m) => warn(&format!("sastrugi: {m}")),
         }
         code.into()
     }
@@ -91,7 +92,7 @@ fn print_study_error(name: &str, text: &str, error: &sastrugi_stages::study::Stu
     let mut rendered = String::new();
     let handler = GraphicalReportHandler::new_themed(theme).with_width(100);
     match handler.render_report(&mut rendered, report.as_ref()) {
-        Ok(()) => eprint!("sastrugi: the study is refused\n{rendered}"),
-        Err(_) => eprintln!("sastrugi: {name}: {}", error.message),
+        Ok(()) => warn(&format!("sastrugi: the study is refused\n{}", rendered.trim_end_matches('\n'))),
+        Err(_) => warn(&format!("sastrugi: {name}: {}", error.message)),
     }
 }

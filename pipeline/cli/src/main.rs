@@ -16,7 +16,7 @@ fn main() -> ExitCode {
         Err(error) => return refuse_arguments(&error),
     };
     if let Err(error) = ctrlc::set_handler(interrupted) {
-        eprintln!("sastrugi: note: Ctrl-C will not be announced: {error}");
+        output::warn(&format!("sastrugi: note: Ctrl-C will not be announced: {error}"));
     }
     if let Err(failure) = verbs::start_threads(arguments.common.threads) {
         return failure.report();
@@ -36,7 +36,9 @@ fn refuse_arguments(error: &clap::Error) -> ExitCode {
 
 /// Every file appears whole or not at all, so the process may end here and now.
 fn interrupted() {
-    eprintln!("\nsastrugi: interrupted; nothing half-written bears its name, and a run goes on from what it finished");
+    output::warn(
+        "\nsastrugi: interrupted; nothing half-written bears its name, and a run goes on from what it finished",
+    );
     std::process::exit(i32::from(Code::Retry as u8));
 }
 

@@ -1,4 +1,4 @@
-//! Results on stdout: JSON for machines, aligned lines for people.
+//! Results on stdout: JSON for machines, aligned lines for people; messages on stderr.
 
 use crate::failure::Failure;
 use serde_json::Value;
@@ -21,6 +21,11 @@ pub fn print(json: bool, value: &Value, text: &str) -> Result<(), Failure> {
         Err(e) if e.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
         other => other.map_err(Failure::failed),
     }
+}
+
+/// A line on stderr. Whoever reads it may have gone away: that is no reason to stop.
+pub fn warn(line: &str) {
+    drop(writeln!(std::io::stderr(), "{line}"));
 }
 
 /// Rows of cells in aligned columns.

@@ -1,5 +1,6 @@
 //! Progress of a run on stderr: a bar with ETA on a terminal, plain lines otherwise, nothing but failures when quiet.
 
+use crate::output::warn;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use sastrugi_stages::jobs::ItemRef;
 use sastrugi_stages::runner::progress::{End, Progress};
@@ -48,8 +49,8 @@ impl Teller {
 
     fn print(&self, line: &str) {
         match &self.bar {
-            Some(bar) => bar.suspend(|| eprintln!("{line}")),
-            None => eprintln!("{line}"),
+            Some(bar) => bar.suspend(|| warn(line)),
+            None => warn(line),
         }
     }
 

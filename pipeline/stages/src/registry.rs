@@ -196,7 +196,7 @@ impl Builder<'_> {
     /// When it is taken.
     pub fn claim(&mut self, entry: &Entry<'_>, section: &'static str, id: &str) -> Result<(), StudyError> {
         let ending = id.rsplit_once('.').map_or("", |(_, ending)| ending);
-        if RESERVED.contains(&ending) || sastrugi_terrain::MAP_NAMES.contains(&ending) {
+        if RESERVED.contains(&ending) || sastrugi_terrain::MAPS.iter().any(|map| map.name == ending) {
             return Err(
                 entry.error("id", format!("the id \"{id}\" ends in .{ending}, which names files of the release"))
             );
@@ -309,7 +309,9 @@ pub fn unknown_id<'s>(entry: &Entry<'_>, key: &str, id: &str, known: impl Iterat
     let known: Vec<&str> = known.map(String::as_str).collect();
     let nearest = crate::study::keys::nearest(id, known.iter().copied()).map(|n| format!("did you mean \"{n}\"?"));
     let list = if known.is_empty() { "there are none".to_owned() } else { format!("there are {}", known.join(", ")) };
-    entry.error(key, format!("`{key}` names \"{id}\", which no item has")).with_help(Some(nearest.unwrap_or(list)))
+    entry
+        .error(key, format!("`{key}` names \"{id}\", which no item before it has"))
+        .with_help(Some(nearest.unwrap_or(list)))
 }
 
 /// A study's items.

@@ -1,7 +1,8 @@
 //! Files that appear complete or not at all: written beside their place under a name no artifact has, brought to disk,
 //! renamed, and the folder brought to disk.
 
-use std::fs::{self, File};
+use std::ffi::OsStr;
+use std::fs::{self, File, TryLockError};
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -76,8 +77,9 @@ impl AtomicFile {
         let writer = self.writer.take().ok_or_else(closed)?;
         let file = writer.into_inner().map_err(io::IntoInnerError::into_error)?;
         file.sync_all()?;
-        drop(file);
         fs::rename(&self.temporary, &self.path)?;
+        // Its lock kept the file from being cleared until it had its name.
+        drop(file);
         if self.in_draft { Ok(()) } else { sync_folder(folder_of(&self.path)) }
     }
 
@@ -137,29 +139,57 @@ fn folder_of(path: &Path) -> &Path {
 fn temporary_file(folder: &Path) -> io::Result<(File, PathBuf)> {
     static COUNT: AtomicU64 = AtomicU64::new(0);
     loop {
-        // Unique in this folder among living processes and their threads.
+        // Unique in this folder among living processes of this machine and their threads.
         let count = COUNT.fetch_add(1, Ordering::Relaxed);
         let path = folder.join(format!("{TEMPORARY_PREFIX}{}-{count}", std::process::id()));
-        let file = File::options().read(true).write(true).create(true).truncate(true).open(&path)?;
-        // A file system without locks has no clearing either, which needs the lock.
-        let locked = file.try_lock().is_ok();
-        if !locked || path.exists() {
-            return Ok((file, path));
+        let file = match File::options().read(true).write(true).create_new(true).open(&path) {
+            // Of a killed process that had this number, or of a living one in another container or machine.
+            Err(e) if e.kind() == io::ErrorKind::AlreadyExists => continue,
+            opened => opened?,
+        };
+        match file.try_lock() {
+            Ok(()) if is_at(&file, &path) => return Ok((file, path)),
+            // Cleared, or about to be, between its making and its lock; another name then.
+            Ok(()) | Err(TryLockError::WouldBlock) => {}
+            // A file system without locks has no clearing either, which needs the lock.
+            Err(TryLockError::Error(_)) => return Ok((file, path)),
         }
-        // Cleared between its making and its lock; another name then.
     }
 }
 
+/// True while the path leads to this open file.
+#[cfg(unix)]
+fn is_at(file: &File, path: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    let identity = |data: fs::Metadata| (data.dev(), data.ino());
+    file.metadata().is_ok_and(|open| fs::symlink_metadata(path).is_ok_and(|there| identity(open) == identity(there)))
+}
+
+/// True while the path leads to this open file, as far as its name is unique.
+#[cfg(not(unix))]
+fn is_at(_: &File, path: &Path) -> bool {
+    path.exists()
+}
+
+/// True for the name of a file under construction, or of what a killed process left of one.
+pub(crate) fn is_temporary(name: &OsStr) -> bool {
+    name.to_string_lossy().starts_with(TEMPORARY_PREFIX)
+}
+
 /// Removes what killed processes left under construction in the folder of `path`. Files of living processes are locked and
-/// stay.
+/// stay; one that is not locked yet is made again by its process under another name.
 pub fn clear_leftovers(path: &Path) {
     let entries = fs::read_dir(folder_of(path)).into_iter().flatten().flatten();
-    let leftovers = entries.filter(|e| e.file_name().to_string_lossy().starts_with(TEMPORARY_PREFIX));
-    for entry in leftovers {
-        // What cannot be opened, locked or removed stays: it is harmless and bears no artifact's name.
-        if File::open(entry.path()).is_ok_and(|file| file.try_lock().is_ok()) {
-            let _ = fs::remove_file(entry.path());
-        }
+    entries.filter(|entry| is_temporary(&entry.file_name())).for_each(|entry| clear(&entry.path()));
+}
+
+/// Removes a file that no process has locked. What cannot be opened, locked or removed stays: it is harmless and bears no
+/// artifact's name.
+fn clear(path: &Path) {
+    let Ok(file) = File::open(path) else { return };
+    // The lock is held until the name is gone: its maker, who locks it next, then finds it cleared.
+    if file.try_lock().is_ok() && is_at(&file, path) {
+        let _ = fs::remove_file(path);
     }
 }
 
@@ -210,5 +240,48 @@ mod tests {
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 2);
         alive.commit().unwrap();
         assert!(path.exists());
+    }
+
+    /// Whoever clears the folder meanwhile, every file gets its name, whole.
+    #[test]
+    fn val_files_appear_while_others_clear() {
+        let folder = tempfile::tempdir().unwrap();
+        let make = |thread: usize| {
+            for k in 0..100 {
+                let path = folder.path().join(format!("{thread}-{k}"));
+                write(&Draft(folder.path()).file(&format!("{thread}-{k}")), b"whole").unwrap();
+                assert_eq!(fs::read(path).unwrap(), b"whole");
+            }
+        };
+        std::thread::scope(|scope| {
+            let makers: Vec<_> = (0..3).map(|thread| scope.spawn(move || make(thread))).collect();
+            std::thread::scope(|inner| {
+                for _ in 0..2 {
+                    inner.spawn(|| {
+                        while !makers.iter().all(|maker| maker.is_finished()) {
+                            clear_leftovers(&folder.path().join("x"));
+                        }
+                    });
+                }
+            });
+        });
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 300);
+    }
+
+    /// A name that is taken is not written to: its owner may live on another machine.
+    #[test]
+    fn val_names_that_are_taken_are_passed_over() {
+        let folder = tempfile::tempdir().unwrap();
+        let (first, name) = temporary_file(folder.path()).unwrap();
+        let word = name.file_name().unwrap().to_string_lossy().into_owned();
+        let count: u64 = word.rsplit('-').next().unwrap().parse().unwrap();
+        for next in count + 1..count + 100 {
+            let taken = format!("{TEMPORARY_PREFIX}{}-{next}", std::process::id());
+            let _ = File::options().write(true).create_new(true).open(folder.path().join(taken)).unwrap();
+        }
+        let (_, other) = temporary_file(folder.path()).unwrap();
+        let word = other.file_name().unwrap().to_string_lossy().into_owned();
+        assert!(word.rsplit('-').next().unwrap().parse::<u64>().unwrap() >= count + 100, "{word}");
+        assert!(is_at(&first, &name) && !is_at(&first, &other));
     }
 }

@@ -3,6 +3,9 @@
 use sastrugi_numeric::{Geometry, Grid, Streams};
 use serde_json::Value;
 
+/// Rough time of a cell of most generators, s.
+const SECONDS_PER_CELL: f64 = 4e-7;
+
 /// A generator with checked parameters.
 pub trait Generator: Send + Sync {
     /// Name in `kind = "..."`.
@@ -18,6 +21,11 @@ pub trait Generator: Send + Sync {
     /// Peak working memory of [`Self::generate`], its result included, bytes.
     fn memory_bytes(&self) -> u64;
 
+    /// Rough time of [`Self::generate`] on one core, s.
+    fn seconds(&self) -> f64 {
+        SECONDS_PER_CELL * self.geometry().len() as f64
+    }
+
     /// Sentences that a reader of the result should know, such as a size that was rounded down.
     fn notes(&self) -> Vec<String>;
 
@@ -32,18 +40,19 @@ pub trait Generator: Send + Sync {
     /// A [`TerrainError`] where the parameters are possible one by one but give no usable surface together.
     fn generate(&self, streams: &Streams, bases: &[Grid]) -> Result<Terrain, TerrainError>;
 
-    /// As [`Self::generate`], and the heights are finite and not the same everywhere, whatever the parameters.
+    /// As [`Self::generate`], and the heights are finite and not the same everywhere, whatever the parameters: in single precision, in
+    /// which files hold them.
     ///
     /// # Errors
     /// As [`Self::generate`]; heights beyond all numbers, or without relief.
     fn generate_checked(&self, streams: &Streams, bases: &[Grid]) -> Result<Terrain, TerrainError> {
         let made = self.generate(streams, bases)?;
         let part = "the heights";
-        if let Some(&value) = made.heights.values.iter().find(|z| !z.is_finite()) {
+        if let Some(&value) = made.heights.values.iter().find(|z| !(**z as f32).is_finite()) {
             return Err(TerrainError::Unrepresentable { part, figure: "one of them", value });
         }
         match made.heights.range() {
-            Some((low, high)) if high > low => Ok(made),
+            Some((low, high)) if high as f32 > low as f32 => Ok(made),
             _ => Err(TerrainError::Level { part }),
         }
     }
@@ -63,8 +72,30 @@ pub struct Base {
     pub name: String,
 }
 
-/// Names of every map: with them, and a dot before them, no id ends.
-pub const MAP_NAMES: [&str; 6] = ["albedo", "class", "flux", "rms-measured", "rms-predicted", "rock-potential"];
+/// What a map shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MapKind {
+    /// Name; its file is called `<id>.<name>.tif`, and no id ends so.
+    pub name: &'static str,
+    /// Unit of the values, `1` for plain numbers; empty for codes, which have no means.
+    pub unit: &'static str,
+    /// What the values are.
+    pub description: &'static str,
+}
+
+/// Every map.
+pub const MAPS: [MapKind; 6] = [
+    MapKind { name: "albedo", unit: "1", description: "albedo: share of the light that the ground gives back, 0 to 1" },
+    MapKind { name: "class", unit: "", description: "what the ground is: 0 sand, 1 rock" },
+    MapKind { name: "flux", unit: "1", description: "flux of the cascade that the heights integrate, mean 1" },
+    MapKind {
+        name: "rms-measured",
+        unit: "m",
+        description: "RMS of profiles in the band, in windows of three times its longest wavelength",
+    },
+    MapKind { name: "rms-predicted", unit: "m", description: "the same RMS by the rule that the roughness varies by" },
+    MapKind { name: "rock-potential", unit: "1", description: "share of the ground that all rocks may cover, 0 to 1" },
+];
 
 /// A heightfield, and what else its generator knows of it.
 #[derive(Clone, Debug, PartialEq)]
@@ -86,12 +117,18 @@ impl From<Grid> for Terrain {
 /// A raster beside the heights, on the same cells.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Map {
-    /// What it shows, one of [`MAP_NAMES`]; its file is called `<id>.<name>.tif`.
+    /// Name of one of [`MAPS`].
     pub name: &'static str,
-    /// Unit of the values, `1` for plain numbers; words for the codes of classes.
-    pub unit: &'static str,
-    /// The values.
+    /// The values; NaN where there are none.
     pub values: Grid,
+}
+
+impl Map {
+    /// What it shows.
+    pub fn kind(&self) -> MapKind {
+        let nameless = MapKind { name: self.name, unit: "", description: "" };
+        MAPS.into_iter().find(|kind| kind.name == self.name).unwrap_or(nameless)
+    }
 }
 
 /// Heights as 16-bit levels, as in a greyscale PNG: `height_m = (level - zero_level) * metres_per_level`.

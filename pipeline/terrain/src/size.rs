@@ -1,7 +1,7 @@
 //! The common size parameters `size_m`, `size_px` and `cell_m`.
 
 use sastrugi_numeric::Geometry;
-use sastrugi_schemas::ParameterError;
+use sastrugi_schemas::{ParameterError, shown};
 
 /// Fewest cells along a side.
 const MIN_SIDE_PX: u32 = 3;
@@ -63,6 +63,10 @@ impl Size {
         }
         if u64::from(x) * u64::from(y) > MAX_CELLS {
             return Err(ParameterError::new(key, format!("gives {x} x {y} cells; the most is 2^28 in all")));
+        }
+        if !self.geometry().size().iter().all(|side| side.is_finite()) {
+            let message = format!("is {}; sides of {x} x {y} such cells are no numbers", shown(self.cell_m));
+            return Err(ParameterError::new("cell_m", message));
         }
         Ok(self)
     }

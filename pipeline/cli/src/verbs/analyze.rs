@@ -3,7 +3,7 @@
 use crate::Verdict;
 use crate::args::{Analyze, Common};
 use crate::failure::{Code, Failure};
-use crate::output::{columns, print};
+use crate::output::{columns, print, warn};
 use sastrugi_schemas::tables::LogRow;
 use sastrugi_stages::Error;
 use sastrugi_stages::verbs::analyze::{Judged, Request, write};
@@ -41,10 +41,10 @@ pub fn analyze(args: &Analyze, common: &Common) -> Verdict {
     if judged.is_empty() {
         let mut refused = refused.into_iter();
         let first = refused.next().unwrap_or_else(|| Error::Usage("no logs".to_owned()));
-        refused.for_each(|error| eprintln!("sastrugi: {error}"));
+        refused.for_each(|error| warn(&format!("sastrugi: {error}")));
         return Err(first.into());
     }
-    refused.iter().for_each(|error| eprintln!("sastrugi: {error}"));
+    refused.iter().for_each(|error| warn(&format!("sastrugi: {error}")));
     let rows: Vec<LogRow> = judged.iter().map(|one| one.row.clone()).collect();
     args.output.as_ref().map(|path| write(path, &rows)).transpose()?;
     let record: Vec<_> = judged.iter().map(|one| json!({ "log": one.row, "notes": one.notes })).collect();

@@ -5,7 +5,8 @@ use crate::Verdict;
 use crate::args::{self, Common, Convert, Info};
 use crate::failure::{Code, Failure};
 use crate::output::{columns, print};
-use sastrugi_stages::verbs::{self, Read, Reading, describe_grid, numbers, read, read_as_it_is, transects};
+use sastrugi_stages::jobs::dem::to_metres;
+use sastrugi_stages::verbs::{self, Read, Reading, describe_grid, numbers, read_as_it_is, transects};
 use sastrugi_store::dem::simulators::{self, Fit};
 use sastrugi_store::dem::{self, Dem, DemError};
 use sastrugi_store::mcap;
@@ -39,19 +40,22 @@ pub fn convert(args: &Convert, common: &Common) -> Verdict {
     }
     let window = args.window.as_deref().map(|w| numbers::<4>("--window", w)).transpose()?;
     let reading = Reading { window, masks: args.masks.all(), ..reading(&args.reading)? };
+    args.simulator.map_or(Ok(()), |simulator| simulators::check_folder(&args.output, simulator)).map_err(failure)?;
+    let Read { dem, notes, .. } = read_as_it_is(&args.input, &reading)?;
+    let geographic = dem.info.crs.geographic;
     let in_metres = args.simulator.is_some() || format.is_some_and(dem::Format::in_metres);
-    let read = if in_metres { read } else { read_as_it_is };
-    let Read { dem: Dem { grid, info }, notes, .. } = read(&args.input, &reading)?;
+    let (Dem { grid, info }, converted) = if in_metres { to_metres(dem) } else { (dem, None) };
     let lost = match args.simulator {
         Some(simulator) => {
             let fit = if args.crop { Fit::Crop } else { Fit::Resample };
-            let export = simulators::export(&grid, simulator, fit).map_err(failure)?;
+            let export = if geographic { simulators::export_from_degrees } else { simulators::export };
+            let export = export(&grid, simulator, fit).map_err(failure)?;
             simulators::write(&args.output, &export).map_err(failure)?;
             export.notes
         }
         None => dem::write(&args.output, &grid, &info.crs, &options).map_err(failure)?,
     };
-    let notes: Vec<&String> = notes.iter().chain(&lost).collect();
+    let notes: Vec<&String> = notes.iter().chain(&converted).chain(&lost).collect();
     let mut text = format!("{output}: {} x {} cells", grid.rows(), grid.cols());
     notes.iter().for_each(|note| text.push_str(&format!("\n  note: {note}")));
     let result = json!({ "file": args.output, "grid": describe_grid(&grid), "notes": notes });

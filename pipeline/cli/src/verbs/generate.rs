@@ -57,7 +57,7 @@ fn made(common: &Common, result: &Value) -> Verdict {
     let grid = &result["grid"];
     let number = |v: &Value| v.as_f64().map_or_else(|| "none".to_owned(), |x| format!("{x:.4}"));
     let text = format!(
-        "{}: {} x {} cells of {} x {} m, heights {} to {} m{}",
+        "{}: {} x {} cells of {} x {} m, heights {} to {} m{}{}",
         result["file"].as_str().unwrap_or_default(),
         grid["rows"],
         grid["cols"],
@@ -65,10 +65,18 @@ fn made(common: &Common, result: &Value) -> Verdict {
         grid["cell"][1],
         number(&grid["height_min_m"]),
         number(&grid["height_max_m"]),
+        maps(&result["maps"]),
         notes(&result["notes"]),
     );
     print(common.json, result, &text)?;
     Ok(Code::Done)
+}
+
+/// The files of maps beside the heights.
+fn maps(all: &Value) -> String {
+    let text = |map: &Value, key: &str| map[key].as_str().unwrap_or_default().to_owned();
+    let lines = all.as_object().into_iter().flatten().map(|(_, map)| (text(map, "file"), text(map, "description")));
+    lines.map(|(file, description)| format!("\n  {file}: {description}")).collect()
 }
 
 fn notes(list: &Value) -> String {
@@ -167,12 +175,14 @@ fn ride(figures: &Ride) -> Vec<(&'static str, String)> {
         },
     );
     let class = f.iso_8608_class.map_or_else(|| "none".to_owned(), |c| format!("{c}, {:.3e} m3", f.iso_8608_psd_m3));
+    let extrapolated = f.power_law.as_ref().is_some_and(|law| !law.reaches_iso_8608());
+    let beyond = if extrapolated { ", beyond the fitted frequencies" } else { "" };
     let iri = [f.iri.along_x_m_km, f.iri.along_y_m_km];
     vec![
         ("RMS in the band", known(f.rms_m, format!("{:.5} m{along}", f.rms_m))),
         ("its band", format!("wavelengths of {min} to {max} m, detrender {}", f.detrender.name())),
         ("density", law),
-        ("ISO 8608 class", format!("{class} at 0.1 cycles/m")),
+        ("ISO 8608 class", format!("{class} at 0.1 cycles/m{beyond}")),
         ("IRI", known(iri[0].max(iri[1]), format!("{} m/km", both(iri, 2)))),
     ]
 }

@@ -40,37 +40,50 @@ fn describe(kind: &Kind) -> String {
     if rows.is_empty() { text } else { format!("{text}\n{}", columns(&rows)) }
 }
 
-/// Rows `name, default, description` of a schema's properties, tables opened, and lists of tables by the kind of table.
+/// Rows `name, default, description` of a schema's properties: tables opened, lists of tables as `name[]` or by the kind of table, and
+/// words with what each of them says.
 fn parameters(prefix: &str, schema: &Value, root: &Value, rows: &mut Vec<Vec<String>>) {
     let schema = resolve(schema, root);
     let defaults = schema.get("default");
     for (name, property) in schema.get("properties").and_then(Value::as_object).into_iter().flatten() {
-        let default = property.get("default").or_else(|| defaults.and_then(|d| d.get(name)));
-        let inner = resolve(property, root);
         if property.get("const").is_some() {
             continue;
         }
+        let inner = resolve(property, root);
+        let items = inner.get("items").map(|items| resolve(items, root));
+        let (tables, words) = (items.map_or_else(Vec::new, choices), words(inner));
+        let is_table = |schema: &Value| schema.get("properties").is_some();
+        let lists_tables = !tables.is_empty() || items.is_some_and(is_table);
+        let default = property.get("default").or_else(|| defaults.and_then(|d| d.get(name)));
+        let default = default.filter(|_| !is_table(inner) && !lists_tables).map(Value::to_string).unwrap_or_default();
         let description = if property.get("description").is_some() { text_of(property) } else { text_of(inner) };
-        let is_table = inner.get("properties").is_some();
-        let choices = choices(inner, root);
-        let is_plain = !is_table && choices.is_empty();
-        let default = default.filter(|_| is_plain).map(Value::to_string).unwrap_or_default();
         rows.push(vec![format!("  {prefix}{name}"), default, description]);
-        if is_table {
-            parameters(&format!("{prefix}{name}."), inner, root, rows);
+        for (word, text) in words {
+            rows.push(vec![format!("  {prefix}{name} = {word}"), String::new(), text]);
         }
-        for (kind, choice) in choices {
-            rows.push(vec![format!("  {prefix}{name}[{kind}]"), String::new(), text_of(choice)]);
-            parameters(&format!("{prefix}{name}[{kind}]."), choice, root, rows);
+        if is_table(inner) {
+            parameters(&format!("{prefix}{name}."), inner, root, rows);
+        } else if let Some(items) = items {
+            parameters(&format!("{prefix}{name}[]."), items, root, rows);
+        }
+        for (kind, table) in tables {
+            rows.push(vec![format!("  {prefix}{name}[{kind}]"), String::new(), text_of(table)]);
+            parameters(&format!("{prefix}{name}[{kind}]."), table, root, rows);
         }
     }
 }
 
-/// Kinds of the tables that a list may hold, with their schemas.
-fn choices<'a>(schema: &'a Value, root: &'a Value) -> Vec<(&'a str, &'a Value)> {
-    let items = schema.get("items").map(|items| resolve(items, root));
-    let all = items.and_then(|i| i.get("oneOf")).and_then(Value::as_array).into_iter().flatten();
+/// Kinds of the tables that a list of `items` may hold, with their schemas.
+fn choices(items: &Value) -> Vec<(&str, &Value)> {
+    let all = items.get("oneOf").and_then(Value::as_array).into_iter().flatten();
     all.filter_map(|c| Some((c.pointer("/properties/kind/const")?.as_str()?, c))).collect()
+}
+
+/// Words that a parameter may be, with what the schema says of each.
+fn words(schema: &Value) -> Vec<(String, String)> {
+    let all = schema.get("oneOf").and_then(Value::as_array).into_iter().flatten();
+    let described = all.filter(|word| word.get("description").is_some());
+    described.filter_map(|word| Some((word.get("const")?.to_string(), text_of(word)))).collect()
 }
 
 /// What a schema says of itself, on one line.
@@ -78,7 +91,11 @@ fn text_of(schema: &Value) -> String {
     schema.get("description").and_then(Value::as_str).unwrap_or_default().replace('\n', " ")
 }
 
+/// The schema that a reference stands for, also where there may be nothing in its place.
 fn resolve<'a>(schema: &'a Value, root: &'a Value) -> &'a Value {
+    let something =
+        schema.get("anyOf").and_then(Value::as_array).and_then(|any| any.iter().find(|s| s["type"] != "null"));
+    let schema = something.unwrap_or(schema);
     let target = schema.get("$ref").and_then(Value::as_str).and_then(|r| r.strip_prefix('#'));
     target.and_then(|path| root.pointer(path)).unwrap_or(schema)
 }

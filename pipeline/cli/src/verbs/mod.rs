@@ -59,7 +59,7 @@ fn options(writing: &Writing, output: &Path) -> Result<WriteOptions, Failure> {
         Compress::Deflate => Compression::Deflate,
         Compress::Zstd => Compression::Zstd,
     };
-    Ok(WriteOptions { compression, cloud_optimised: writing.cog })
+    Ok(WriteOptions { compression, cloud_optimised: writing.cog, ..WriteOptions::default() })
 }
 
 /// How a DEM is read.

@@ -11,9 +11,9 @@ use crate::study::{Entry, StudyError};
 use sastrugi_numeric::{Grid, Streams};
 use sastrugi_schemas::study::{GeoTiff, TerrainItem};
 use sastrugi_store::atomic::Target;
-use sastrugi_store::dem::{self, Crs};
+use sastrugi_store::dem::{self, Crs, Values, WriteOptions};
 use sastrugi_store::digest;
-use sastrugi_terrain::{Generator, Terrain};
+use sastrugi_terrain::{Generator, Map, MapKind, Terrain, TerrainError};
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -62,7 +62,7 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
                 stream: Some(streams.label()),
                 release_path: format!("terrain/{}.tif", one.id),
                 cells: generator.geometry().len() as u64,
-                cell_m: Some(generator.geometry().cell.into_iter().fold(f64::INFINITY, f64::min)),
+                cell_m: Some(generator.geometry().cell.into_iter().fold(0.0, f64::max)),
                 geometry: Some(generator.geometry()),
             };
             let geotiff = builder.study.head.geotiff;
@@ -142,16 +142,18 @@ impl Job for TerrainJob {
 
     fn estimate(&self) -> Estimate {
         let cells = self.generator.geometry().len() as f64;
-        Estimate { seconds: 4e-7 * cells, bytes: 3.0 * cells + self.exports.bytes(cells) }
+        Estimate { seconds: self.generator.seconds(), bytes: 3.0 * cells + self.exports.bytes() }
     }
 
     fn run(&self, work: &Work<'_>) -> Result<Outcome, JobError> {
         let (bases, crs) = self.read_bases(work)?;
         let made = generate(self.generator.as_ref(), &self.streams, &bases)?;
-        let mut products = vec![self.write(work, HEIGHTS, "", &made.heights, &crs)?];
+        let options = raster_options(self.geotiff);
+        let mut products = vec![self.write(work, HEIGHTS, "", &made.heights, &crs, &options)?];
         for map in &made.maps {
             let (file, ending) = (format!("{}.tif", map.name), format!(".{}", map.name));
-            products.push(self.write(work, &file, &ending, &map.values, &crs)?);
+            let options = WriteOptions { values: values_of(map), ..options };
+            products.push(self.write(work, &file, &ending, &map.values, &crs, &options)?);
         }
         let mut notes = self.generator.notes();
         notes.extend(made.notes);
@@ -180,10 +182,26 @@ impl TerrainJob {
     }
 
     /// Writes a raster that is released as `terrain/<id><ending>.tif`.
-    fn write(&self, work: &Work<'_>, file: &str, ending: &str, values: &Grid, crs: &Crs) -> Result<Product, JobError> {
-        dem::write(&work.output(file), values, crs, &raster_options(self.geotiff)).map_err(JobError::new)?;
+    fn write(
+        &self,
+        work: &Work<'_>,
+        file: &str,
+        ending: &str,
+        values: &Grid,
+        crs: &Crs,
+        options: &WriteOptions,
+    ) -> Result<Product, JobError> {
+        dem::write(&work.output(file), values, crs, options).map_err(JobError::new)?;
         let content = digest::heights(values);
         Ok(Product::released(file, format!("terrain/{}{ending}.tif", self.id), Some(content)))
+    }
+}
+
+/// How a map is written.
+pub fn values_of(map: &Map) -> Values {
+    match map.kind() {
+        MapKind { unit: "", description, .. } => Values::Codes { description },
+        MapKind { unit, description, .. } => Values::Figures { unit, description },
     }
 }
 
@@ -192,7 +210,11 @@ impl TerrainJob {
 /// # Errors
 /// When the generator has no result, or heights that are not finite or the same everywhere.
 pub fn generate(generator: &dyn Generator, streams: &Streams, bases: &[Grid]) -> Result<Terrain, JobError> {
-    generator.generate_checked(streams, bases).map_err(|e| JobError::new(format!("failed to {e}")))
+    generator.generate_checked(streams, bases).map_err(|e| {
+        let message = format!("failed to {e}");
+        // The surface below does not serve: another part of it, or another file, would.
+        if matches!(e, TerrainError::Base { .. }) { JobError::input(message) } else { JobError::new(message) }
+    })
 }
 
 /// Writes heights as 16-bit levels: the generator's own where it has them, else from lowest to highest. Returns how to read

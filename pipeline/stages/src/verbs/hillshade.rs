@@ -19,7 +19,6 @@ const PIXELS_MAX: u32 = 16384;
 /// # Errors
 /// Numbers out of range, or a file that cannot be written.
 pub fn hillshade(read: &Read, output: &Path, pixels: u32, factor: Option<f64>) -> Result<Value, Error> {
-    super::check_output(output)?;
     if !output.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("png")) {
         return Err(Error::Usage(format!("{}: the picture is a PNG; name it .png", output.display())));
     }

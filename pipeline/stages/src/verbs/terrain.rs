@@ -2,7 +2,7 @@
 
 use super::parameters;
 use crate::error::Error;
-use crate::jobs::terrain::{STAGE, generate, write_png16};
+use crate::jobs::terrain::{STAGE, generate, values_of, write_png16};
 use sastrugi_numeric::{Grid, Streams};
 use sastrugi_store::dem::{self, Crs, Format, WriteOptions};
 use sastrugi_terrain::Generator;
@@ -51,8 +51,11 @@ pub fn terrain(request: &Request<'_>) -> Result<Value, Error> {
     let mut maps = Map::new();
     for map in &made.maps {
         let path = request.output.with_extension(format!("{}.tif", map.name));
-        dem::write(&path, &map.values, &crs, &request.options).map_err(super::write_error)?;
-        maps.insert(map.name.to_owned(), json!({ "file": path.display().to_string(), "unit": map.unit }));
+        let options = WriteOptions { values: values_of(map), ..request.options };
+        dem::write(&path, &map.values, &crs, &options).map_err(super::write_error)?;
+        let kind = map.kind();
+        let map = json!({ "file": path.display().to_string(), "unit": kind.unit, "description": kind.description });
+        maps.insert(kind.name.to_owned(), map);
     }
     Ok(json!({
         "file": request.output.display().to_string(),

@@ -3,7 +3,7 @@
 //! One vertex per cell with data, at its centre; two triangles between four neighbours, counter-clockwise from above, whose common
 //! side runs from north-west to south-east. A triangle with a corner without data is left out.
 
-use super::Refusal;
+use super::{Refusal, check_single_precision};
 use sastrugi_numeric::Grid;
 use serde_json::json;
 use std::fmt::Write;
@@ -16,77 +16,90 @@ const UNSIGNED_INT: u32 = 5125;
 const ARRAY_BUFFER: u32 = 34962;
 const ELEMENT_ARRAY_BUFFER: u32 = 34963;
 
-/// Vertices (x east, y north, z up, m) and triangles.
-struct Mesh {
-    vertices: Vec<[f64; 3]>,
-    triangles: Vec<[u32; 3]>,
+/// Number of a cell without data, which has no vertex.
+const NO_VERTEX: u32 = u32::MAX;
+
+/// Vertices (x east, y north, z up, m) and triangles of a grid, made as they are asked for.
+struct Mesh<'a> {
+    grid: &'a Grid,
+    /// Where coordinates count from.
+    zero: [f64; 3],
+    /// For each cell, the number of its vertex.
+    numbers: Vec<u32>,
 }
 
-impl Mesh {
-    /// The grid with x and y counted from `zero`.
-    fn of(grid: &Grid, zero: [f64; 2]) -> Self {
-        let g = &grid.geometry;
-        let mut vertices = Vec::with_capacity(g.len());
-        let mut index = vec![None; g.len()];
-        for row in 0..g.rows {
-            for (col, &z) in grid.row(row).iter().enumerate().filter(|(_, z)| z.is_finite()) {
-                index[row * g.cols + col] = Some(vertices.len() as u32);
-                vertices.push([g.x(col) - zero[0], g.y(row) - zero[1], z]);
-            }
-        }
-        let mut triangles = Vec::new();
-        let mut add = |corners: [Option<u32>; 3]| {
-            if let [Some(a), Some(b), Some(c)] = corners {
-                triangles.push([a, b, c]);
-            }
-        };
-        for north in 0..g.rows.saturating_sub(1) {
-            for west in 0..g.cols.saturating_sub(1) {
-                let at = |row: usize, col: usize| index[row * g.cols + col];
-                let (nw, ne) = (at(north, west), at(north, west + 1));
-                let (sw, se) = (at(north + 1, west), at(north + 1, west + 1));
-                add([nw, sw, se]);
-                add([nw, se, ne]);
-            }
-        }
-        Self { vertices, triangles }
-    }
-
-    /// The grid from its south-west corner, for formats of single precision.
-    fn local(grid: &Grid) -> Result<Self, Refusal> {
-        let g = &grid.geometry;
-        if g.len() > MAX_CELLS {
-            let size = format!("{} x {} cells", g.cols, g.rows);
-            return Err(Refusal::new(format!("{size} are too many for a mesh, which takes {MAX_CELLS}; cut a window")));
-        }
-        let mesh = Self::of(grid, g.origin);
-        if mesh.triangles.is_empty() {
+impl<'a> Mesh<'a> {
+    /// The grid with coordinates counted from `zero`.
+    ///
+    /// # Errors
+    /// No triangle, or a height that does not fit in single precision.
+    fn of(grid: &'a Grid, zero: [f64; 3]) -> Result<Self, Refusal> {
+        check_single_precision(grid.values.iter().map(|z| z - zero[2]))?;
+        let mut count = 0..;
+        let numbers = grid.values.iter().map(|z| if z.is_finite() { count.next() } else { None });
+        let numbers = numbers.map(|number| number.unwrap_or(NO_VERTEX)).collect();
+        let mesh = Self { grid, zero, numbers };
+        if mesh.triangles().next().is_none() {
             return Err(Refusal::new("no three neighbouring cells hold data, so that there is no mesh"));
         }
         Ok(mesh)
     }
+
+    /// The grid from its south-west corner, for formats of single precision.
+    fn local(grid: &'a Grid) -> Result<Self, Refusal> {
+        let g = &grid.geometry;
+        if g.len() > MAX_CELLS {
+            let size = format!("{} x {} cells", g.cols, g.rows);
+            let limit = format!("which takes {MAX_CELLS}; choose a smaller size, or cut a window");
+            return Err(Refusal::new(format!("{size} are too many for a mesh, {limit}")));
+        }
+        Self::of(grid, [g.origin[0], g.origin[1], 0.0])
+    }
+
+    fn vertices(&self) -> impl Iterator<Item = [f64; 3]> {
+        let (g, [x, y, z]) = (&self.grid.geometry, self.zero);
+        let cells = self.grid.values.iter().enumerate().filter(|(_, height)| height.is_finite());
+        cells.map(move |(at, height)| [g.x(at % g.cols) - x, g.y(at / g.cols) - y, height - z])
+    }
+
+    fn triangles(&self) -> impl Iterator<Item = [u32; 3]> {
+        let g = &self.grid.geometry;
+        let squares = (1..g.rows).flat_map(move |south| (1..g.cols).map(move |east| south * g.cols + east));
+        let corners = squares.flat_map(move |se| {
+            let [nw, ne, sw, se] = [se - g.cols - 1, se - g.cols, se - 1, se].map(|at| self.numbers[at]);
+            [[nw, sw, se], [nw, se, ne]]
+        });
+        corners.filter(|triangle| !triangle.contains(&NO_VERTEX))
+    }
 }
 
 /// Wavefront, in the DEM's own coordinates.
-pub(super) fn obj(grid: &Grid) -> Vec<u8> {
-    let Mesh { vertices, triangles } = Mesh::of(grid, [0.0; 2]);
+pub(super) fn obj(grid: &Grid) -> Result<Vec<u8>, Refusal> {
+    obj_above(grid, 0.0)
+}
+
+/// Wavefront, in the DEM's own coordinates, with heights above `zero_m`: single precision then counts the relief, not the height
+/// above the sea.
+pub(super) fn obj_above(grid: &Grid, zero_m: f64) -> Result<Vec<u8>, Refusal> {
+    let mesh = Mesh::of(grid, [0.0, 0.0, zero_m])?;
     let mut text = String::from("# terrain mesh; x east, y north, z up, metres\n");
     // Writing to a string cannot fail.
-    for [x, y, z] in vertices {
+    for [x, y, z] in mesh.vertices() {
         let _ = writeln!(text, "v {x} {y} {}", z as f32);
     }
-    for [a, b, c] in triangles {
+    for [a, b, c] in mesh.triangles() {
         let _ = writeln!(text, "f {} {} {}", a + 1, b + 1, c + 1);
     }
-    text.into_bytes()
+    Ok(text.into_bytes())
 }
 
 /// Binary glTF, whose y points up: x east, y up, z south.
 pub(super) fn glb(grid: &Grid) -> Result<Vec<u8>, Refusal> {
-    let Mesh { vertices, triangles } = Mesh::local(grid)?;
-    let vertices: Vec<[f32; 3]> = vertices.into_iter().map(|[x, y, z]| [x as f32, z as f32, -y as f32]).collect();
-    let (low, high) = bounds(&vertices);
-    let (vertex_bytes, index_bytes) = (12 * vertices.len(), 12 * triangles.len());
+    let mesh = Mesh::local(grid)?;
+    let vertices = || mesh.vertices().map(|[x, y, z]| [x as f32, z as f32, -y as f32]);
+    let (low, high) = bounds(vertices());
+    let (vertex_count, triangle_count) = (grid.finite_count(), mesh.triangles().count());
+    let (vertex_bytes, index_bytes) = (12 * vertex_count, 12 * triangle_count);
     let scene = json!({
         "asset": { "version": "2.0", "generator": crate::PROGRAM },
         "scene": 0,
@@ -94,8 +107,8 @@ pub(super) fn glb(grid: &Grid) -> Result<Vec<u8>, Refusal> {
         "nodes": [{ "name": "terrain", "mesh": 0 }],
         "meshes": [{ "name": "terrain", "primitives": [{ "attributes": { "POSITION": 0 }, "indices": 1 }] }],
         "accessors": [
-            { "bufferView": 0, "componentType": FLOAT, "count": vertices.len(), "type": "VEC3", "min": low, "max": high },
-            { "bufferView": 1, "componentType": UNSIGNED_INT, "count": 3 * triangles.len(), "type": "SCALAR" },
+            { "bufferView": 0, "componentType": FLOAT, "count": vertex_count, "type": "VEC3", "min": low, "max": high },
+            { "bufferView": 1, "componentType": UNSIGNED_INT, "count": 3 * triangle_count, "type": "SCALAR" },
         ],
         "bufferViews": [
             { "buffer": 0, "byteLength": vertex_bytes, "target": ARRAY_BUFFER },
@@ -114,16 +127,16 @@ pub(super) fn glb(grid: &Grid) -> Result<Vec<u8>, Refusal> {
     bytes.extend(text.as_bytes());
     bytes.extend(((vertex_bytes + index_bytes) as u32).to_le_bytes());
     bytes.extend(b"BIN\0");
-    bytes.extend(vertices.iter().flatten().flat_map(|v| v.to_le_bytes()));
-    bytes.extend(triangles.iter().flatten().flat_map(|v| v.to_le_bytes()));
+    bytes.extend(vertices().flatten().flat_map(f32::to_le_bytes));
+    bytes.extend(mesh.triangles().flatten().flat_map(u32::to_le_bytes));
     Ok(bytes)
 }
 
 /// OpenUSD: metres, z up, a collision mesh of its own triangles (no convex hull).
 pub(super) fn usda(grid: &Grid) -> Result<Vec<u8>, Refusal> {
-    let Mesh { vertices, triangles } = Mesh::local(grid)?;
-    let points: Vec<[f32; 3]> = vertices.into_iter().map(|point| point.map(|v| v as f32)).collect();
-    let (low, high) = bounds(&points);
+    let mesh = Mesh::local(grid)?;
+    let points = || mesh.vertices().map(|point| point.map(|v| v as f32));
+    let (low, high) = bounds(points());
     let point = |[x, y, z]: [f32; 3]| format!("({x}, {y}, {z})");
     let mut text = String::from(
         "#usda 1.0\n(\n    defaultPrim = \"Terrain\"\n    doc = \"Terrain; x east, y north, z up\"\n    \
@@ -133,11 +146,11 @@ pub(super) fn usda(grid: &Grid) -> Result<Vec<u8>, Refusal> {
     );
     let _ = writeln!(text, "        float3[] extent = [{}, {}]", point(low), point(high));
     text.push_str("        int[] faceVertexCounts = [");
-    listed(&mut text, triangles.iter().map(|_| 3));
+    listed(&mut text, mesh.triangles().map(|_| 3));
     text.push_str("]\n        int[] faceVertexIndices = [");
-    listed(&mut text, triangles.iter().flatten());
+    listed(&mut text, mesh.triangles().flatten());
     text.push_str("]\n        uniform token orientation = \"rightHanded\"\n        point3f[] points = [");
-    listed(&mut text, points.iter().map(|&p| point(p)));
+    listed(&mut text, points().map(point));
     text.push_str(
         "]\n        uniform token physics:approximation = \"none\"\n        bool physics:collisionEnabled = 1\n        \
          uniform token subdivisionScheme = \"none\"\n    }\n}\n",
@@ -154,8 +167,8 @@ fn listed<T: std::fmt::Display>(text: &mut String, values: impl Iterator<Item = 
 }
 
 /// Lowest and highest of each coordinate.
-fn bounds(points: &[[f32; 3]]) -> ([f32; 3], [f32; 3]) {
-    points.iter().fold(([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]), |(low, high), point| {
+fn bounds(points: impl Iterator<Item = [f32; 3]>) -> ([f32; 3], [f32; 3]) {
+    points.fold(([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]), |(low, high), point| {
         (std::array::from_fn(|k| low[k].min(point[k])), std::array::from_fn(|k| high[k].max(point[k])))
     })
 }

@@ -133,7 +133,7 @@ impl Format {
 
     /// True for formats that state metres, so that a raster in degrees is converted before it is written.
     pub fn in_metres(self) -> bool {
-        matches!(self, Self::Glb | Self::Usda)
+        matches!(self, Self::Obj | Self::Glb | Self::Usda)
     }
 
     /// The format of a file: by its first bytes, and by its name where those say nothing.
@@ -363,6 +363,15 @@ fn free_of_no_data_value(grid: &Grid) -> Result<(), Refusal> {
     Ok(())
 }
 
+/// Heights, m, of which none is beyond single precision; `NaN` stands for no data.
+fn check_single_precision(mut heights: impl Iterator<Item = f64>) -> Result<(), Refusal> {
+    match heights.find(|z| (*z as f32).is_infinite()) {
+        // In powers of ten: such a number has 39 digits or more.
+        Some(height) => Err(Refusal::new(format!("the height {height:e} m does not fit in single precision"))),
+        None => Ok(()),
+    }
+}
+
 /// Compression of a written GeoTIFF.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Compression {
@@ -375,6 +384,26 @@ pub enum Compression {
     Zstd,
 }
 
+/// What the values of a raster are, for the reader of a GeoTIFF.
+#[derive(Clone, Copy, Debug, Default)]
+pub enum Values {
+    /// Heights, m.
+    #[default]
+    Heights,
+    /// Figures of another kind.
+    Figures {
+        /// Their unit, `1` for plain numbers.
+        unit: &'static str,
+        /// What they are.
+        description: &'static str,
+    },
+    /// Codes, which have no means: overviews hold one of them.
+    Codes {
+        /// What they stand for.
+        description: &'static str,
+    },
+}
+
 /// How a raster is written.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct WriteOptions {
@@ -382,6 +411,8 @@ pub struct WriteOptions {
     pub compression: Compression,
     /// A GeoTIFF with overviews, laid out so that a part can be read over a network (COG).
     pub cloud_optimised: bool,
+    /// What its values are.
+    pub values: Values,
 }
 
 /// Writes heights in the format of the name's ending: `.tif` (float32, tiles of 256, no data -9999, PixelIsArea),
@@ -408,7 +439,7 @@ pub fn write<'a>(
             let scale = write_png_heights(target, grid)?;
             return Ok(vec![scale.sentence()]);
         }
-        Some(Format::Obj) => (mesh::obj(grid), lost_crs(crs)),
+        Some(Format::Obj) => (mesh::obj(grid).map_err(unfit)?, lost_crs(crs)),
         Some(Format::Glb) => (mesh::glb(grid).map_err(unfit)?, shifted(grid, crs)),
         Some(Format::Usda) => (mesh::usda(grid).map_err(unfit)?, shifted(grid, crs)),
         Some(Format::Las) => return Err(unfit(Refusal::new("point clouds are read, not written"))),

@@ -1,7 +1,7 @@
 //! GeoTIFF as releases hold it: one band, little-endian, tiles of 256 x 256, directory first, PixelIsArea.
 //!
-//! A cloud-optimised one holds overviews as well, each cell the mean of up to 2 x 2 finite ones of the level before, down to
-//! one tile: directories first, from the largest level to the smallest, then tiles, those of the smallest level first.
+//! A cloud-optimised one holds overviews as well, each cell the mean of up to 2 x 2 finite ones of the level before (of
+//! codes one of them), down to one tile: directories first, from the largest level to the smallest, then tiles, those of the smallest level first.
 //!
 //! A writer of our own, because what is needed is small and its bytes must follow from the grid alone: no clock, no
 //! host, no CPU. Deflate runs in `flate2`; whichever pure-Rust backend it is built with chooses its output without
@@ -9,7 +9,7 @@
 //! the bytes. Predictor 3 is that of Adobe Photoshop TIFF Technical Note 3 (2005).
 
 use super::crs::{Crs, GeoKey, RASTER_TYPE};
-use super::{Compression, NO_DATA, Refusal, WriteOptions, free_of_no_data_value};
+use super::{Compression, NO_DATA, Refusal, Values, WriteOptions, check_single_precision, free_of_no_data_value};
 use flate2::write::ZlibEncoder;
 use rayon::prelude::*;
 use sastrugi_numeric::{Geometry, Grid};
@@ -36,18 +36,12 @@ const PREDICTOR_FLOAT: u16 = 3;
 const SAMPLE_UNSIGNED: u16 = 1;
 const SAMPLE_FLOAT: u16 = 3;
 const RASTER_PIXEL_IS_AREA: u16 = 1;
-/// Unit of the band, where GDAL looks for it.
-const UNIT_METRE: &str =
-    "<GDALMetadata>\n  <Item name=\"UNITTYPE\" sample=\"0\" role=\"unittype\">m</Item>\n</GDALMetadata>\n";
-
 /// Heights as float32.
 pub(super) fn heights(grid: &Grid, crs: &Crs, options: &WriteOptions) -> Result<Vec<u8>, Refusal> {
     let compression = options.compression;
     let rounded = grid.as_stored();
     free_of_no_data_value(&rounded)?;
-    if let Some(at) = rounded.values.iter().position(|v| v.is_infinite()) {
-        return Err(Refusal::new(format!("the height {} m does not fit in single precision", grid.values[at])));
-    }
+    check_single_precision(grid.values.iter().copied())?;
     let encode = |tile: Vec<f32>| match compression {
         Compression::None => Ok(tile.iter().flat_map(|v| v.to_le_bytes()).collect()),
         Compression::Deflate => deflated(&float_predicted(&tile)),
@@ -62,11 +56,26 @@ pub(super) fn heights(grid: &Grid, crs: &Crs, options: &WriteOptions) -> Result<
         |subfile| [sample_tags(code, predictor, 32, SAMPLE_FLOAT), vec![Tag::long(SUBFILE, &[subfile])]].concat();
     let image = |subfile, level: &Grid| image(tags(subfile), &single_precision(level), NO_DATA as f32, encode);
     let mut whole = image(WHOLE, &rounded)?;
-    whole.tags.push(Tag::ascii(42112, UNIT_METRE));
+    whole.tags.push(Tag::ascii(42112, &band_metadata(options.values)));
     whole.tags.extend(georeference(&grid.geometry, crs)?);
-    let levels = if options.cloud_optimised { overviews(&rounded) } else { vec![] };
+    let less = if matches!(options.values, Values::Codes { .. }) { thinned } else { halved };
+    let levels = if options.cloud_optimised { overviews(&rounded, less) } else { vec![] };
     let reduced = levels.iter().map(|level| image(REDUCED, level));
     assemble(std::iter::once(Ok(whole)).chain(reduced).collect::<Result<_, _>>()?)
+}
+
+/// Unit and description of the band, where GDAL looks for them.
+fn band_metadata(values: Values) -> String {
+    let item = |name: &str, text: &str| match text {
+        "" => String::new(),
+        _ => format!("  <Item name=\"{name}\" sample=\"0\" role=\"{}\">{text}</Item>\n", name.to_ascii_lowercase()),
+    };
+    let (unit, description) = match values {
+        Values::Heights => ("m", ""),
+        Values::Figures { unit, description } => (unit, description),
+        Values::Codes { description } => ("", description),
+    };
+    format!("<GDALMetadata>\n{}{}</GDALMetadata>\n", item("UNITTYPE", unit), item("DESCRIPTION", description))
 }
 
 fn single_precision(grid: &Grid) -> Grid<f32> {
@@ -75,15 +84,27 @@ fn single_precision(grid: &Grid) -> Grid<f32> {
 }
 
 /// Levels after the whole one, down to one tile.
-fn overviews(grid: &Grid) -> Vec<Grid> {
-    let half = |level: &Grid| (level.rows().max(level.cols()) > TILE).then(|| halved(level).as_stored());
+fn overviews(grid: &Grid, less: fn(&Grid) -> Grid) -> Vec<Grid> {
+    let half = |level: &Grid| (level.rows().max(level.cols()) > TILE).then(|| less(level).as_stored());
     std::iter::successors(half(grid), half).collect()
+}
+
+/// Cells of the level after.
+fn doubled(g: Geometry) -> Geometry {
+    Geometry { rows: g.rows.div_ceil(2), cols: g.cols.div_ceil(2), cell: g.cell.map(|c| 2.0 * c), ..g }
+}
+
+/// The level after of codes: the north-western one of 2 x 2.
+fn thinned(grid: &Grid) -> Grid {
+    let geometry = doubled(grid.geometry);
+    let code = |at: usize| grid.at(2 * (at / geometry.cols), 2 * (at % geometry.cols));
+    Grid::new(geometry, (0..geometry.len()).map(code).collect())
 }
 
 /// The level after: half as many cells, each the mean of the finite ones among 2 x 2.
 fn halved(grid: &Grid) -> Grid {
     let g = grid.geometry;
-    let geometry = Geometry { rows: g.rows.div_ceil(2), cols: g.cols.div_ceil(2), cell: g.cell.map(|c| 2.0 * c), ..g };
+    let geometry = doubled(g);
     let mean = |at: usize| {
         let (row, col) = (2 * (at / geometry.cols), 2 * (at % geometry.cols));
         let beside = (row..(row + 2).min(g.rows)).flat_map(|r| (col..(col + 2).min(g.cols)).map(move |c| (r, c)));

@@ -178,7 +178,7 @@ impl Generator for Cascade {
         }
         let heights = level.map(|z| z * (self.raw.rms_height_m / rms));
         let notes = self.exponents_note(&heights).into_iter().collect();
-        let maps = vec![Map { name: FLUX, unit: "1", values: self.cut(&flux) }];
+        let maps = vec![Map { name: FLUX, values: self.cut(&flux) }];
         Ok(Terrain { heights, maps, notes })
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::size::Size;
 use sastrugi_numeric::fft::smooth_length;
-use sastrugi_schemas::ParameterError;
+use sastrugi_schemas::{ParameterError, shown};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -68,7 +68,10 @@ impl TryFrom<RawCascade> for Cascade {
         ParameterError::between("hurst_exponent", raw.hurst_exponent, 0.0, 1.0)?;
         ParameterError::positive("rms_height_m", raw.rms_height_m)?;
         let [width, height] = size.geometry().size();
-        let outer_scale_m = ParameterError::positive("outer_scale_m", raw.outer_scale_m.unwrap_or(width.min(height)))?;
+        let outer_scale_m = match raw.outer_scale_m {
+            Some(scale) => ParameterError::positive("outer_scale_m", scale)?,
+            None => width.min(height),
+        };
         let outer_px = outer_scale_m / size.cell_m;
         if outer_px < 3.0 {
             let message = format!("is {outer_scale_m}; it must be at least three cells of {} m", size.cell_m);
@@ -76,8 +79,10 @@ impl TryFrom<RawCascade> for Cascade {
         }
         let shape = repeated_shape(&size, outer_px).ok_or_else(|| {
             let message = format!(
-                "is {outer_scale_m}, {outer_px:.0} cells beyond {} x {}; that needs more memory than \
-                                   2^29 cells; choose a smaller scale or larger cells",
+                "is {}, {} cells beyond {} x {}; that needs more memory than 2^29 cells; choose a smaller scale or larger \
+                 cells",
+                shown(outer_scale_m),
+                shown(outer_px.ceil()),
                 size.cols(),
                 size.rows()
             );

@@ -17,7 +17,11 @@
 //! `to` turns it round.
 //!
 //! Generators draw from streams of their own, named by the number of the process. Surfaces of the study are taken at the centres of the
-//! cells (bilinear) and must reach there. Maps of generators (`class`, `albedo` ...) go on; of two with one name the later stays.
+//! cells (bilinear) and must reach there.
+//!
+//! Maps of generators (`class`, `albedo` ...) go on where their process counts (w above 0), of two with one name the later; without data
+//! where no process has any, where a blend puts another operand in place (w = 1), and outside of a mask. Maps of roughness do not go on:
+//! they are those of the operand alone, as are the figures of notes that begin with `process k alone`.
 //!
 //! # Cost
 //! The generators', one after the other; three grids more.
@@ -28,13 +32,16 @@ mod tests;
 
 pub use params::{Compose, Operation, RawCompose, RawProcess, RawRegion};
 
-use crate::generator::{Base, Generator, MAP_NAMES, Map, Terrain, TerrainError};
+use crate::generator::{Base, Generator, MAPS, Map, Terrain, TerrainError};
 use params::{Operand, Process, Region, Step};
 use sastrugi_numeric::{Geometry, Grid, Streams, Surface, ops, sums};
 use serde_json::Value;
 
 /// Name in the registry.
 pub const KIND: &str = "compose";
+
+/// Rough time of a cell where a process joins, s.
+const SECONDS_PER_JOIN: f64 = 2e-8;
 
 impl Operand {
     fn bases(&self) -> Vec<Base> {
@@ -51,6 +58,13 @@ impl Operand {
         match self {
             Self::Surface(_) => 0,
             Self::Generator { generator, .. } => generator.memory_bytes(),
+        }
+    }
+
+    fn seconds(&self) -> f64 {
+        match self {
+            Self::Surface(_) => 0.0,
+            Self::Generator { generator, .. } => generator.seconds(),
         }
     }
 
@@ -97,32 +111,47 @@ struct Running<'a> {
     notes: Vec<String>,
 }
 
-impl Running<'_> {
-    /// An operand's heights; its maps and notes go on.
-    fn operand(&mut self, operand: &Operand, streams: &Streams) -> Result<Grid, TerrainError> {
-        let made = operand.values(&self.geometry, streams, &mut self.bases)?;
-        self.maps.retain(|map| made.maps.iter().all(|new| new.name != map.name));
-        for map in made.maps {
-            let values = self.placed(map.values);
-            self.maps.push(Map { values, ..map });
-        }
-        self.notes.extend(made.notes);
-        Ok(self.placed(made.heights))
-    }
+/// Maps that tell of an operand's own heights, not of what is made of them.
+const MAPS_OF_HEIGHTS: [&str; 2] = ["rms-measured", "rms-predicted"];
 
-    /// Values laid on the cells of the whole, cell for cell: generators may place their samples elsewhere in theirs.
-    fn placed(&self, values: Grid) -> Grid {
-        Grid::new(self.geometry, values.values)
+impl Running<'_> {
+    /// What an operand makes, on the cells of the whole: generators may place their samples elsewhere in theirs. Its notes go on.
+    fn made(&mut self, operand: &Operand, streams: &Streams, number: usize) -> Result<Terrain, TerrainError> {
+        let made = operand.values(&self.geometry, streams, &mut self.bases)?;
+        self.notes.extend(made.notes.into_iter().map(|note| format!("process {number} alone: {note}")));
+        let placed = |values: Grid| Grid::new(self.geometry, values.values);
+        let maps = made.maps.into_iter().map(|map| Map { values: placed(map.values), ..map }).collect();
+        Ok(Terrain { heights: placed(made.heights), maps, notes: Vec::new() })
     }
 
     /// The weights of a region, 1 everywhere without one.
-    fn weights(&mut self, region: Option<&Region>, streams: &Streams) -> Result<Grid, TerrainError> {
+    fn weights(&mut self, region: Option<&Region>, streams: &Streams, number: usize) -> Result<Grid, TerrainError> {
         match region {
             None => Ok(Grid::filled(self.geometry, 1.0)),
             Some(region) => {
-                let made = region.operand.values(&self.geometry, &streams.child("region"), &mut self.bases)?;
-                self.notes.extend(made.notes);
-                Ok(self.placed(made.heights).map(|v| region.weight(v)))
+                let made = self.made(&region.operand, &streams.child("region"), number)?;
+                Ok(made.heights.map(|v| region.weight(v)))
+            }
+        }
+    }
+
+    /// Takes values off the maps so far, cell by cell, by the weight there.
+    fn clear_maps(&mut self, weights: &Grid, cleared: fn(f64) -> bool) {
+        for map in &mut self.maps {
+            map.values = ops::combine(&map.values, weights, |v, w| if cleared(w) { f64::NAN } else { v });
+        }
+    }
+
+    /// Lays the maps of an operand over those so far, where it counts.
+    fn lay_maps(&mut self, maps: Vec<Map>, weights: &Grid) {
+        for map in maps.into_iter().filter(|map| !MAPS_OF_HEIGHTS.contains(&map.name)) {
+            let values = ops::combine(&map.values, weights, |v, w| if w > 0.0 { v } else { f64::NAN });
+            match self.maps.iter_mut().find(|below| below.name == map.name) {
+                Some(below) => {
+                    below.values =
+                        ops::combine(&below.values, &values, |old, new| if new.is_nan() { old } else { new });
+                }
+                None => self.maps.push(Map { values, ..map }),
             }
         }
     }
@@ -133,13 +162,18 @@ impl Running<'_> {
             Step::Clip { low_m, high_m } => Ok(z.map(|v| v.clamp(*low_m, *high_m))),
             Step::ScaleToRelief { relief_m } => scaled_to_relief(&z, *relief_m),
             Step::Mask { region, outside_m } => {
-                let weights = self.weights(Some(region), &streams)?;
+                let weights = self.weights(Some(region), &streams, number)?;
+                self.clear_maps(&weights, |w| w == 0.0);
                 Ok(ops::combine(&z, &weights, |z, w| w * z + (1.0 - w) * outside_m))
             }
             Step::Join { join, operand, factor, region } => {
-                let operand = self.operand(operand, &streams)?.map(|v| v * factor);
-                let weights = self.weights(region.as_ref(), &streams)?;
-                Ok(join.of(z, &operand, &weights))
+                let made = self.made(operand, &streams, number)?;
+                let weights = self.weights(region.as_ref(), &streams, number)?;
+                if matches!(join, params::Join::Blend) {
+                    self.clear_maps(&weights, |w| w == 1.0);
+                }
+                self.lay_maps(made.maps, &weights);
+                Ok(join.of(z, &made.heights.map(|v| v * factor), &weights))
             }
         }
     }
@@ -185,7 +219,12 @@ impl Generator for Compose {
     fn memory_bytes(&self) -> u64 {
         // Heights, an operand, weights, their product and the sum, and the maps so far, beside the largest generator at work.
         let most = self.processes.iter().flat_map(Process::operands).map(Operand::memory_bytes).max();
-        most.unwrap_or(0) + 8 * (5 + MAP_NAMES.len() as u64) * self.geometry.len() as u64
+        most.unwrap_or(0) + 8 * (5 + MAPS.len() as u64) * self.geometry.len() as u64
+    }
+
+    fn seconds(&self) -> f64 {
+        let joining = SECONDS_PER_JOIN * (self.processes.len() * self.geometry.len()) as f64;
+        joining + self.processes.iter().flat_map(Process::operands).map(Operand::seconds).sum::<f64>()
     }
 
     fn notes(&self) -> Vec<String> {
@@ -203,6 +242,7 @@ impl Generator for Compose {
         for (k, process) in self.processes.iter().enumerate() {
             heights = running.apply(heights, k + 1, process)?;
         }
-        Ok(Terrain { heights, maps: running.maps, notes: running.notes })
+        let maps = running.maps.into_iter().filter(|map| map.values.finite_count() > 0).collect();
+        Ok(Terrain { heights, maps, notes: running.notes })
     }
 }

@@ -73,7 +73,7 @@ pub enum Operation {
 
 /// One process.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
+#[serde(deny_unknown_fields, default, expecting = "a process, which is a table")]
 pub struct RawProcess {
     /// What it does; `add` when absent.
     pub operation: Operation,
@@ -129,7 +129,7 @@ fn is_one(factor: &f64) -> bool {
 
 /// Where a process counts, by the values of a surface.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a region, which is a table")]
 pub struct RawRegion {
     /// Generator of that surface.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -306,7 +306,7 @@ impl Whole {
         all.insert("size_px".to_owned(), json!(self.size.px));
         all.insert("cell_m".to_owned(), json!(self.size.cell_m));
         if crate::registry::has_parameter(kind, "origin_m") {
-            all.insert("origin_m".to_owned(), json!(self.origin_m));
+            all.insert("origin_m".to_owned(), json!(self.origin_of(kind)));
         }
         let generator = crate::prepare(kind, &Value::Object(all)).map_err(|e| match e.key.as_str() {
             "kind" => e,
@@ -314,6 +314,13 @@ impl Whole {
         })?;
         self.check_cells(kind, &generator.geometry())?;
         Ok(generator)
+    }
+
+    /// What a generator calls its origin. `elaborate` stands on a DEM in the study's coordinates, and its origin is the sample in the
+    /// centre of the south-western cell; worlds of `planetary` have coordinates of their own.
+    fn origin_of(&self, kind: &str) -> [f64; 2] {
+        let half = if kind == crate::elaborate::KIND { 0.5 * self.size.cell_m } else { 0.0 };
+        self.origin_m.map(|at| at + half)
     }
 
     /// Published listings may choose cells of their own.

@@ -78,6 +78,21 @@ fn val_blends_and_masks_follow_their_region() {
     assert!((0..600).all(|k| heights.geometry.x(k % 30) > 4.0 || heights.values[k] == -1.0));
 }
 
+/// A refined DEM lies where the DEM lies: between the posts of a ramp it is the ramp.
+#[test]
+fn val_a_refined_dem_lies_on_its_posts() {
+    let g = Geometry { origin: [-10.0, -10.0], ..Geometry::square(12, 14, 3.0) };
+    let dem = Grid::new(g, (0..g.len()).map(|k| g.x(k % 14) - 2.0 * g.y(k / 14)).collect());
+    let plain = json!({"dem": "hill", "texture": false});
+    let params = json!({"size_px": [30, 20], "cell_m": 0.5, "origin_m": [1.0, 2.0],
+        "processes": [{"kind": "elaborate", "parameters": plain}]});
+    let made = crate::prepare(KIND, &params).unwrap().generate(&streams(), &[dem]).unwrap().heights;
+    for (k, z) in made.values.iter().enumerate() {
+        let (x, y) = (made.geometry.x(k % 30), made.geometry.y(k / 30));
+        assert!((z - (x - 2.0 * y)).abs() < 1e-9, "{x} {y}: {z}");
+    }
+}
+
 #[test]
 fn val_surfaces_must_reach_the_cells() {
     let small = Grid::filled(Geometry::square(10, 10, 0.5), 1.0);
@@ -123,7 +138,7 @@ fn val_notes_of_generators_go_on() {
     assert!(!alone.notes().is_empty() && alone.notes().iter().all(|note| generator.notes().contains(note)));
     let wide = json!({"size_px": [70, 64], "processes": [{"kind": "spheroids", "region": {"kind": "cascade", "from": 0, "to": 1}}]});
     let made = crate::prepare(KIND, &wide).unwrap().generate(&streams(), &[]).unwrap();
-    assert!(made.notes[0].contains("zeta(1)"), "{:?}", made.notes);
+    assert!(made.notes[0].starts_with("process 1 alone: ") && made.notes[0].contains("zeta(1)"), "{:?}", made.notes);
 }
 
 /// The listing behind `mavs_gaussian` may choose another cell.
@@ -143,6 +158,30 @@ fn val_maps_of_generators_go_on() {
     let two = maps(json!([{"kind": "cascade"}, {"kind": "cascade"}]));
     assert_eq!(two.len(), 1);
     assert_ne!(one[0].values, two[0].values);
+}
+
+/// A map has values where its process counts, and none of roughness goes on: x below 4 m is masked off or blended over.
+#[test]
+fn val_maps_follow_their_region() {
+    let region = |from: f64, to: f64| json!({"of": "ramp", "from": from, "to": to});
+    let known = |processes: Value, bases: &[Grid]| -> Vec<bool> {
+        let maps = made(processes, bases).maps;
+        maps.first().map_or_else(Vec::new, |map| map.values.row(7).iter().map(|v| v.is_finite()).collect())
+    };
+    let east: Vec<bool> = (0..30).map(|k| 0.5 * k as f64 + 0.25 > 4.0).collect();
+    let west: Vec<bool> = east.iter().map(|e| !e).collect();
+    let cascade = || json!({"kind": "cascade"});
+    let add = json!([{"kind": "spheroids"}, {"kind": "cascade", "region": region(4.0, 4.1)}]);
+    assert_eq!(known(add, &[ramp()]), east);
+    let mask = json!([cascade(), {"operation": "mask", "region": region(4.0, 4.1)}]);
+    assert_eq!(known(mask, &[ramp()]), east);
+    let blend = json!([cascade(), {"operation": "blend", "kind": "spheroids", "region": region(4.0, 4.1)}]);
+    assert_eq!(known(blend, &[ramp()]), west);
+    let over = json!([cascade(), {"operation": "blend", "kind": "spheroids"}]);
+    assert!(known(over, &[]).is_empty());
+    let rough = json!({"roughness": {"band_m": [1.0, 2.5]}});
+    let made = made(json!([{"kind": "mavs_perlin", "parameters": rough, "factor": 3.0}]), &[]);
+    assert!(made.maps.is_empty() && made.notes.iter().all(|n| n.starts_with("process 1 alone: ")), "{:?}", made.notes);
 }
 
 #[test]
@@ -176,25 +215,37 @@ fn val_impossible_processes_are_refused() {
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
-    /// Whatever the list, it is refused, fails with a reason, or gives finite heights that are not flat.
+    /// Whatever the numbers, a list of processes that fit fails with a reason, or gives finite heights that are not flat.
     #[test]
-    fn prop_any_list_is_made_or_refused(words in proptest::collection::vec((0usize..6, 0usize..3, -3.0f64..3.0), 0..6)) {
+    fn prop_any_list_is_made_or_refused(words in proptest::collection::vec((0usize..6, any::<bool>(), -3.0f64..3.0), 1..6)) {
         let operations = ["add", "multiply", "blend", "mask", "clip", "scale_to_relief"];
-        let process = |(operation, what, number): (usize, usize, f64)| {
+        let region = |number: f64| json!({"kind": "spheroids", "from": 0.0, "to": number});
+        let process = |(operation, everywhere, number): (usize, bool, f64)| {
             let mut process = json!({"operation": operations[operation]});
-            match what {
-                0 => process["kind"] = json!("spheroids"),
-                1 => process["region"] = json!({"kind": "spheroids", "from": 0.0, "to": number}),
-                _ => process["relief_m"] = json!(number),
+            match operations[operation] {
+                "clip" => process["high_m"] = json!(number),
+                "scale_to_relief" => process["relief_m"] = json!(number.abs()),
+                "mask" => process["region"] = region(number),
+                _ => {
+                    process["kind"] = json!("spheroids");
+                    process["factor"] = json!(number);
+                    if !everywhere {
+                        process["region"] = region(number);
+                    }
+                }
             }
             process
         };
-        let processes: Vec<Value> = words.into_iter().map(process).collect();
-        let generator = crate::prepare(KIND, &json!({"size_px": [9, 8], "processes": processes}));
-        let made = generator.ok().and_then(|g| g.generate_checked(&streams(), &[]).ok());
-        if let Some(made) = made {
-            let (low, high) = made.heights.range().unwrap();
-            prop_assert!(made.heights.finite_count() == 72 && high > low);
+        let first = json!({"kind": "spheroids"});
+        let processes: Vec<Value> = std::iter::once(first).chain(words.into_iter().map(process)).collect();
+        let generator = crate::prepare(KIND, &json!({"size_px": [9, 8], "processes": processes})).unwrap();
+        match generator.generate_checked(&streams(), &[]) {
+            Ok(made) => {
+                let (low, high) = made.heights.range().unwrap();
+                prop_assert!(made.heights.finite_count() == 72 && high > low);
+            }
+            Err(TerrainError::Level { .. }) => {}
+            Err(other) => prop_assert!(false, "{other}"),
         }
     }
 }

@@ -270,7 +270,11 @@ impl Generator for Elaborate {
     }
 
     fn memory_bytes(&self) -> u64 {
-        planetary::memory_bytes(&self.window, self.tile_objects)
+        planetary::memory_bytes(&self.window, &self.work)
+    }
+
+    fn seconds(&self) -> f64 {
+        planetary::seconds(&self.window, &self.work)
     }
 
     fn notes(&self) -> Vec<String> {

@@ -1,6 +1,8 @@
 //! Parameters of the elaboration.
 
-use crate::planetary::{Lattice, RawProcess, WHOLE_TOLERANCE, Window, check_processes, check_texture, window_in_reach};
+use crate::planetary::{
+    Lattice, RawProcess, WHOLE_TOLERANCE, Window, Work, check_processes, check_texture, window_in_reach,
+};
 use crate::size::Size;
 use sastrugi_schemas::ParameterError;
 use schemars::JsonSchema;
@@ -72,7 +74,7 @@ pub struct Elaborate {
     pub(super) window: Window,
     /// Where lattice point 0 lies in the DEM's coordinates, m.
     pub(super) offset_m: [f64; 2],
-    pub(super) tile_objects: f64,
+    pub(super) work: Work,
 }
 
 impl TryFrom<RawElaborate> for Elaborate {
@@ -94,14 +96,14 @@ impl TryFrom<RawElaborate> for Elaborate {
         check_processes(&raw.processes, spacing_m)?;
         let [west, south] = raw.origin_m.map(|at| column(at, cell_m));
         let window = Window { zoom, west: west?, south: south?, cols: size.cols(), rows: size.rows() };
-        let tile_objects = window_in_reach(&raw.processes, spacing_m, &window)?;
+        let work = window_in_reach(&raw.processes, spacing_m, &window)?;
         let offset_m = [(raw.origin_m[0], window.west), (raw.origin_m[1], window.south)].map(|(at_m, column)| {
             let beyond_m = at_m - column as f64 * cell_m;
             (beyond_m / OFFSET_STEP_M).round() * OFFSET_STEP_M
         });
         let (size_px, basic_spacing_m) = (Some(size.px), Some(spacing_m));
         let raw = RawElaborate { size_m: None, size_px, cell_m, basic_spacing_m, ..raw };
-        Ok(Self { raw, size, spacing_m, window, offset_m, tile_objects })
+        Ok(Self { raw, size, spacing_m, window, offset_m, work })
     }
 }
 

@@ -145,7 +145,10 @@ pub struct Made<F> {
 /// When no roughness in the band is there to be scaled.
 pub fn finish<F: Fn(&WaveBand) -> f64>(made: Made<F>, asked: Option<&Roughness>) -> Result<Terrain, TerrainError> {
     let Made { plain, scale, expected_m2 } = made;
-    let heights = scale.as_ref().map_or_else(|| plain.clone(), |scale| ops::multiply(&plain, scale));
+    let (heights, modulated) = match scale {
+        Some(scale) => (ops::multiply(&plain, &scale), Some((plain, scale))),
+        None => (plain, None),
+    };
     let Some(asked) = asked else { return Ok(Terrain::from(heights)) };
     let band = &asked.band;
     let measure = |grid: &Grid| Detrended::of(grid, band, Detrender::Band);
@@ -167,8 +170,8 @@ pub fn finish<F: Fn(&WaveBand) -> f64>(made: Made<F>, asked: Option<&Roughness>)
         band.max_m(),
         factor * measured.rms_m()
     ));
-    let map = |name, values: Grid| Map { name, unit: "m", values: values.map(|v| factor * v) };
-    let predicted = scale.map(|scale| {
+    let map = |name, values: Grid| Map { name, values: values.map(|v| factor * v) };
+    let predicted = modulated.map(|(plain, scale)| {
         let plain_rms_m = measure(&plain).rms_m();
         map("rms-predicted", scale.map(|s| s * plain_rms_m))
     });

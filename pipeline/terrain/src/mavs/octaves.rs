@@ -14,7 +14,9 @@
 //! S the density of the noise ([`super::perlin`]). For n = 2, l = 2 and s = 1 that is `c = 0.0351 A_0^2 / lambda_0`. The published
 //! `A_k = A_0 2^k` (`mavs_variable`) gives n = 3, not the 2 that is claimed for it.
 //!
-//! The sum of discrete octaves ripples about the power law (by a third for l = 2; much less for sqrt 2).
+//! The sum of discrete octaves ripples about the power law (by a third for l = 2; much less for sqrt 2). As no octave is shorter than two
+//! cells, it falls below the law from waves of about 6 cells down: 0.7 of it at 4 cells, 0.5 (l = 2) or 0.25 (sqrt 2) at 2.2
+//! (`stat_the_density_is_that_of_the_octaves`).
 //!
 //! # Source
 //! Van Deusen, B. D. (1967), A statistical technique for the dynamic analysis of vehicles traversing rough yielding and
@@ -40,6 +42,10 @@ use serde_json::Value;
 const WAVELENGTH_MAX_M: f64 = 100.0;
 /// Longest wave over the shorter side.
 const WAVELENGTH_SHARE: f64 = 0.25;
+/// Fewest cells along the shorter side: a wave of two cells four times.
+const CELLS_MIN: f64 = 8.0;
+/// Shortest wave that has the power law, cells: the octaves below two cells, which shorter waves lack, are not there.
+const CELLS_OF_LAW: f64 = 6.0;
 /// Most octaves: finer lacunarities would add nothing.
 const OCTAVES_MAX: usize = 200;
 /// Exponent of the profiles' density under the published amplitudes.
@@ -158,8 +164,12 @@ struct Octaves {
 
 /// The wavelengths of the octaves, m.
 fn wavelengths(frame: &Frame, lacunarity: f64, max_m: Option<f64>) -> Result<Vec<f64>, ParameterError> {
-    let shortest = 2.0 * frame.size.cell_m;
-    let side = frame.sides_m()[0];
+    let (cell, side) = (frame.size.cell_m, frame.sides_m()[0]);
+    let shortest = 2.0 * cell;
+    if side < CELLS_MIN * cell * (1.0 - 1e-12) {
+        let message = format!("is {cell} m; the shorter side of {side} m must have at least {CELLS_MIN} cells");
+        return Err(ParameterError::new("cell_m", message));
+    }
     let longest = match max_m {
         Some(max) => ParameterError::positive("wavelength_max_m", max)?,
         None => WAVELENGTH_MAX_M.min(WAVELENGTH_SHARE * side),
@@ -169,18 +179,18 @@ fn wavelengths(frame: &Frame, lacunarity: f64, max_m: Option<f64>) -> Result<Vec
     let waves: Vec<f64> = waves.collect();
     match (waves.len(), max_m) {
         (0, None) => {
-            let message = format!(
-                "is {} m; the shorter side of {side} m must have at least 8 cells, or no wave fits",
-                frame.size.cell_m
-            );
+            let message =
+                format!("is {cell} m; the shortest wave, two cells, must be no longer than {WAVELENGTH_MAX_M} m");
             Err(ParameterError::new("cell_m", message))
         }
         (0, Some(max)) => {
-            let message = format!("is {max} m; the shortest wave, two cells, has {shortest} m");
+            let message = format!("is {max} m; it must be at least the shortest wave, two cells of {cell} m");
             Err(ParameterError::new("wavelength_max_m", message))
         }
         (n, _) if n > OCTAVES_MAX => {
-            let message = format!("is {lacunarity}; it gives more than {OCTAVES_MAX} octaves");
+            let message = format!(
+                "is {lacunarity}; waves from {shortest} to {longest} m would be more than {OCTAVES_MAX} octaves"
+            );
             Err(ParameterError::new("lacunarity", message))
         }
         _ => Ok(waves),
@@ -370,7 +380,12 @@ impl Generator for VanDeusen {
         let mut notes = self.octaves.notes();
         let asked = self.octaves.roughness.as_ref().and_then(Roughness::rms_m);
         notes.extend(asked.is_none().then(|| {
-            format!("mean density of profiles: {:.4e} f^-{} m3, f in cycles/m", self.constant, self.raw.exponent)
+            let whole_m = CELLS_OF_LAW * self.octaves.frame.size.cell_m;
+            format!(
+                "mean density of profiles: {:.4e} f^-{} m3, f in cycles/m, for waves above {whole_m:.4} m; \
+                 shorter ones have less",
+                self.constant, self.raw.exponent
+            )
         }));
         notes
     }

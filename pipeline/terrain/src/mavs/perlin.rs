@@ -64,11 +64,6 @@ pub struct Perlin {
 }
 
 impl Perlin {
-    /// The noise of a permutation of 0 to 255.
-    pub fn of(permutation: [u8; PERIOD]) -> Self {
-        Self { permutation }
-    }
-
     /// A drawn noise: the places of the permutation from the first on are exchanged with a drawn later one or themselves.
     pub fn draw(stream: &mut Stream) -> Self {
         let mut permutation = std::array::from_fn(|k| k as u8);
@@ -95,13 +90,6 @@ impl Perlin {
         let Place { lattice, ahead, blend } = Place::of(y);
         let hash = |line: i64| self.permutation[line.rem_euclid(PERIOD as i64) as usize];
         Line { hashes: [hash(lattice), hash(lattice.wrapping_add(1))], ahead, blend }
-    }
-
-    /// The noise at a point, in lattice cells.
-    pub fn at(&self, x: f64, y: f64) -> f64 {
-        let (line, place) = (self.line(y), Place::of(x));
-        let node = |column| self.node(column, &line);
-        blended(node(place.lattice), node(place.lattice.wrapping_add(1)), place.ahead, place.blend)
     }
 }
 

@@ -162,7 +162,7 @@ impl Generator for TwoLayers {
         if let Some(roughness) = &self.roughness {
             let total: f64 = self.layers().iter().map(|(_, _, a)| a * a * perlin::MEAN_SQUARE).sum();
             let share = 100.0 * self.expected_m2(&roughness.band()) / total;
-            made.notes.push(format!("{share:.0} % of the variance of such surfaces lies in the band"));
+            made.notes.push(format!("{share:.2} % of the variance of such surfaces lies in the band"));
         }
         Ok(made)
     }

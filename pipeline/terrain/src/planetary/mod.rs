@@ -45,7 +45,7 @@ mod world;
 
 pub(crate) use assemble::Assembly;
 pub use levels::Window;
-pub(crate) use params::{Lattice, WHOLE_TOLERANCE, window_in_reach};
+pub(crate) use params::{Lattice, WHOLE_TOLERANCE, Work, window_in_reach};
 pub use params::{Planetary, RawPlanetary};
 pub use processes::RawProcess;
 pub(crate) use processes::{check as check_processes, check_texture};
@@ -60,6 +60,10 @@ use serde_json::Value;
 /// Name in the registry.
 pub const KIND: &str = "planetary";
 
+/// Rough time of a sample, s.
+const SECONDS_PER_SAMPLE: f64 = 4e-7;
+/// Rough time of a crater or rock that a tile looks at, s: 4e-7 to 1.1e-6 in the zooms of `jpl_planetary.toml`.
+const SECONDS_PER_VISIT: f64 = 7e-7;
 /// Samples along the side of a tile.
 const TILE: usize = 256;
 /// Working memory of a tile for a sample of it: the patch, heights on the way, and what two levels of a texture need.
@@ -123,10 +127,15 @@ fn widest_tile(window: &Window) -> Window {
     Window { cols: window.cols.min(TILE), rows: window.rows.min(TILE), ..*window }
 }
 
-/// Peak memory of making a patch and of its grids, bytes; `tile_objects` is what [`window_in_reach`] says.
-pub(crate) fn memory_bytes(window: &Window, tile_objects: f64) -> u64 {
+/// Rough time of a patch on one core, s.
+pub(crate) fn seconds(window: &Window, work: &Work) -> f64 {
+    SECONDS_PER_SAMPLE * window.len() as f64 + SECONDS_PER_VISIT * work.visits
+}
+
+/// Peak memory of making a patch and of its grids, bytes.
+pub(crate) fn memory_bytes(window: &Window, work: &Work) -> u64 {
     let tile_samples = widest_tile(window).len() as u64;
-    let tile = BYTES_PER_TILE_SAMPLE * tile_samples + (BYTES_PER_OBJECT * tile_objects) as u64 + BYTES_PER_TILE;
+    let tile = BYTES_PER_TILE_SAMPLE * tile_samples + (BYTES_PER_OBJECT * work.tile_objects) as u64 + BYTES_PER_TILE;
     // Four fields of the patch beside those of its tiles or its grids.
     8 * 8 * window.len() as u64 + tiles(window).min(TILES_AT_WORK) as u64 * tile
 }
@@ -140,11 +149,11 @@ pub(crate) fn to_grid<T: Copy + Into<f64>>(geometry: Geometry, values: &[T]) -> 
 pub(crate) fn maps(world: &World, geometry: Geometry, patch: &Patch) -> Vec<Map> {
     let mut maps = Vec::new();
     if world.rocks.is_some() {
-        maps.push(Map { name: "class", unit: "0 sand, 1 rock", values: to_grid(geometry, &patch.class) });
-        maps.push(Map { name: "rock-potential", unit: "1", values: to_grid(geometry, &patch.rock_potential) });
+        maps.push(Map { name: "class", values: to_grid(geometry, &patch.class) });
+        maps.push(Map { name: "rock-potential", values: to_grid(geometry, &patch.rock_potential) });
     }
     if world.albedo.is_some() {
-        maps.push(Map { name: "albedo", unit: "1", values: to_grid(geometry, &patch.albedo) });
+        maps.push(Map { name: "albedo", values: to_grid(geometry, &patch.albedo) });
     }
     maps
 }
@@ -164,7 +173,11 @@ impl Generator for Planetary {
     }
 
     fn memory_bytes(&self) -> u64 {
-        memory_bytes(&self.window, self.tile_objects)
+        memory_bytes(&self.window, &self.work)
+    }
+
+    fn seconds(&self) -> f64 {
+        seconds(&self.window, &self.work)
     }
 
     fn notes(&self) -> Vec<String> {

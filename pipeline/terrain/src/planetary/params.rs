@@ -78,7 +78,7 @@ pub struct Planetary {
     pub(super) size: Size,
     pub(super) spacing_m: f64,
     pub(super) window: Window,
-    pub(super) tile_objects: f64,
+    pub(super) work: Work,
 }
 
 impl TryFrom<RawPlanetary> for Planetary {
@@ -94,11 +94,11 @@ impl TryFrom<RawPlanetary> for Planetary {
         processes::check(&raw.processes, spacing_m)?;
         let [west, south] = raw.origin_m.map(|at| column(at, cell_m));
         let window = Window { zoom, west: west?, south: south?, cols: size.cols(), rows: size.rows() };
-        let tile_objects = window_in_reach(&raw.processes, spacing_m, &window)?;
+        let work = window_in_reach(&raw.processes, spacing_m, &window)?;
         let origin_m = [window.west, window.south].map(|column| column as f64 * cell_m);
         let (size_px, basic_spacing_m) = (Some(size.px), Some(spacing_m));
         let raw = RawPlanetary { size_m: None, size_px, cell_m, basic_spacing_m, origin_m, ..raw };
-        Ok(Self { raw, size, spacing_m, window, tile_objects })
+        Ok(Self { raw, size, spacing_m, window, work })
     }
 }
 
@@ -158,12 +158,20 @@ fn column(at_m: f64, cell_m: f64) -> Result<i64, ParameterError> {
     Ok(quotient.round() as i64)
 }
 
-/// Whether a window lies in the world of some processes and does not take too much work. Returns how many craters and rocks one of
-/// its tiles is expected to hold in memory.
+/// What a window asks of the craters and rocks of a world.
+#[derive(Clone, Copy, Debug)]
+pub struct Work {
+    /// Craters and rocks that one of its tiles is expected to hold in memory.
+    pub tile_objects: f64,
+    /// Craters and rocks to look at, and places to look for them, in all tiles.
+    pub visits: f64,
+}
+
+/// What a window of a world of some processes asks for.
 ///
 /// # Errors
 /// A window beyond the end of the world, or more craters and rocks than it can be asked to look at.
-pub fn window_in_reach(processes: &[RawProcess], spacing_m: f64, window: &Window) -> Result<f64, ParameterError> {
+pub fn window_in_reach(processes: &[RawProcess], spacing_m: f64, window: &Window) -> Result<Work, ParameterError> {
     let ends = [(window.west, window.cols), (window.south, window.rows)];
     let far = |(first, count): (i64, usize)| (first.unsigned_abs() as f64 + count as f64) * spacing(window.zoom);
     if ends.into_iter().any(|end| far(end) > LATTICE_MAX) {
@@ -172,12 +180,12 @@ pub fn window_in_reach(processes: &[RawProcess], spacing_m: f64, window: &Window
     // How many there are does not depend on the seed.
     let world = assemble::world(processes, spacing_m, 0, &Streams::for_seed(0, "terrain"));
     let tile = widest_tile(window);
-    let objects = world.expected_work(&tile) * tiles(window) as f64;
-    if objects <= OBJECTS_MAX {
-        return Ok(world.expected_objects(&tile));
+    let visits = world.expected_work(&tile) * tiles(window) as f64;
+    if visits <= OBJECTS_MAX {
+        return Ok(Work { tile_objects: world.expected_objects(&tile), visits });
     }
     let message = format!(
-        "stand for {objects:.1e} craters and rocks that the surface would have to look at; the most is {OBJECTS_MAX:.1e}: \
+        "stand for {visits:.1e} craters and rocks that the surface would have to look at; the most is {OBJECTS_MAX:.1e}: \
          raise their smallest diameters, or choose fewer cells"
     );
     Err(ParameterError::new("processes", message))

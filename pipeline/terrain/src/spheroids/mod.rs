@@ -32,6 +32,9 @@ use serde_json::Value;
 /// Name in the registry.
 pub const KIND: &str = "spheroids";
 
+/// Rough time of a cell that a hill covers at its widest, s.
+const SECONDS_PER_COVERED: f64 = 1e-9;
+
 /// Rows that one task fills.
 const BAND_ROWS: usize = 32;
 
@@ -107,6 +110,10 @@ impl Generator for Spheroids {
 
     fn memory_bytes(&self) -> u64 {
         8 * self.size.cells() + 32 * u64::from(self.spheroids)
+    }
+
+    fn seconds(&self) -> f64 {
+        SECONDS_PER_COVERED * self.covered + 1e-8 * self.size.cells() as f64
     }
 
     fn notes(&self) -> Vec<String> {

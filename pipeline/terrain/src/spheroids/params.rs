@@ -9,6 +9,8 @@ use serde::{Deserialize, Serialize};
 const DEFAULT_SIZE_PX: [u32; 2] = [1000, 1000];
 /// Most hills of a surface.
 const SPHEROIDS_MAX: u32 = 1_000_000;
+/// Most cells that all hills may cover together, each at its widest: some minutes of one core.
+const COVERED_MAX: f64 = 1e11;
 /// Longest semi-axis, cells.
 const AXIS_MAX_PX: u32 = 1_000_000;
 
@@ -85,6 +87,8 @@ pub struct Spheroids {
     pub(super) spheroids: u32,
     pub(super) major_max_px: u32,
     pub(super) minor_max_px: u32,
+    /// Cells that all hills cover together, each at its widest.
+    pub(super) covered: f64,
 }
 
 impl TryFrom<RawSpheroids> for Spheroids {
@@ -98,6 +102,7 @@ impl TryFrom<RawSpheroids> for Spheroids {
         let spheroids = count("spheroids", raw.spheroids.unwrap_or(of_preset), SPHEROIDS_MAX)?;
         let major_max_px = count("major_max_px", raw.major_max_px.unwrap_or(major), AXIS_MAX_PX)?;
         let minor_max_px = count("minor_max_px", raw.minor_max_px.unwrap_or(minor), AXIS_MAX_PX)?;
+        let covered = check_work(&size, spheroids, major_max_px)?;
         let raw = RawSpheroids {
             size_m: None,
             size_px: Some(size.px),
@@ -106,8 +111,22 @@ impl TryFrom<RawSpheroids> for Spheroids {
             minor_max_px: Some(minor_max_px),
             ..raw
         };
-        Ok(Self { raw, size, spheroids, major_max_px, minor_max_px })
+        Ok(Self { raw, size, spheroids, major_max_px, minor_max_px, covered })
     }
+}
+
+/// Cells that all hills cover together, each at its widest; refused where they would keep a machine busy for days.
+fn check_work(size: &Size, spheroids: u32, major_max_px: u32) -> Result<f64, ParameterError> {
+    let across = |cells: u32| f64::from(cells).min(2.0 * f64::from(major_max_px));
+    let covered = f64::from(spheroids) * size.px.map(across).iter().product::<f64>();
+    if covered <= COVERED_MAX {
+        return Ok(covered);
+    }
+    let message = format!(
+        "is {spheroids}; at their widest such hills cover {covered:.1e} cells together, the most is {COVERED_MAX:e}; \
+         choose fewer or narrower ones"
+    );
+    Err(ParameterError::new("spheroids", message))
 }
 
 fn count(key: &str, value: u32, most: u32) -> Result<u32, ParameterError> {

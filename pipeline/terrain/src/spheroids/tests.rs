@@ -64,6 +64,8 @@ fn val_impossible_parameters_are_refused() {
         let error = crate::prepare(KIND, &json!({key: value})).err().unwrap();
         assert_eq!(error.key, key);
     }
+    let many = json!({"size_px": [1000, 1000], "spheroids": 1_000_000, "major_max_px": 1000});
+    assert!(crate::prepare(KIND, &many).err().unwrap().message.contains("1e11"));
     assert!(crate::prepare(KIND, &json!({"preset": "hilly"})).is_err());
 }
 

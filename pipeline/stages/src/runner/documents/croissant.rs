@@ -7,6 +7,7 @@ use crate::splits::PARTS;
 use sastrugi_schemas::manifest::{Artifact, Source};
 use sastrugi_schemas::study::McapFlavour;
 use sastrugi_schemas::tables::{self, Column, ColumnType, Table};
+use sastrugi_terrain::MapKind;
 use serde_json::{Value, json};
 
 /// Record set of the parts of a split, and the column that names one.
@@ -17,9 +18,11 @@ const PARQUET: &str = "application/x-parquet";
 /// Most files of a table that are described one by one; more are one set, and their hashes are in the manifest alone, so
 /// that this file, which loaders read whole, stays small.
 const DESCRIBED_FILES: usize = 64;
+/// Set of the generated heightfields.
+const HEIGHTS: &str = "terrain-files";
 /// Files beside the tables, which the manifest lists with their hashes: id of the set, folder, ending, media type, what they are.
 const SETS: [(&str, &str, &str, &str, &str); 9] = [
-    ("terrain-files", "terrain", ".tif", "image/tiff", "Generated heightfields, GeoTIFF, float32 metres"),
+    (HEIGHTS, "terrain", ".tif", "image/tiff", "Generated heightfields, GeoTIFF, float32 metres"),
     ("terrain-pictures", "terrain", ".png", "image/png", "Generated heightfields in steps of 16 bit"),
     ("texture-files", "texture", ".tif", "image/tiff", "Synthesised textures, GeoTIFF, float32 metres"),
     ("dem-files", "dem", ".metric.tif", "image/tiff", "Measured heights in metres, GeoTIFF"),
@@ -138,10 +141,22 @@ fn distribution(described: &Described<'_>) -> Vec<Value> {
         let folder = format!("{folder}/");
         described.artifacts.iter().any(|a| a.path.starts_with(&folder) && a.path.ends_with(ending))
     };
+    let maps: Vec<(MapKind, String)> =
+        described.maps().map(|map| (map, format!("terrain/*.{}.tif", map.name))).collect();
     for (id, folder, ending, media, what) in SETS.into_iter().filter(|(_, folder, ending, ..)| there(folder, ending)) {
         let below = if folder == "mcap" { "**/" } else { "" };
-        files.push(file_set(id, &[&format!("{folder}/{below}*{ending}")], &[media], what));
+        let mut set = file_set(id, &[&format!("{folder}/{below}*{ending}")], &[media], what);
+        if id == HEIGHTS && !maps.is_empty() {
+            // The specification has the word, its context does not.
+            set["cr:excludes"] = one_or_many(&maps.iter().map(|(_, files)| files.as_str()).collect::<Vec<_>>());
+        }
+        files.push(set);
     }
+    files.extend(maps.iter().map(|(map, pattern)| {
+        let unit = if map.unit == "m" { ", m" } else { "" };
+        let what = format!("Maps beside the heightfields, GeoTIFF, float32: {}{unit}", map.description);
+        file_set(&format!("map-{}-files", map.name), &[pattern], &["image/tiff"], &what)
+    }));
     let layout = (described.head.mcap == McapFlavour::Viewer && there("mcap", ".mcap")).then_some(LAYOUT);
     let exports = there(exports::FOLDER.trim_end_matches('/'), "").then_some(EXPORTS);
     let documents = DOCUMENTS.into_iter().chain(layout).chain(exports);

@@ -11,8 +11,15 @@ use super::execute::Failure;
 use sastrugi_schemas::manifest::{Artifact, Source};
 use sastrugi_schemas::study::StudyHead;
 use sastrugi_schemas::tables;
+use sastrugi_terrain::{MAPS, MapKind};
 use serde_json::Value;
 use std::fmt::Write as _;
+
+/// Whether a file of the release is that map of a terrain. No id ends so.
+fn is_map(path: &str, name: &str) -> bool {
+    let id = path.strip_prefix("terrain/").and_then(|file| file.strip_suffix(".tif"));
+    id.is_some_and(|id| id.ends_with(&format!(".{name}")))
+}
 
 /// What the documents tell of.
 pub struct Described<'a> {
@@ -30,7 +37,7 @@ pub struct Described<'a> {
 const FOLDERS: [(&str, &str); 10] = [
     ("dem/", "measured inputs, and the same in metres (`.metric.tif`)"),
     ("mask/", "masks of the fits"),
-    ("terrain/", "generated heightfields, GeoTIFF, float32 metres, no data -9999"),
+    ("terrain/", "generated heightfields, GeoTIFF, float32 metres, no data -9999; maps of the same cells beside them"),
     ("export/", "terrains to import into simulators: `export/<terrain>/<simulator>/README.md` says how"),
     ("texture/", "synthesised textures, GeoTIFF, float32 metres, no data -9999"),
     ("classes/", "roughness classes: 0 low, 1 semi, 2 high, 255 none; `.raw.tif` before closing"),
@@ -68,6 +75,11 @@ const HUB_IDENTIFIERS: [&str; 20] = [
 ];
 
 impl<'a> Described<'a> {
+    /// Maps that some terrain has.
+    fn maps(&self) -> impl Iterator<Item = MapKind> {
+        MAPS.into_iter().filter(|map| self.artifacts.iter().any(|artifact| is_map(&artifact.path, map.name)))
+    }
+
     /// Files of a table, in order.
     fn parts(&self, table: &str) -> impl Iterator<Item = &'a Artifact> {
         let folder = format!("tables/{table}/");
@@ -113,6 +125,10 @@ pub fn readme(described: &Described<'_>) -> String {
     text.push_str("| where | what |\n|---|---|\n| `study.toml` | the study: everything here follows from it |\n");
     for (folder, what) in FOLDERS.iter().filter(|(folder, _)| described.has(folder)) {
         let _ = writeln!(text, "| `{folder}` | {what} |");
+    }
+    for map in described.maps() {
+        let unit = if map.unit == "m" { ", m" } else { "" };
+        let _ = writeln!(text, "| `terrain/*.{}.tif` | map beside heights: {}{unit} |", map.name, map.description);
     }
     text.push_str(
         "| `croissant.json` | the tables in Croissant, for data loaders |\n\

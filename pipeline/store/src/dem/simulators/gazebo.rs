@@ -5,6 +5,8 @@
 //! plus `size` z: the lowest and highest post take them, because loaders scale by the picture's brightest pixel. The renderer
 //! (gz-rendering, `Ogre2Heightmap`) lays 2^n spacings over `size` x and y, and drops the last row and column.
 //!
+//! The mesh counts heights from the lowest post, so that single precision keeps small relief high above the sea.
+//!
 //! Why the physics has a mesh: that of a heightmap divides `size` by 2^n + 1 (gz-physics, `CustomHeightmapShape` of dartsim), and
 //! takes a relief of 1 m where the loader finds no brightest pixel, as gz-common 4 in pictures of 16 bit (`Image::MaxColor`).
 
@@ -25,7 +27,7 @@ pub(super) fn parts(posts: &Posts) -> Result<Parts, Refusal> {
         title: "Gazebo",
         files: vec![
             ("heightmap.png".to_owned(), png::levels(&levels.of(posts))?),
-            (COLLISION.to_owned(), mesh::obj(&posts.heights)),
+            (COLLISION.to_owned(), mesh::obj_above(&posts.heights, posts.low_m)?),
             ("model.config".to_owned(), CONFIG.as_bytes().to_vec()),
             ("model.sdf".to_owned(), document(&model).into_bytes()),
             ("world.sdf".to_owned(), document(&world(&model)).into_bytes()),
@@ -76,8 +78,9 @@ fn world(model: &str) -> String {
 
 fn model(posts: &Posts) -> String {
     let numbers = |[x, y, z]: [f64; 3]| format!("{x} {y} {z}");
-    // The mesh is in scene coordinates, wherever the model stands.
-    let back = pose(posts).map(|v| 0.0 - v);
+    // The mesh is in scene coordinates across, wherever the model stands, and above its height as the model is.
+    let [x, y] = posts.centre_m();
+    let back = [0.0 - x, 0.0 - y, 0.0];
     format!(
         "<model name=\"terrain\">\n  <static>true</static>\n  <pose>{} 0 0 0</pose>\n  <link name=\"ground\">\n    \
          <collision name=\"collision\">\n      <pose>{} 0 0 0</pose>\n      <geometry>\n        <mesh>\n          \

@@ -3,8 +3,8 @@
 //!
 //! Cell centres are posts: the ground reaches from the outer centres to the outer centres, `(cols - 1) x (rows - 1)` cells, and no
 //! height is made up beyond. Scene coordinates (x east, y north, z up, m) are the DEM's less its south-west corner, because
-//! simulators count in single precision; for a generated terrain they are the terrain's own. `scene_to_target` in `import.json`
-//! takes them to those of the program, in whose axes and units all other numbers are.
+//! simulators count in single precision; for a generated terrain without `origin_m` they are the terrain's own. `scene_to_target`
+//! in `import.json` takes them to those of the program, in whose axes and units all other numbers are.
 //!
 //! Where a program takes certain sizes only, the DEM is resampled or cropped ([`Fit`]), and `import.json` says how; a larger DEM is
 //! refused, not thinned.
@@ -28,9 +28,32 @@ use sastrugi_schemas::study::Simulator;
 use serde_json::{Value, json};
 use std::fmt::Write;
 use std::path::Path;
+use std::{fs, io};
 
-/// Rough peak of the memory that an export takes for each cell, bytes: four posts, or the text of a mesh.
-pub const BYTES_PER_CELL: u64 = 200;
+const IMPORT: &str = "import.json";
+const README: &str = "README.md";
+
+/// What an export takes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Cost {
+    /// Rough peak of the working memory beside the DEM, bytes.
+    pub memory_bytes: u64,
+    /// Rough length of the files, bytes.
+    pub file_bytes: u64,
+}
+
+impl Cost {
+    /// Of so many posts, measured, rounded up: heights, levels or vertices, and the text of a mesh where there is one.
+    fn of(simulator: Simulator, posts: u64) -> Self {
+        let (memory, files) = match simulator {
+            Simulator::Unreal | Simulator::Unity => (24, 2),
+            Simulator::Gazebo => (130, 100),
+            Simulator::Mujoco => (24, 4),
+            Simulator::Isaac => (160, 90),
+        };
+        Self { memory_bytes: memory * posts, file_bytes: files * posts }
+    }
+}
 
 /// How a DEM of another size is fitted to a simulator that takes certain sizes only.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -80,13 +103,17 @@ const fn sizes(simulator: Simulator) -> Option<&'static [usize]> {
     }
 }
 
-/// Refuses a DEM of a size that the simulator does not take.
+/// What an export of a DEM of this size takes.
 ///
 /// # Errors
 /// [`DemError::Unfit`] for fewer than two rows or columns; more, or for a crop fewer, than the program takes.
-pub fn check_size(geometry: &Geometry, simulator: Simulator, fit: Fit) -> Result<(), DemError> {
-    size(geometry, simulator, fit).map(drop).map_err(|refusal| unfit(Path::new(simulator.name()), refusal))
+pub fn check_size(geometry: &Geometry, simulator: Simulator, fit: Fit) -> Result<Cost, DemError> {
+    let side = size(geometry, simulator, fit).map_err(|refusal| unfit(Path::new(simulator.name()), refusal))?;
+    Ok(Cost::of(simulator, side.map_or(geometry.len(), |side| side * side) as u64))
 }
+
+/// What to do about a DEM that is too large.
+const SMALLER: &str = "choose a smaller size, or cut a window";
 
 /// Posts a side where the simulator takes certain sizes only.
 fn size(g: &Geometry, simulator: Simulator, fit: Fit) -> Result<Option<usize>, Refusal> {
@@ -95,14 +122,14 @@ fn size(g: &Geometry, simulator: Simulator, fit: Fit) -> Result<Option<usize>, R
         return Err(Refusal::new(format!("{cells} are no surface, which takes two rows and two columns at least")));
     }
     if simulator == Simulator::Isaac && g.len() > mesh::MAX_CELLS {
-        return Err(Refusal::new(format!("{cells} are more than the {} of a mesh; cut a window", mesh::MAX_CELLS)));
+        return Err(Refusal::new(format!("{cells} are more than the {} of a mesh; {SMALLER}", mesh::MAX_CELLS)));
     }
     let Some(sizes) = sizes(simulator) else { return Ok(None) };
     let (smallest, largest) = (sizes[0], sizes[sizes.len() - 1]);
     let (fitting, refusal) = match fit {
         Fit::Resample => (
             sizes.iter().find(|&&size| size >= g.cols.max(g.rows)),
-            format!("{cells} are more than {largest} posts a side; cut a window"),
+            format!("{cells} are more than {largest} posts a side; {SMALLER}"),
         ),
         Fit::Crop => (
             sizes.iter().rfind(|&&size| size <= g.cols.min(g.rows)),
@@ -115,24 +142,75 @@ fn size(g: &Geometry, simulator: Simulator, fit: Fit) -> Result<Option<usize>, R
 /// The files for a simulator, of heights in metres. The same heights give the same bytes.
 ///
 /// # Errors
-/// [`DemError::Unfit`] as [`check_size`], and for cells without data where the program has no holes.
+/// [`DemError::Unfit`] as [`check_size`], for cells without data where the program has no holes, and for heights beyond single
+/// precision.
 pub fn export(grid: &Grid, simulator: Simulator, fit: Fit) -> Result<Export, DemError> {
+    export_posts(simulator, posts(grid, simulator, fit))
+}
+
+/// As [`export`], of a DEM that was brought from degrees to metres: its own coordinates are not those of the scene shifted, and the
+/// files say so.
+///
+/// # Errors
+/// As [`export`].
+pub fn export_from_degrees(grid: &Grid, simulator: Simulator, fit: Fit) -> Result<Export, DemError> {
+    export_posts(simulator, posts(grid, simulator, fit).map(Posts::of_degrees))
+}
+
+fn export_posts(simulator: Simulator, posts: Result<Posts, Refusal>) -> Result<Export, DemError> {
     let refused = |refusal| unfit(Path::new(simulator.name()), refusal);
-    let posts = posts(grid, simulator, fit).map_err(refused)?;
+    let posts = posts.map_err(refused)?;
     let mut parts = parts(&posts, simulator).map_err(refused)?;
     let mut files = std::mem::take(&mut parts.files);
-    files.push(("import.json".to_owned(), import_json(&posts, &parts, simulator).into_bytes()));
-    files.push(("README.md".to_owned(), readme(&posts, &parts).into_bytes()));
+    files.push((IMPORT.to_owned(), import_json(&posts, &parts, simulator).into_bytes()));
+    files.push((README.to_owned(), readme(&posts, &parts).into_bytes()));
     Ok(Export { files, notes: posts.sentence().into_iter().collect() })
 }
 
-/// Writes the files of an export to a folder, which is made where there is none.
+/// Refuses a folder that holds something else than an export for this simulator, which is what [`write()`] would overwrite.
+///
+/// # Errors
+/// [`DemError::Unfit`] for such a folder, [`DemError::Io`] when it cannot be read.
+pub fn check_folder(folder: &Path, simulator: Simulator) -> Result<(), DemError> {
+    if is_vacant(folder).map_err(|source| DemError::Io { path: folder.to_owned(), source })? || holds(folder, simulator)
+    {
+        return Ok(());
+    }
+    let reason = format!("is a folder with files, but without an export for {}; name a new folder", simulator.name());
+    Err(unfit(folder, Refusal::new(reason)))
+}
+
+/// True where there is no folder, or one without a file; what runs write at this moment does not count.
+fn is_vacant(folder: &Path) -> io::Result<bool> {
+    match fs::read_dir(folder) {
+        Err(e) if e.kind() == io::ErrorKind::NotFound => Ok(true),
+        Err(e) => Err(e),
+        Ok(entries) => {
+            let names = entries.map(|entry| entry.map(|e| e.file_name()));
+            let mut others = names.filter(|name| !name.as_ref().is_ok_and(|name| atomic::is_temporary(name)));
+            others.next().transpose().map(|other| other.is_none())
+        }
+    }
+}
+
+/// True for a folder whose `import.json` is this program's, whatever its version, for this simulator.
+fn holds(folder: &Path, simulator: Simulator) -> bool {
+    let name = |program: &str| program.split('/').next().map(str::to_owned);
+    let text = fs::read(folder.join(IMPORT)).unwrap_or_default();
+    let found: Value = serde_json::from_slice(&text).unwrap_or_default();
+    let program = found["program"].as_str().and_then(name);
+    program == name(crate::PROGRAM) && found["target"] == simulator.name()
+}
+
+/// Writes the files of an export to a folder, which is made where there is none. See [`check_folder`] for one that is there.
 ///
 /// # Errors
 /// [`DemError::Io`] when a file cannot be written.
 pub fn write(folder: &Path, export: &Export) -> Result<(), DemError> {
-    atomic::clear_leftovers(&folder.join("README.md"));
-    export.files.iter().try_for_each(|(name, bytes)| save((&folder.join(name)).into(), bytes))
+    atomic::clear_leftovers(&folder.join(IMPORT));
+    // `import.json` first: by it a later run may complete the folder of a killed one.
+    let (first, others): (Vec<_>, Vec<_>) = export.files.iter().partition(|(name, _)| name == IMPORT);
+    first.into_iter().chain(others).try_for_each(|(name, bytes)| save((&folder.join(name)).into(), bytes))
 }
 
 fn posts(grid: &Grid, simulator: Simulator, fit: Fit) -> Result<Posts, Refusal> {
@@ -161,7 +239,8 @@ fn import_json(posts: &Posts, parts: &Parts, simulator: Simulator) -> String {
         "target": simulator.name(),
         "scene": {
             "axes": "x east, y north, z up, m",
-            "dem_minus_scene_m": posts.shift_m,
+            // None where the DEM's own coordinates are degrees.
+            "dem_minus_scene_m": (!posts.from_degrees).then_some(posts.shift_m),
             "south_west_post_m": posts.south_west_m(),
             "ground_m": posts.ground_m(),
             "height_min_m": posts.low_m,
@@ -194,12 +273,22 @@ fn readme(posts: &Posts, parts: &Parts) -> String {
     };
     let _ = write!(
         text,
-        "Scene coordinates (x east, y north, z up, m) are the DEM's less ({}, {}); `scene_to_target` in `import.json` takes them to \
-         those of {}: {}. The numbers below stand there too.\n\n",
-        posts.shift_m[0], posts.shift_m[1], parts.title, parts.axes
+        "Scene coordinates (x east, y north, z up, m) {}; `scene_to_target` in `import.json` takes them to those of {}: {}. The \
+         numbers below stand there too.\n\n",
+        scene(posts),
+        parts.title,
+        parts.axes
     );
     for (k, step) in parts.steps.iter().enumerate() {
         let _ = writeln!(text, "{}. {step}", k + 1);
     }
     text
+}
+
+/// What the scene counts from.
+fn scene(posts: &Posts) -> String {
+    match posts.shift_m {
+        _ if posts.from_degrees => "count from the south-west corner of the DEM, which is in degrees".to_owned(),
+        [x, y] => format!("are the DEM's less ({x}, {y})"),
+    }
 }

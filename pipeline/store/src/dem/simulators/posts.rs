@@ -1,6 +1,6 @@
 //! Heights at posts, in scene coordinates.
 
-use crate::dem::Refusal;
+use crate::dem::{Refusal, check_single_precision};
 use sastrugi_numeric::resample::stretch;
 use sastrugi_numeric::{Geometry, Grid};
 use serde_json::{Value, json};
@@ -13,6 +13,8 @@ pub(super) struct Posts {
     pub shift_m: [f64; 2],
     /// Columns and rows of the DEM.
     pub source: [usize; 2],
+    /// True for a DEM that was brought from degrees to metres: `shift_m` knows nothing of its place then.
+    pub from_degrees: bool,
     /// Lowest post, m.
     pub low_m: f64,
     /// Highest post, m.
@@ -40,8 +42,14 @@ impl Posts {
 
     fn at(heights: Grid, source: &Grid, how: How) -> Result<Self, Refusal> {
         let (low_m, high_m) = heights.range().ok_or_else(|| Refusal::new("no cell holds data"))?;
+        check_single_precision([low_m, high_m, high_m - low_m].into_iter())?;
         let g = source.geometry;
-        Ok(Self { heights, shift_m: g.origin, source: [g.cols, g.rows], low_m, high_m, how })
+        Ok(Self { heights, shift_m: g.origin, source: [g.cols, g.rows], from_degrees: false, low_m, high_m, how })
+    }
+
+    /// The same, of a DEM that was brought from degrees to metres.
+    pub fn of_degrees(self) -> Self {
+        Self { from_degrees: true, ..self }
     }
 
     /// As [`Self::of`], for programs whose terrain has no holes.

@@ -97,7 +97,7 @@ fn val_planes_are_exported() {
 fn val_meshes_leave_holes_out() {
     let mut grid = slanted(3, 3);
     grid.values[0] = f64::NAN;
-    let text = String::from_utf8(mesh::obj(&grid)).unwrap();
+    let text = String::from_utf8(mesh::obj(&grid).unwrap()).unwrap();
     let lines = |start: &str| text.lines().filter(|l| l.starts_with(start)).map(str::to_owned).collect::<Vec<_>>();
     assert_eq!(lines("v ")[0], "v 1000.75 -19.375 100.3");
     assert_eq!((lines("v ").len(), lines("f ").len()), (8, 6));
@@ -107,7 +107,105 @@ fn val_meshes_leave_holes_out() {
     let glb = mesh::glb(&grid).unwrap();
     assert_eq!(u32::from_le_bytes(glb[8..12].try_into().unwrap()) as usize, glb.len());
     grid.values[2..].fill(f64::NAN);
-    assert!(mesh::usda(&grid).is_err() && mesh::glb(&grid).is_err(), "no triangle is left");
+    let meshes = [mesh::usda, mesh::glb, mesh::obj];
+    assert!(meshes.iter().all(|mesh| mesh(&grid).is_err()), "no triangle is left");
+    assert!(meshes.iter().all(|mesh| mesh(&slanted(20, 1)).is_err()), "a line is no surface");
+}
+
+/// Beyond single precision no file is written, whose numbers would be infinite; nor where the relief alone is.
+#[test]
+fn val_heights_beyond_single_precision_are_refused() {
+    for high in [1e300, 3e38] {
+        let mut grid = slanted(4, 4);
+        grid.values[5] = high;
+        grid.values[6] = -high;
+        for simulator in Simulator::ALL {
+            let found = resampled(&grid, simulator).unwrap_err().to_string();
+            assert!(found.contains("e38 m does not fit in single") || found.contains("1e300 m does"), "{found}");
+        }
+    }
+    let mut grid = slanted(4, 4);
+    grid.values[5] = 1e300;
+    for name in ["a.tif", "a.obj", "a.glb", "a.usda"] {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(name);
+        let found = crate::dem::write(&path, &grid, &Default::default(), &Default::default()).unwrap_err().to_string();
+        assert!(found.ends_with("the height 1e300 m does not fit in single precision") && !path.exists(), "{found}");
+    }
+}
+
+/// Millimetres of relief far above the sea are in Gazebo's collision mesh, which stands where the picture does.
+#[test]
+fn val_small_relief_high_up_is_kept() {
+    let geometry = Geometry { rows: 50, cols: 65, cell: [0.5; 2], origin: [1000.0, -20.0] };
+    let height = |k: usize| 6000.0 + 0.0275 * ((k * 7919) % 3250) as f64 / 3249.0;
+    let grid = Grid::new(geometry, (0..3250).map(height).collect());
+    let export = resampled(&grid, Simulator::Gazebo).unwrap();
+    let text = |name: &str| {
+        let (_, bytes) = export.files.iter().find(|(file, _)| file == name).unwrap();
+        String::from_utf8(bytes.clone()).unwrap()
+    };
+    let collision = text("collision.obj");
+    let heights = collision.lines().filter(|line| line.starts_with("v ")).filter_map(|line| line.split(' ').nth(3));
+    let distinct = heights.collect::<std::collections::HashSet<_>>();
+    assert!(distinct.len() > 10_000 && distinct.contains("0"), "{} heights", distinct.len());
+    let [x, y] = posts(&grid, Simulator::Gazebo, Fit::Resample).unwrap().centre_m();
+    let poses = [format!("<pose>{x} {y} 6000 0 0 0</pose>"), format!("<pose>-{x} -{y} 0 0 0 0</pose>")];
+    assert!(poses.iter().all(|pose| text("model.sdf").contains(pose)), "{}", text("model.sdf"));
+}
+
+/// A folder is written to again for the same simulator; no other is, and none with files of somebody else.
+#[test]
+fn val_folders_of_others_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let refused = |simulator| check_folder(&out, simulator).err().map(|e| e.to_string());
+    assert_eq!(refused(Simulator::Isaac), None);
+    fs::create_dir(&out).unwrap();
+    fs::write(out.join(".sastrugi-partial-1-0"), b"left").unwrap();
+    assert_eq!(refused(Simulator::Isaac), None, "a file under construction");
+    fs::write(out.join(README), b"mine").unwrap();
+    let found = refused(Simulator::Isaac).unwrap_or_default();
+    assert!(found.ends_with("is a folder with files, but without an export for isaac; name a new folder"), "{found}");
+    for other in ["[]", "{\"program\": \"blender/4\", \"target\": \"isaac\"}", "{\"target\": \"isaac\"}"] {
+        fs::write(out.join(IMPORT), other).unwrap();
+        assert!(refused(Simulator::Isaac).is_some(), "{other}");
+    }
+    fs::remove_dir_all(&out).unwrap();
+    write(&out, &resampled(&slanted(4, 4), Simulator::Isaac).unwrap()).unwrap();
+    assert_eq!(refused(Simulator::Isaac), None);
+    assert!(refused(Simulator::Mujoco).is_some());
+    fs::write(out.join(IMPORT), "{\"program\": \"sastrugi/0.0.9\", \"target\": \"isaac\"}").unwrap();
+    assert_eq!(refused(Simulator::Isaac), None, "another version");
+}
+
+/// What is counted is posts, not the cells of the DEM.
+#[test]
+fn val_costs_count_posts() {
+    let cost =
+        |rows, cols, simulator| check_size(&Geometry::square(rows, cols, 0.1), simulator, Fit::Resample).unwrap();
+    assert_eq!(cost(30, 1026, Simulator::Gazebo), cost(2049, 2049, Simulator::Gazebo));
+    assert_eq!(cost(3, 4097, Simulator::Unreal), cost(8129, 8129, Simulator::Unreal));
+    assert_eq!(cost(40, 50, Simulator::Isaac), cost(50, 40, Simulator::Isaac));
+    for simulator in Simulator::ALL {
+        let grid = slanted(129, 129);
+        let files: usize = resampled(&grid, simulator).unwrap().files.iter().map(|(_, bytes)| bytes.len()).sum();
+        let stated = cost(129, 129, simulator).file_bytes as f64;
+        // Beside the heights there are the texts.
+        assert!((files as f64) < 1.1 * stated + 8e3 && files as f64 > 0.3 * stated, "{}: {files}", simulator.name());
+    }
+}
+
+/// The scene of a DEM in degrees is not the DEM's coordinates shifted, and the files say so.
+#[test]
+fn val_degrees_have_no_shift() {
+    let grid = slanted(4, 4);
+    let found = numbers(&resampled(&grid, Simulator::Mujoco).unwrap());
+    assert_eq!(found["scene"]["dem_minus_scene_m"], json!([1000.0, -20.0]));
+    let export = export_from_degrees(&grid, Simulator::Mujoco, Fit::Resample).unwrap();
+    assert!(numbers(&export)["scene"]["dem_minus_scene_m"].is_null());
+    let (_, readme) = export.files.iter().find(|(name, _)| name == README).unwrap();
+    assert!(String::from_utf8_lossy(readme).contains("corner of the DEM, which is in degrees;"));
 }
 
 proptest! {
