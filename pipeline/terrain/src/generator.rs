@@ -85,7 +85,7 @@ pub struct MapKind {
 
 /// Every map.
 pub const MAPS: [MapKind; 6] = [
-    MapKind { name: "albedo", unit: "1", description: "albedo: share of the light that the ground gives back, 0 to 1" },
+    MapKind { name: "albedo", unit: "1", description: "share of the light that the ground gives back, 0 to 1" },
     MapKind { name: "class", unit: "", description: "what the ground is: 0 sand, 1 rock" },
     MapKind { name: "flux", unit: "1", description: "flux of the cascade that the heights integrate, mean 1" },
     MapKind {

@@ -33,7 +33,7 @@ use crate::generator::{Generator, Terrain, TerrainError};
 use crate::size::Size;
 use sastrugi_numeric::{Geometry, Grid, Streams};
 use sastrugi_roughness::WaveBand;
-use sastrugi_schemas::ParameterError;
+use sastrugi_schemas::{ParameterError, shown};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -189,7 +189,8 @@ fn wavelengths(frame: &Frame, lacunarity: f64, max_m: Option<f64>) -> Result<Vec
         }
         (n, _) if n > OCTAVES_MAX => {
             let message = format!(
-                "is {lacunarity}; waves from {shortest} to {longest} m would be more than {OCTAVES_MAX} octaves"
+                "is {lacunarity}; waves from {shortest} to {} m would be more than {OCTAVES_MAX} octaves",
+                shown(longest)
             );
             Err(ParameterError::new("lacunarity", message))
         }

@@ -12,7 +12,7 @@ use sastrugi_schemas::tables::TerrainRow;
 const KINDS: [[&str; 3]; 6] = [
     ["class", "Sand and rock.", "0 sand, 1 rock"],
     ["albedo", "Albedo.", "albedo"],
-    ["rock-potential", "Rock potential.", "share of the ground that rocks may cover"],
+    ["rock-potential", "Rock potential.", "rock potential"],
     ["rms-measured", "Measured roughness.", "RMS in the band, m"],
     ["rms-predicted", "Predicted roughness.", "RMS in the band, m"],
     ["flux", "Flux of the cascade.", "flux, mean 1"],
