@@ -102,6 +102,16 @@ fn val_exports_are_refused() {
 }
 
 /// A hypothesis that cannot be tested is refused before anything runs, with its place.
+/// A wheel meets the longer side of a cell.
+#[test]
+fn val_oblong_cells_are_judged_by_their_longer_side() {
+    let folder = area();
+    let study = small_study().replace("cell_m = 90.0", "cell_m = [0.4, 90.0]");
+    let study = study.replace("terrains = [\"rough\", \"smooth\"]", "terrains = [\"tile\"]");
+    write(folder.path(), "study.toml", &study);
+    refused(folder.path(), &["plan", "study.toml"], USAGE, &["cells of 90 m", "wheelbase", "missions"]);
+}
+
 #[test]
 fn val_hypotheses_are_refused_with_the_line() {
     let good =

@@ -62,7 +62,7 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
                 stream: Some(streams.label()),
                 release_path: format!("terrain/{}.tif", one.id),
                 cells: generator.geometry().len() as u64,
-                cell_m: Some(generator.geometry().cell.into_iter().fold(0.0, f64::max)),
+                cell_m: Some(generator.geometry().cell.into_iter().fold(f64::INFINITY, f64::min)),
                 geometry: Some(generator.geometry()),
             };
             let geotiff = builder.study.head.geotiff;

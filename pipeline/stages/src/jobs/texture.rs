@@ -154,7 +154,7 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
                     stream: Some(streams.label()),
                     release_path: format!("texture/{id}.tif"),
                     cells: base.as_ref().or(fill.as_ref()).map_or(draft.geometry().len() as u64, |(_, cells)| *cells),
-                    cell_m: Some(draft.geometry().cell.into_iter().fold(0.0, f64::max)),
+                    cell_m: Some(draft.geometry().cell.into_iter().fold(f64::INFINITY, f64::min)),
                     geometry: (base.is_none() && fill.is_none()).then(|| draft.geometry()),
                 };
                 let cells = field.cells;

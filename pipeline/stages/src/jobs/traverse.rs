@@ -162,7 +162,8 @@ fn raster(
 /// Refuses a terrain whose cells are known to be larger than the vehicle. A measured DEM is judged when it is read: its file may
 /// state them in degrees.
 fn check_scales(field: &Heightfield, vehicle: &Vehicle) -> Result<(), GroundError> {
-    match field.cell_m.filter(|_| field.item.stage != measured::STAGE) {
+    let longer = field.geometry.map(|g| g.cell[0].max(g.cell[1]));
+    match longer.or(field.cell_m).filter(|_| field.item.stage != measured::STAGE) {
         Some(cell_m) => check_scale(cell_m, vehicle),
         None => Ok(()),
     }

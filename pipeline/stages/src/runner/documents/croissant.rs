@@ -1,13 +1,12 @@
 //! `croissant.json`: every table in Croissant 1.1 (MLCommons, "Croissant Format Specification", version 1.1), so that data
 //! loaders find its columns with type, unit and description, and its files with their hashes.
 
-use super::{Described, add_terms, citation_line, license, page};
+use super::{Described, add_terms, citation_line, license, map_files, map_words, page};
 use crate::jobs::{exports, original};
 use crate::splits::PARTS;
 use sastrugi_schemas::manifest::{Artifact, Source};
 use sastrugi_schemas::study::McapFlavour;
 use sastrugi_schemas::tables::{self, Column, ColumnType, Table};
-use sastrugi_terrain::MapKind;
 use serde_json::{Value, json};
 
 /// Record set of the parts of a split, and the column that names one.
@@ -141,21 +140,19 @@ fn distribution(described: &Described<'_>) -> Vec<Value> {
         let folder = format!("{folder}/");
         described.artifacts.iter().any(|a| a.path.starts_with(&folder) && a.path.ends_with(ending))
     };
-    let maps: Vec<(MapKind, String)> =
-        described.maps().map(|map| (map, format!("terrain/*.{}.tif", map.name))).collect();
+    let maps: Vec<String> = described.maps().map(map_files).collect();
     for (id, folder, ending, media, what) in SETS.into_iter().filter(|(_, folder, ending, ..)| there(folder, ending)) {
         let below = if folder == "mcap" { "**/" } else { "" };
         let mut set = file_set(id, &[&format!("{folder}/{below}*{ending}")], &[media], what);
         if id == HEIGHTS && !maps.is_empty() {
             // The specification has the word, its context does not.
-            set["cr:excludes"] = one_or_many(&maps.iter().map(|(_, files)| files.as_str()).collect::<Vec<_>>());
+            set["cr:excludes"] = one_or_many(&maps.iter().map(String::as_str).collect::<Vec<_>>());
         }
         files.push(set);
     }
-    files.extend(maps.iter().map(|(map, pattern)| {
-        let unit = if map.unit == "m" { ", m" } else { "" };
-        let what = format!("Maps beside the heightfields, GeoTIFF, float32: {}{unit}", map.description);
-        file_set(&format!("map-{}-files", map.name), &[pattern], &["image/tiff"], &what)
+    files.extend(described.maps().map(|map| {
+        let what = format!("Maps beside the heightfields, GeoTIFF, float32: {}", map_words(map));
+        file_set(&format!("map-{}-files", map.name), &[&map_files(map)], &["image/tiff"], &what)
     }));
     let layout = (described.head.mcap == McapFlavour::Viewer && there("mcap", ".mcap")).then_some(LAYOUT);
     let exports = there(exports::FOLDER.trim_end_matches('/'), "").then_some(EXPORTS);

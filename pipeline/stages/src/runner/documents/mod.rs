@@ -21,6 +21,16 @@ fn is_map(path: &str, name: &str) -> bool {
     id.is_some_and(|id| id.ends_with(&format!(".{name}")))
 }
 
+/// The files of a map.
+fn map_files(map: MapKind) -> String {
+    format!("terrain/*.{}.tif", map.name)
+}
+
+/// What a map shows, with its unit where it has one.
+fn map_words(map: MapKind) -> String {
+    format!("{}{}", map.description, if map.unit == "m" { ", m" } else { "" })
+}
+
 /// What the documents tell of.
 pub struct Described<'a> {
     /// The study's head.
@@ -127,8 +137,7 @@ pub fn readme(described: &Described<'_>) -> String {
         let _ = writeln!(text, "| `{folder}` | {what} |");
     }
     for map in described.maps() {
-        let unit = if map.unit == "m" { ", m" } else { "" };
-        let _ = writeln!(text, "| `terrain/*.{}.tif` | map beside heights: {}{unit} |", map.name, map.description);
+        let _ = writeln!(text, "| `{}` | map beside heights: {} |", map_files(map), map_words(map));
     }
     text.push_str(
         "| `croissant.json` | the tables in Croissant, for data loaders |\n\
