@@ -1,9 +1,12 @@
 //! Shaded relief and deviation maps of one heightfield.
 
 use crate::ReportError;
-use crate::content::{Figure, Numbers, number, text};
+use crate::content::{Figure, Numbers, count, number, text};
 use crate::data::Data;
+use crate::render::chart::Mark;
+use crate::render::colour::Rgb;
 use crate::render::map::{Key, Map};
+use crate::render::svg::Paint;
 use crate::render::{colour, number as set, picture, thin};
 use sastrugi_numeric::{Grid, sums};
 use sastrugi_schemas::Cell;
@@ -135,6 +138,27 @@ pub fn values(
     let map = Map::new(&picture, MAP_WIDTH, &Key::Ramp { colours: &colours, range, title, absent });
     let description = format!("Map of {path}: {}.", extent(grid));
     Ok(Some(figure(words, description, map, numbers_of(path, grid, own_range, ""))))
+}
+
+/// A code of a raster, its colour and meaning.
+pub type Code = (u8, Rgb, &'static str);
+
+/// A raster of codes in their colours; the legend names those that occur, with their shares.
+pub fn codes(grid: &Grid<u8>, path: &str, codes: &[Code], words: Words) -> Result<Figure, ReportError> {
+    let cells = |code: u8| grid.values.iter().filter(|c| **c == code).count();
+    let present: Vec<Code> = codes.iter().copied().filter(|(code, _, _)| cells(*code) > 0).collect();
+    let share = |code: u8| set::percent(cells(code) as f64 / grid.values.len().max(1) as f64, 1);
+    let named = |(code, _, meaning): &Code| format!("{meaning} {}", share(*code));
+    let legend: Vec<_> = present.iter().map(|c| (Mark::Fill(Paint::Fixed(c.1)), named(c))).collect();
+    let colours: Vec<(u8, Rgb)> = present.iter().map(|(code, colour, _)| (*code, *colour)).collect();
+    let map = Map::new(&picture::codes(grid, &colours, 400)?, MAP_WIDTH, &Key::Entries(&legend));
+    let mut numbers = Numbers::of_file(path, &[("code", ""), ("cells", ""), ("meaning", "")]);
+    for (code, _, meaning) in &present {
+        numbers.row([count(usize::from(*code)), count(cells(*code)), text(*meaning)]);
+    }
+    let shares: Vec<String> = present.iter().map(named).collect();
+    let description = format!("Map of {path}: {}; {}.", extent(grid), shares.join(", "));
+    Ok(figure(words, description, map, numbers))
 }
 
 /// Two and a half standard deviations of the cells with data.

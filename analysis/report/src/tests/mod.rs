@@ -258,12 +258,15 @@ fn val_maps_and_sparse_holes_are_drawn() {
     let heights = grid.clone();
     shelf.grids.insert("terrain/d2.30-0000.albedo.tif".into(), heights.map(|z| 0.2 + z));
     shelf.grids.insert("terrain/d2.30-0000.rock-potential.tif".into(), heights.map(|_| 0.069));
+    shelf.grids.insert("terrain/d2.30-0000.class.tif".into(), heights.map(|z| f64::from(u8::from(z > 0.0))));
     data.files = Box::new(shelf);
     let (files, summary) = report(&data);
     assert_sound(&files);
     assert!(summary.figures.iter().any(|f| f == "map-albedo-d2.30-0000"));
     assert!(!summary.figures.iter().any(|f| f.starts_with("map-rock-potential")));
     assert!(files["index.html"].contains("map albedo: albedo."));
+    let ground = &files["figures/map-class-d2.30-0000.svg"];
+    assert!(ground.contains(">sand ") && ground.contains(">rock ") && !ground.contains("no data"));
     assert!(files["figures/relief-d2.30-0000.svg"].contains(">−3.00<"));
 }
 

@@ -38,7 +38,7 @@ impl HeightScale {
 
     /// The scale as a sentence.
     pub fn sentence(self) -> String {
-        format!("heights are {} m + {} m x level; level 0 is no data", self.offset_m, self.step_m)
+        format!("heights are {:?} m + {:?} m x level; level 0 is no data", self.offset_m, self.step_m)
     }
 
     fn parse(text: &str) -> Option<Self> {

@@ -4,13 +4,22 @@ use super::representative;
 use crate::ReportError;
 use crate::content::{Figure, slug};
 use crate::data::{Data, Group};
-use crate::questions::relief::{Words, percentiles, values};
+use crate::questions::relief::{Code, Words, codes, percentiles, values};
+use crate::render::colour::NO_DATA;
 use sastrugi_numeric::Grid;
 use sastrugi_schemas::tables::TerrainRow;
 
+/// The map that holds codes.
+const CLASS: &str = "class";
+/// Those codes.
+const GROUND: [Code; 3] =
+    [(0, [0xe8, 0xd3, 0xa2], "sand"), (1, [0x5d, 0x52, 0x4a], "rock"), (NOTHING, NO_DATA, "no data")];
+/// Where there is no code.
+const NOTHING: u8 = 255;
+
 /// A kind of map: its name in the name of its files, a title, and what its colours show, with the unit that generators state.
 const KINDS: [[&str; 3]; 6] = [
-    ["class", "Sand and rock.", "0 sand, 1 rock"],
+    [CLASS, "Sand and rock.", "what the ground is"],
     ["albedo", "Albedo.", "albedo"],
     ["rock-potential", "Rock potential.", "rock potential"],
     ["rms-measured", "Measured roughness.", "RMS in the band, m"],
@@ -46,6 +55,10 @@ fn figure(
         title: title.into(),
         caption: format!("{}, map {name}: {quantity}.", terrain.terrain_id),
     };
+    if name == CLASS {
+        let code = |v: f64| if v.is_finite() { v as u8 } else { NOTHING };
+        return codes(&grid.map(code), &path, &GROUND, words).map(Some);
+    }
     values(&grid, &path, (range, quantity), words)
 }
 
