@@ -36,6 +36,13 @@ const SLOPE_NYQUIST_SHARE: f64 = 0.5;
 /// Density over the largest of the band below which a ring holds rounding alone: squares of amplitudes near 1e-16 of the largest, and
 /// well above them.
 const SLOPE_NOISE_SHARE: f64 = 1e-12;
+/// Density over that of rings on either side below which a ring is a gap.
+const SLOPE_GAP_SHARE: f64 = 0.01;
+/// Rings on either side that are looked at.
+const SLOPE_GAP_RINGS: usize = 3;
+/// Cycles per shortest side above which rings are wider than the distance of modes along an axis, and none is a gap for that reason: what
+/// lies between the lines of a sum of waves is its own.
+const SLOPE_GAP_CYCLES_MAX: f64 = 11.5;
 
 /// One ring of the radially averaged spectrum.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -190,17 +197,30 @@ pub fn default_slope_band(g: &Geometry) -> [f64; 2] {
 }
 
 /// Slope of log density over log frequency, by least squares over the rings of the band (inclusive, cycles/m), each with
-/// the same weight. Rings of rounding noise are left out: a surface that varies along one axis only has no power in rings without a
-/// mode on that axis. NaN with fewer than two rings, or fewer than half of those of the band. A surface with Hurst exponent H has
-/// `-2 (H + 1)`.
-pub fn psd_slope(spectrum: &[SpectrumBin], band_cycles_m: [f64; 2]) -> f64 {
+/// the same weight. Left out are rings of rounding noise, and gaps: a surface that varies along one axis only has no power, or what
+/// padding leaks, in rings without a mode on that axis, which occur below 11.5 cycles per `side_m`, the shortest side. NaN with fewer than two rings, or fewer than half of those of the band. A
+/// surface with Hurst exponent H has `-2 (H + 1)`.
+pub fn psd_slope(spectrum: &[SpectrumBin], band_cycles_m: [f64; 2], side_m: f64) -> f64 {
     let [low, high] = band_cycles_m;
-    let inside = |b: &&SpectrumBin| b.frequency_cycles_m >= low && b.frequency_cycles_m <= high;
-    let band: Vec<&SpectrumBin> = spectrum.iter().filter(inside).collect();
-    let noise = SLOPE_NOISE_SHARE * band.iter().map(|b| b.psd_m4).fold(0.0, f64::max);
-    let told = band.iter().filter(|b| b.psd_m4 > noise);
+    let inside = |b: &SpectrumBin| b.frequency_cycles_m >= low && b.frequency_cycles_m <= high;
+    let band: Vec<usize> = (0..spectrum.len()).filter(|&k| inside(&spectrum[k])).collect();
+    let noise = SLOPE_NOISE_SHARE * largest(band.iter().map(|&k| &spectrum[k]));
+    let narrow = |k: usize| spectrum[k].frequency_cycles_m * side_m < SLOPE_GAP_CYCLES_MAX;
+    let told = |&&k: &&usize| spectrum[k].psd_m4 > noise && !(narrow(k) && is_gap(spectrum, k));
+    let told = band.iter().filter(told).map(|&k| &spectrum[k]);
     let points: Vec<[f64; 2]> = told.map(|b| [libm::log(b.frequency_cycles_m), libm::log(b.psd_m4)]).collect();
     if 2 * points.len() < band.len() { f64::NAN } else { crate::multifractality::line_slope(&points) }
+}
+
+fn largest<'a>(rings: impl IntoIterator<Item = &'a SpectrumBin>) -> f64 {
+    rings.into_iter().map(|b| b.psd_m4).fold(0.0, f64::max)
+}
+
+/// True for a ring far below those on both sides of it.
+fn is_gap(spectrum: &[SpectrumBin], k: usize) -> bool {
+    let below = largest(&spectrum[k.saturating_sub(SLOPE_GAP_RINGS)..k]);
+    let above = largest(spectrum[k + 1..].iter().take(SLOPE_GAP_RINGS));
+    spectrum[k].psd_m4 < SLOPE_GAP_SHARE * below.min(above)
 }
 
 #[cfg(test)]
@@ -283,22 +303,66 @@ mod tests {
     fn val_slope_of_a_power_law() {
         let bin = |f: f64| SpectrumBin { frequency_cycles_m: f, psd_m4: 7.0 / (f * f * f), modes: 1 };
         let spectrum: Vec<SpectrumBin> = (1..50).map(|k| bin(0.1 * f64::from(k))).collect();
-        assert!((psd_slope(&spectrum, [0.2, 3.0]) + 3.0).abs() < 1e-12);
-        assert!(psd_slope(&spectrum, [9.0, 10.0]).is_nan());
+        assert!((psd_slope(&spectrum, [0.2, 3.0], 10.0) + 3.0).abs() < 1e-12);
+        assert!(psd_slope(&spectrum, [9.0, 10.0], 10.0).is_nan());
     }
 
-    /// A wall across the ground: low rings without a mode on the axis of its profile hold rounding alone. Steps fall off as f^-2, and
-    /// the share of modes on the axis in a ring as 1/f: -3, give or take lobes.
+    /// A wall across the ground: low rings without a mode on the axis of its profile hold rounding alone, or what leaks into them where
+    /// sides are padded (all but 400 and 720). Steps fall off as f^-2, and the share of modes on the axis in a ring as 1/f: -3, give or
+    /// take lobes.
     #[test]
-    fn val_rounding_is_no_slope() {
-        let g = Geometry::square(400, 400, 0.15);
-        let wall = field(g, |_, y| if (y - 30.0).abs() < 1.5 { -1.0 } else { 0.0 });
-        let (spectrum, band) = (power_spectrum(&wall), default_slope_band(&g));
-        let top = spectrum.iter().map(|b| b.psd_m4).fold(0.0, f64::max);
-        let empty = |b: &&SpectrumBin| b.frequency_cycles_m >= band[0] && b.psd_m4 < 1e-20 * top;
-        assert!(spectrum.iter().filter(empty).count() > 2);
-        let slope = psd_slope(&spectrum, band);
-        assert!((slope + 3.0).abs() < 0.6, "{slope}");
+    fn val_gaps_are_no_slope() {
+        for side in [400, 660, 666, 667, 700, 720] {
+            let g = Geometry::square(side, side, 0.15);
+            let side_m = 0.15 * side as f64;
+            let middle_m = 0.5 * side_m;
+            let wall = field(g, |_, y| if (y - middle_m).abs() < 1.5 { -1.0 } else { 0.0 });
+            let (spectrum, band) = (power_spectrum(&wall), default_slope_band(&g));
+            let empty =
+                (0..spectrum.len()).filter(|&k| spectrum[k].frequency_cycles_m >= band[0] && is_gap(&spectrum, k));
+            assert!((3..9).contains(&empty.count()), "{side}");
+            let slope = psd_slope(&spectrum, band, side_m);
+            assert!((slope + 3.0).abs() < 0.8, "{side}: {slope}");
+            // The same along the other axis.
+            let across = field(g, |x, _| if (x - middle_m).abs() < 1.5 { -1.0 } else { 0.0 });
+            assert!((psd_slope(&power_spectrum(&across), band, side_m) - slope).abs() < 1e-6, "{side}");
+        }
+    }
+
+    /// Lines of a sum of waves, half an octave apart: what lies between those above 11.5 cycles a side stays.
+    #[test]
+    fn val_lines_far_above_the_side_leave_no_gaps() {
+        let bin = |k: u32| {
+            let f = libm::pow(2.0, f64::from(k) / RINGS_PER_OCTAVE);
+            SpectrumBin {
+                frequency_cycles_m: f,
+                psd_m4: if k.is_multiple_of(4) { 1.0 } else { 1e-6 } / (f * f),
+                modes: 9,
+            }
+        };
+        let spectrum: Vec<SpectrumBin> = (32..64).map(bin).collect();
+        assert!((0..spectrum.len()).any(|k| is_gap(&spectrum, k)));
+        let [all, without] = [1.0, 0.001].map(|side_m| psd_slope(&spectrum, [16.0, 256.0], side_m));
+        let logs: Vec<[f64; 2]> =
+            spectrum.iter().map(|b| [libm::log(b.frequency_cycles_m), libm::log(b.psd_m4)]).collect();
+        assert_eq!(all, crate::multifractality::line_slope(&logs));
+        assert_ne!(all, without);
+    }
+
+    /// Falling, rising and bent spectra have no gaps, nor has a broad valley.
+    #[test]
+    fn val_no_gaps_in_smooth_spectra() {
+        let of = |psd: &dyn Fn(f64) -> f64| -> Vec<SpectrumBin> {
+            let bin = |f: f64| SpectrumBin { frequency_cycles_m: f, psd_m4: psd(f), modes: 9 };
+            (0..60).map(|k| bin(libm::pow(2.0, f64::from(k) / RINGS_PER_OCTAVE))).collect()
+        };
+        let valley = |f: f64| libm::pow(f, -6.0) + 1e-6 * libm::pow(f, 4.0);
+        let laws: [&dyn Fn(f64) -> f64; 4] =
+            [&|f| libm::pow(f, -9.0), &|f| libm::pow(f, 9.0), &|f| libm::exp(-libm::pow(f - 20.0, 2.0)), &valley];
+        for (n, law) in laws.into_iter().enumerate() {
+            let spectrum = of(law);
+            assert!((0..spectrum.len()).all(|k| !is_gap(&spectrum, k)), "{n}");
+        }
     }
 
     /// Half of the rings is enough, less is not.
@@ -307,7 +371,7 @@ mod tests {
         let of = |noisy: usize| {
             let psd = |k: usize| if k <= noisy { 1e-16 } else { libm::pow(k as f64, -3.0) };
             let bin = |k| SpectrumBin { frequency_cycles_m: k as f64, psd_m4: psd(k), modes: 1 };
-            psd_slope(&(1..=8).map(bin).collect::<Vec<_>>(), [0.5, 9.0])
+            psd_slope(&(1..=8).map(bin).collect::<Vec<_>>(), [0.5, 9.0], 1.0)
         };
         assert!([0, 1, 4].iter().all(|&noisy| (of(noisy) + 3.0).abs() < 1e-12));
         assert!(of(5).is_nan());
@@ -318,6 +382,6 @@ mod tests {
         assert!(power_spectrum(&Grid::filled(Geometry::square(9, 9, 1.0), f64::NAN)).is_empty());
         assert!(power_spectrum(&Grid::filled(Geometry::square(2, 9, 1.0), 1.0)).is_empty());
         let flat = power_spectrum(&Grid::filled(Geometry::square(9, 9, 1.0), 1.0));
-        assert!(psd_slope(&flat, [0.0, 1.0]).is_nan());
+        assert!(psd_slope(&flat, [0.0, 1.0], 9.0).is_nan());
     }
 }

@@ -78,7 +78,7 @@ pub fn describe(dem: &Grid, settings: &DescribeSettings) -> Summary {
     let classes = classify(&moore_gradient(dem), &settings.thresholds);
     let window_m = settings.band_window_m.unwrap_or(BAND_CELLS * dem.geometry.mean_cell());
     let (band_rms_m, window) = band_rms(dem, window_m);
-    let map = SpectralMap::of(dem);
+    let (map, size) = (SpectralMap::of(dem), dem.geometry.size());
     let spectrum = map.as_ref().map_or_else(Vec::new, SpectralMap::rings);
     let slope_band_cycles_m = settings.slope_band_cycles_m.unwrap_or_else(|| default_slope_band(&dem.geometry));
     let areal = areal_figures(dem, map.as_ref(), slope_band_cycles_m, settings.hurst_lags_m);
@@ -91,7 +91,7 @@ pub fn describe(dem: &Grid, settings: &DescribeSettings) -> Summary {
         shares: shares(&classes, settings.border_m),
         share_border_m: settings.border_m,
         areal,
-        psd_slope: psd_slope(&spectrum, slope_band_cycles_m),
+        psd_slope: psd_slope(&spectrum, slope_band_cycles_m, size[0].min(size[1])),
         spectrum,
         slope_band_cycles_m,
         histogram: histogram(dem, settings.histogram_bins),
