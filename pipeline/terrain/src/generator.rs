@@ -93,7 +93,11 @@ pub const MAPS: [MapKind; 6] = [
         unit: "m",
         description: "RMS of profiles in the band, in windows of three times its longest wavelength",
     },
-    MapKind { name: "rms-predicted", unit: "m", description: "the same RMS by the rule that the roughness varies by" },
+    MapKind {
+        name: "rms-predicted",
+        unit: "m",
+        description: "RMS of profiles in the band, by the rule that the roughness varies by",
+    },
     MapKind { name: "rock-potential", unit: "1", description: "share of the ground that all rocks may cover, 0 to 1" },
 ];
 

@@ -21,7 +21,7 @@
 //!
 //! Maps of generators (`class`, `albedo` ...) go on where their process counts (w above 0), of two with one name the later; without data
 //! where no process has any, where a blend puts another operand in place (w = 1), and outside of a mask. Maps of roughness do not go on:
-//! they are those of the operand alone, as are the figures of notes that begin with `process k alone`.
+//! they are those of the operand alone, as is what notes say that begin with `process k alone` (k from 1).
 //!
 //! # Cost
 //! The generators', one after the other; three grids more.
@@ -33,7 +33,7 @@ mod tests;
 pub use params::{Compose, Operation, RawCompose, RawProcess, RawRegion};
 
 use crate::generator::{Base, Generator, MAPS, Map, Terrain, TerrainError};
-use params::{Operand, Process, Region, Step};
+use params::{Operand, Part, Process, Region, Step};
 use sastrugi_numeric::{Geometry, Grid, Streams, Surface, ops, sums};
 use serde_json::Value;
 
@@ -116,9 +116,14 @@ const MAPS_OF_HEIGHTS: [&str; 2] = ["rms-measured", "rms-predicted"];
 
 impl Running<'_> {
     /// What an operand makes, on the cells of the whole: generators may place their samples elsewhere in theirs. Its notes go on.
-    fn made(&mut self, operand: &Operand, streams: &Streams, number: usize) -> Result<Terrain, TerrainError> {
+    fn made(
+        &mut self,
+        (part, number): (Part, usize),
+        operand: &Operand,
+        streams: &Streams,
+    ) -> Result<Terrain, TerrainError> {
         let made = operand.values(&self.geometry, streams, &mut self.bases)?;
-        self.notes.extend(made.notes.into_iter().map(|note| format!("process {number} alone: {note}")));
+        self.notes.extend(made.notes.iter().map(|note| part.note(number, note)));
         let placed = |values: Grid| Grid::new(self.geometry, values.values);
         let maps = made.maps.into_iter().map(|map| Map { values: placed(map.values), ..map }).collect();
         Ok(Terrain { heights: placed(made.heights), maps, notes: Vec::new() })
@@ -129,7 +134,7 @@ impl Running<'_> {
         match region {
             None => Ok(Grid::filled(self.geometry, 1.0)),
             Some(region) => {
-                let made = self.made(&region.operand, &streams.child("region"), number)?;
+                let made = self.made((Part::Region, number), &region.operand, &streams.child("region"))?;
                 Ok(made.heights.map(|v| region.weight(v)))
             }
         }
@@ -167,7 +172,7 @@ impl Running<'_> {
                 Ok(ops::combine(&z, &weights, |z, w| w * z + (1.0 - w) * outside_m))
             }
             Step::Join { join, operand, factor, region } => {
-                let made = self.made(operand, &streams, number)?;
+                let made = self.made((Part::Operand, number), operand, &streams)?;
                 let weights = self.weights(region.as_ref(), &streams, number)?;
                 if matches!(join, params::Join::Blend) {
                     self.clear_maps(&weights, |w| w == 1.0);

@@ -185,12 +185,34 @@ pub(super) struct Process {
 impl Process {
     /// Operand and region, in the order in which they are made.
     pub(super) fn operands(&self) -> Vec<&Operand> {
+        self.parts().into_iter().map(|(_, operand)| operand).collect()
+    }
+
+    fn parts(&self) -> Vec<(Part, &Operand)> {
         match &self.step {
             Step::Join { operand, region, .. } => {
-                std::iter::once(operand).chain(region.as_ref().map(|r| &r.operand)).collect()
+                let region = region.as_ref().map(|r| (Part::Region, &r.operand));
+                std::iter::once((Part::Operand, operand)).chain(region).collect()
             }
-            Step::Mask { region, .. } => vec![&region.operand],
+            Step::Mask { region, .. } => vec![(Part::Region, &region.operand)],
             Step::Clip { .. } | Step::ScaleToRelief { .. } => Vec::new(),
+        }
+    }
+}
+
+/// What a generator is to its process.
+#[derive(Clone, Copy)]
+pub(super) enum Part {
+    Operand,
+    Region,
+}
+
+impl Part {
+    /// A note of the generator alone, which need not be true of the whole. Processes count from 1.
+    pub(super) fn note(self, number: usize, note: &str) -> String {
+        match self {
+            Self::Operand => format!("process {number} alone: {note}"),
+            Self::Region => format!("region of process {number} alone: {note}"),
         }
     }
 }
@@ -310,6 +332,10 @@ impl Whole {
         }
         let generator = crate::prepare(kind, &Value::Object(all)).map_err(|e| match e.key.as_str() {
             "kind" => e,
+            key if COMMON.contains(&key) => {
+                let message = format!("is `{kind}`, for which the whole's `{key}` does not serve: it {}", e.message);
+                ParameterError::new("kind", message)
+            }
             _ => e.within("parameters"),
         })?;
         self.check_cells(kind, &generator.geometry())?;
@@ -396,10 +422,12 @@ fn finite(key: &str, value: f64) -> Result<f64, ParameterError> {
 /// What the whole and its generators say before they run; a rounded size is said once.
 fn notes(size: &Size, processes: &[Process]) -> Vec<String> {
     let mut notes: Vec<String> = size.note().into_iter().collect();
-    for operand in processes.iter().flat_map(Process::operands) {
-        let Operand::Generator { generator, .. } = operand else { continue };
-        let said: Vec<String> = generator.notes().into_iter().filter(|note| !notes.contains(note)).collect();
-        notes.extend(said);
+    for (k, process) in processes.iter().enumerate() {
+        for (part, operand) in process.parts() {
+            let Operand::Generator { generator, .. } = operand else { continue };
+            let own = generator.notes().into_iter().filter(|note| size.note().as_ref() != Some(note));
+            notes.extend(own.map(|note| part.note(k + 1, &note)));
+        }
     }
     notes
 }

@@ -129,16 +129,27 @@ fn prop_every_generator_composes() {
     }
 }
 
-/// What a process of its own would say is said of the whole.
+/// What a generator says is said of its process, or of its region.
 #[test]
 fn val_notes_of_generators_go_on() {
     let listing = json!([{"kind": "mavs_perlin", "parameters": {"compat": true}}, {"kind": "cascade"}]);
     let generator = prepared(listing);
     let alone = crate::prepare("mavs_perlin", &json!({"size_px": [30, 20], "cell_m": 0.5, "compat": true})).unwrap();
-    assert!(!alone.notes().is_empty() && alone.notes().iter().all(|note| generator.notes().contains(note)));
+    let of_process = |note: &String| generator.notes().contains(&format!("process 1 alone: {note}"));
+    assert!(!alone.notes().is_empty() && alone.notes().iter().all(of_process));
     let wide = json!({"size_px": [70, 64], "processes": [{"kind": "spheroids", "region": {"kind": "cascade", "from": 0, "to": 1}}]});
     let made = crate::prepare(KIND, &wide).unwrap().generate(&streams(), &[]).unwrap();
-    assert!(made.notes[0].starts_with("process 1 alone: ") && made.notes[0].contains("zeta(1)"), "{:?}", made.notes);
+    let of_region = |note: &String| note.starts_with("region of process 1 alone: ");
+    assert!(made.notes.iter().all(of_region) && made.notes[0].contains("zeta(1)"), "{:?}", made.notes);
+}
+
+/// Size, cell and origin are keys of the whole: what does not serve a generator is said of its kind.
+#[test]
+fn val_an_origin_that_a_generator_refuses_is_the_whole_s() {
+    let processes = json!([{"kind": "spheroids"}, {"kind": "gap"}]);
+    let params = json!({"size_px": [90, 90], "cell_m": 0.25, "origin_m": [0.1, 0.0], "processes": processes});
+    let error = crate::prepare(KIND, &params).err().unwrap();
+    assert!(error.key == "processes.1.kind" && error.message.contains("the whole's `origin_m`"), "{error}");
 }
 
 /// The listing behind `mavs_gaussian` may choose another cell.

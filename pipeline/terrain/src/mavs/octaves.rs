@@ -16,7 +16,8 @@
 //!
 //! The sum of discrete octaves ripples about the power law (by a third for l = 2; much less for sqrt 2). As no octave is shorter than two
 //! cells, it falls below the law from waves of about 6 cells down: 0.7 of it at 4 cells, 0.5 (l = 2) or 0.25 (sqrt 2) at 2.2
-//! (`stat_the_density_is_that_of_the_octaves`).
+//! (`stat_the_density_is_that_of_the_octaves`). It falls below the law again for waves above 1.5 of the longest octave
+//! (`val_the_law_ends_where_the_notes_say`).
 //!
 //! # Source
 //! Van Deusen, B. D. (1967), A statistical technique for the dynamic analysis of vehicles traversing rough yielding and
@@ -46,6 +47,8 @@ const WAVELENGTH_SHARE: f64 = 0.25;
 const CELLS_MIN: f64 = 8.0;
 /// Shortest wave that has the power law, cells: the octaves below two cells, which shorter waves lack, are not there.
 const CELLS_OF_LAW: f64 = 6.0;
+/// Longest wave that has the power law over the longest octave: longer ones lack the octaves above.
+const OCTAVES_OF_LAW: f64 = 1.5;
 /// Most octaves: finer lacunarities would add nothing.
 const OCTAVES_MAX: usize = 200;
 /// Exponent of the profiles' density under the published amplitudes.
@@ -353,6 +356,19 @@ impl TryFrom<RawVanDeusen> for VanDeusen {
     }
 }
 
+/// A length for a sentence.
+fn short(length_m: f64) -> String {
+    shown(format!("{length_m:.2e}").parse().unwrap_or(length_m))
+}
+
+impl VanDeusen {
+    /// Shortest and longest wave that have the power law, m.
+    pub(super) fn law_m(&self) -> [f64; 2] {
+        let longest = self.octaves.octaves.last().map_or(0.0, |[wavelength, _]| *wavelength);
+        [CELLS_OF_LAW * self.octaves.frame.size.cell_m, OCTAVES_OF_LAW * longest]
+    }
+}
+
 /// Constant of the mean density where the shortest waves, of `shortest_m`, have an amplitude of 1 m.
 fn constant_of_unit(raw: &RawVanDeusen, shortest_m: f64) -> f64 {
     let power = raw.exponent - 1.0;
@@ -381,10 +397,13 @@ impl Generator for VanDeusen {
         let mut notes = self.octaves.notes();
         let asked = self.octaves.roughness.as_ref().and_then(Roughness::rms_m);
         notes.extend(asked.is_none().then(|| {
-            let whole_m = CELLS_OF_LAW * self.octaves.frame.size.cell_m;
+            let [low, high] = self.law_m();
+            let waves = match low < high {
+                true => format!("for waves of {} to {} m; others have less", short(low), short(high)),
+                false => "of more octaves than these: all waves have less".to_owned(),
+            };
             format!(
-                "mean density of profiles: {:.4e} f^-{} m3, f in cycles/m, for waves above {whole_m:.4} m; \
-                 shorter ones have less",
+                "mean density of profiles: {:.4e} f^-{} m3, f in cycles/m, {waves}",
                 self.constant, self.raw.exponent
             )
         }));

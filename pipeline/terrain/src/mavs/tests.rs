@@ -218,6 +218,25 @@ fn stat_the_density_is_that_of_the_octaves() {
     }
 }
 
+/// Between the waves that notes name, the octaves' density is the power law but for the ripple of the lacunarity; beyond them it is less.
+#[test]
+fn val_the_law_ends_where_the_notes_say() {
+    for (lacunarity, ripple) in [(2.0, 0.15), (2f64.sqrt(), 0.14)] {
+        let raw = super::octaves::RawVanDeusen { lacunarity, ..Default::default() };
+        let [low_m, high_m] = super::octaves::VanDeusen::try_from(raw).unwrap().law_m();
+        assert!((low_m - 0.9).abs() < 1e-9 && (high_m - 28.8).abs() < 1e-9);
+        let waves = (0..).map(|k| 0.3 * libm::pow(lacunarity, f64::from(k))).take_while(|w| *w < 19.3);
+        let octaves: Vec<[f64; 2]> = waves.map(|w| [w, w.sqrt()]).collect();
+        let constant = super::perlin::moment(1.0) / libm::log(lacunarity);
+        let of_law = |wave_m: f64| expected_density(&octaves, 0.15, 1.0 / wave_m) / (wave_m * wave_m) / constant;
+        for k in 0..=20 {
+            let share = of_law(low_m * libm::pow(high_m / low_m, f64::from(k) / 20.0));
+            assert!((share - 1.0).abs() < ripple, "{lacunarity} {k}: {share}");
+        }
+        assert!(of_law(0.5 * low_m) < 0.8 && of_law(1.6 * high_m) < 0.6, "{lacunarity}");
+    }
+}
+
 /// The constant that the notes state is that of the spectra, also under the scale and other lacunarities. The mean of six
 /// surfaces scatters by 2 %; catches the 0.028 that was measured for the specification (25 % off).
 #[test]
