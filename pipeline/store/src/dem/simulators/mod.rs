@@ -3,7 +3,7 @@
 //!
 //! Cell centres are posts: the ground reaches from the outer centres to the outer centres, `(cols - 1) x (rows - 1)` cells, and no
 //! height is made up beyond. Scene coordinates (x east, y north, z up, m) are the DEM's less its south-west corner, because
-//! simulators count in single precision; for a generated terrain without `origin_m` they are the terrain's own. `scene_to_target`
+//! simulators count in single precision; for most generated terrains without `origin_m` they are the terrain's own. `scene_to_target`
 //! in `import.json` takes them to those of the program, in whose axes and units all other numbers are.
 //!
 //! Where a program takes certain sizes only, the DEM is resampled or cropped ([`Fit`]), and `import.json` says how; a larger DEM is
@@ -208,9 +208,21 @@ fn holds(folder: &Path, simulator: Simulator) -> bool {
 /// [`DemError::Io`] when a file cannot be written.
 pub fn write(folder: &Path, export: &Export) -> Result<(), DemError> {
     atomic::clear_leftovers(&folder.join(IMPORT));
-    // `import.json` first: by it a later run may complete the folder of a killed one.
+    let at = |name: &str| folder.join(name);
     let (first, others): (Vec<_>, Vec<_>) = export.files.iter().partition(|(name, _)| name == IMPORT);
-    first.into_iter().chain(others).try_for_each(|(name, bytes)| save((&folder.join(name)).into(), bytes))
+    let put = |(name, bytes): &(String, Vec<u8>)| save((&at(name)).into(), bytes);
+    // `import.json` first: by it a later run may complete the folder of a killed one. Then what an earlier export left there goes, so that
+    // such a folder lacks files rather than holding those of another terrain.
+    first.into_iter().try_for_each(put)?;
+    for (name, _) in &others {
+        match fs::remove_file(at(name)) {
+            Err(source) if source.kind() != io::ErrorKind::NotFound => {
+                return Err(DemError::Io { path: at(name), source });
+            }
+            _ => {}
+        }
+    }
+    others.into_iter().try_for_each(put)
 }
 
 fn posts(grid: &Grid, simulator: Simulator, fit: Fit) -> Result<Posts, Refusal> {

@@ -154,6 +154,26 @@ fn val_small_relief_high_up_is_kept() {
     assert!(poses.iter().all(|pose| text("model.sdf").contains(pose)), "{}", text("model.sdf"));
 }
 
+/// An export over an older one that breaks off leaves nothing of the older one, and a folder that can be completed.
+#[test]
+fn val_broken_exports_hold_nothing_old() {
+    let folder = tempfile::tempdir().unwrap();
+    let [old, new] = [4, 5].map(|side| resampled(&slanted(side, side), Simulator::Mujoco).unwrap());
+    write(folder.path(), &old).unwrap();
+    // The last file cannot be written.
+    let (last, _) = new.files.iter().rfind(|(name, _)| name != IMPORT).unwrap();
+    fs::remove_file(folder.path().join(last)).unwrap();
+    fs::create_dir_all(folder.path().join(last).join("in the way")).unwrap();
+    write(folder.path(), &new).unwrap_err();
+    for (name, bytes) in new.files.iter().filter(|(name, _)| name != last) {
+        let found = fs::read(folder.path().join(name));
+        assert!(found.is_err() || found.unwrap() == *bytes, "{name}");
+    }
+    assert!(check_folder(folder.path(), Simulator::Mujoco).is_ok());
+    fs::remove_dir_all(folder.path().join(last)).unwrap();
+    write(folder.path(), &new).unwrap();
+}
+
 /// A folder is written to again for the same simulator; no other is, and none with files of somebody else.
 #[test]
 fn val_folders_of_others_are_refused() {
