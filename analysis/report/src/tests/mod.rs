@@ -196,8 +196,13 @@ fn val_groups_share_colours_where_they_are_alike() {
     let alike = ends(|_, _| ());
     assert!(alike[0] == alike[1] && alike[1] == alike[2] && alike[0].len() == 2, "{alike:?}");
     for apart in [
-        ends(|data, shelf| lifted(data, shelf, 1.0, 300.0)),
-        ends(|data, shelf| lifted(data, shelf, 20.0, 0.0)),
+        ends(|data, shelf| lifted(data, shelf, "d2.60-0000", [1.0, 300.0])),
+        ends(|data, shelf| lifted(data, shelf, "d2.60-0000", [20.0, 0.0])),
+        // Alike to the second, not to the first.
+        ends(|data, shelf| {
+            lifted(data, shelf, "d2.45-0000", [2.5, 0.0]);
+            lifted(data, shelf, "d2.60-0000", [6.5, 0.0]);
+        }),
         ends(|data, _| {
             data.terrains.iter_mut().filter(|t| t.terrain_id == "d2.60-0000").for_each(|t| t.cell_x_m = 9.0)
         }),
@@ -206,9 +211,9 @@ fn val_groups_share_colours_where_they_are_alike() {
     }
 }
 
-/// The third group's heights, times a factor and shifted.
-fn lifted(data: &mut Data, shelf: &mut made_up::Shelf, factor: f64, shift_m: f64) {
-    for terrain in data.terrains.iter_mut().filter(|t| t.terrain_id == "d2.60-0000") {
+/// A terrain's heights, times a factor and shifted.
+fn lifted(data: &mut Data, shelf: &mut made_up::Shelf, id: &str, [factor, shift_m]: [f64; 2]) {
+    for terrain in data.terrains.iter_mut().filter(|t| t.terrain_id == id) {
         let grid = shelf.grids.get_mut(&terrain.path).unwrap();
         grid.values.iter_mut().for_each(|z| *z = factor * *z + shift_m);
         let (low, high) = grid.range().unwrap();

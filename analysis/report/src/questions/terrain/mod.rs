@@ -86,16 +86,20 @@ fn alike_in_shape(family: &[Group<TerrainRow>], group: &Group<TerrainRow>) -> bo
 /// Besides, heights that overlap, over ranges within a factor of each other: what one range of colours shows. A piece of measured ground
 /// hundreds of metres up would leave no colours to terrains about 0, and hills none to potholes among them.
 fn alike_in_heights(family: &[Group<TerrainRow>], group: &Group<TerrainRow>) -> bool {
-    let (a, b) = (heights(family), heights(std::slice::from_ref(group)));
-    let [relief_a, relief_b] = [a, b].map(|[low, high]| high - low);
-    let overlap = a[0] <= b[1] && b[0] <= a[1];
-    alike_in_shape(family, group) && overlap && relief_a.max(relief_b) <= RELIEFS_MAX * relief_a.min(relief_b)
+    let b = heights(group);
+    let alike = |other: &Group<TerrainRow>| {
+        let a = heights(other);
+        let [relief_a, relief_b] = [a, b].map(|[low, high]| high - low);
+        let overlap = a[0] <= b[1] && b[0] <= a[1];
+        overlap && relief_a.max(relief_b) <= RELIEFS_MAX * relief_a.min(relief_b)
+    };
+    alike_in_shape(family, group) && family.iter().all(alike)
 }
 
-/// Lowest and highest height of all terrains.
-fn heights(groups: &[Group<TerrainRow>]) -> [f64; 2] {
-    let rows = groups.iter().flat_map(|g| &g.rows);
-    rows.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], t| [low.min(t.height_min_m), high.max(t.height_max_m)])
+/// Lowest and highest height of all terrains of a group.
+fn heights(group: &Group<TerrainRow>) -> [f64; 2] {
+    let none = [f64::INFINITY, f64::NEG_INFINITY];
+    group.rows.iter().fold(none, |[low, high], t| [low.min(t.height_min_m), high.max(t.height_max_m)])
 }
 
 /// True when no cell is as far from the edges as the border that shares leave out.
