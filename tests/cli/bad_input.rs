@@ -101,7 +101,6 @@ fn val_exports_are_refused() {
     refused(path, &["convert", "holed.asc", "out"], USAGE, &["the ending names no DEM format", ".usda"]);
 }
 
-/// A hypothesis that cannot be tested is refused before anything runs, with its place.
 /// A wheel meets the longer side of a cell.
 #[test]
 fn val_oblong_cells_are_judged_by_their_longer_side() {
@@ -112,6 +111,7 @@ fn val_oblong_cells_are_judged_by_their_longer_side() {
     refused(folder.path(), &["plan", "study.toml"], USAGE, &["cells of 90 m", "wheelbase", "missions"]);
 }
 
+/// A hypothesis that cannot be tested is refused before anything runs, with its place.
 #[test]
 fn val_hypotheses_are_refused_with_the_line() {
     let good =
