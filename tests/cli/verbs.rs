@@ -180,6 +180,14 @@ fn val_worlds_are_cut_out_and_dems_refined() {
         assert_eq!(made["maps"][map]["file"], format!("p.{map}.tif"));
         assert_eq!(ok_json(path, &["info", &format!("p.{map}.tif")])["cols"], 64);
     }
+    // What the values are goes through a conversion.
+    ok(path, &["convert", "p.class.tif", "c.tif", "--cog"]);
+    ok(path, &["convert", "p.albedo.tif", "a.tif"]);
+    let [class, albedo, heights] = ["c.tif", "a.tif", "p.tif"].map(|file| ok_json(path, &["info", file]));
+    assert!(class["unit"].is_null() && class["values"].as_str().unwrap().contains("0 sand, 1 rock"), "{class}");
+    assert!(albedo["unit"] == "1" && albedo["what"] == "raster", "{albedo}");
+    assert!(albedo["value_max"].as_f64().unwrap() < 1.0, "{albedo}");
+    assert!(heights["unit"] == "m" && heights["height_max_m"].is_number(), "{heights}");
     let dem = format!("dem=\"{}\"", sastrugi_fixtures::jacksboro().display());
     let window = ["--set", "size_px=[120,100]", "--set", "cell_m=0.5"];
     let refine = |origin: &str| {

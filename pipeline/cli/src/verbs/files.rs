@@ -8,7 +8,7 @@ use crate::output::{columns, print};
 use sastrugi_stages::jobs::dem::to_metres;
 use sastrugi_stages::verbs::{self, Read, Reading, describe_grid, numbers, read_as_it_is, transects};
 use sastrugi_store::dem::simulators::{self, Fit};
-use sastrugi_store::dem::{self, Dem, DemError};
+use sastrugi_store::dem::{self, Dem, DemError, Values};
 use sastrugi_store::mcap;
 use sastrugi_store::release::Release;
 use sastrugi_store::transect::Transects;
@@ -26,7 +26,7 @@ fn failure(error: DemError) -> Failure {
 /// `convert`.
 pub fn convert(args: &Convert, common: &Common) -> Verdict {
     let output = args.output.display();
-    let options = options(&args.writing, &args.output)?;
+    let mut options = options(&args.writing, &args.output)?;
     let format = dem::Format::of_name(&args.output);
     match (args.simulator, format) {
         (Some(_), _) if args.output.exists() && !args.output.is_dir() => {
@@ -53,7 +53,10 @@ pub fn convert(args: &Convert, common: &Common) -> Verdict {
             simulators::write(&args.output, &export).map_err(failure)?;
             export.notes
         }
-        None => dem::write(&args.output, &grid, &info.crs, &options).map_err(failure)?,
+        None => {
+            options.values = info.values;
+            dem::write(&args.output, &grid, &info.crs, &options).map_err(failure)?
+        }
     };
     let notes: Vec<&String> = notes.iter().chain(&converted).chain(&lost).collect();
     let mut text = format!("{output}: {} x {} cells", grid.rows(), grid.cols());
@@ -104,17 +107,23 @@ fn raster(path: &Path, settings: &args::Reading) -> Result<Value, Failure> {
     let read = read_as_it_is(path, &reading)?.dem;
     let info = &read.info;
     let mut result = json!({
-        "what": "elevation raster",
+        "what": if info.values == Values::Heights { "elevation raster" } else { "raster" },
         "format": info.format.name(),
         "dtype": info.dtype,
         "nodata": info.nodata,
-        "unit": if info.crs.geographic { "degrees" } else { "m" },
+        "values": info.values.description(),
+        "unit": info.values.unit(),
+        "coordinates": if info.crs.geographic { "degrees" } else { "m" },
         "epsg": info.crs.epsg,
         "crs": info.crs.name,
         "pixel_is_point": info.pixel_is_point,
     });
     if let (Some(all), Some(grid)) = (result.as_object_mut(), describe_grid(&read.grid).as_object()) {
-        all.extend(grid.clone());
+        let name = |key: &str| match key.strip_prefix("height_") {
+            Some(rest) if info.values.unit() != Some("m") => format!("value_{}", rest.trim_end_matches("_m")),
+            _ => key.to_owned(),
+        };
+        all.extend(grid.iter().map(|(key, value)| (name(key), value.clone())));
         all.insert("heights_sha256".to_owned(), json!(sastrugi_store::digest::heights(&read.grid)));
         all.insert("notes".to_owned(), json!(info.notes));
     }

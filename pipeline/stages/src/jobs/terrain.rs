@@ -152,7 +152,7 @@ impl Job for TerrainJob {
         let mut products = vec![self.write(work, HEIGHTS, "", &made.heights, &crs, &options)?];
         for map in &made.maps {
             let (file, ending) = (format!("{}.tif", map.name), format!(".{}", map.name));
-            let options = WriteOptions { values: values_of(map), ..options };
+            let options = WriteOptions { values: values_of(map), ..options.clone() };
             products.push(self.write(work, &file, &ending, &map.values, &crs, &options)?);
         }
         let mut notes = self.generator.notes();
@@ -200,8 +200,8 @@ impl TerrainJob {
 /// How a map is written.
 pub fn values_of(map: &Map) -> Values {
     match map.kind() {
-        MapKind { unit: "", description, .. } => Values::Codes { description },
-        MapKind { unit, description, .. } => Values::Figures { unit, description },
+        MapKind { unit: "", description, .. } => Values::Codes { description: description.into() },
+        MapKind { unit, description, .. } => Values::Figures { unit: unit.into(), description: description.into() },
     }
 }
 

@@ -51,7 +51,7 @@ pub fn terrain(request: &Request<'_>) -> Result<Value, Error> {
     let mut maps = Map::new();
     for map in &made.maps {
         let path = request.output.with_extension(format!("{}.tif", map.name));
-        let options = WriteOptions { values: values_of(map), ..request.options };
+        let options = WriteOptions { values: values_of(map), ..request.options.clone() };
         dem::write(&path, &map.values, &crs, &options).map_err(super::write_error)?;
         let kind = map.kind();
         let map = json!({ "file": path.display().to_string(), "unit": kind.unit, "description": kind.description });

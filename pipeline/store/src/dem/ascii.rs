@@ -1,6 +1,6 @@
 //! ESRI ASCII grids: a header of words, then rows from the north.
 
-use super::{Crs, Dem, DemInfo, Format, NO_DATA, Refusal, cell_count};
+use super::{Crs, Dem, DemInfo, Format, NO_DATA, Refusal, Values, cell_count};
 use sastrugi_numeric::{Geometry, Grid};
 use std::fmt::Write;
 
@@ -127,7 +127,9 @@ pub(super) fn parse(bytes: &[u8], projection: Option<&str>) -> Result<Dem, Refus
     let (values, integers) = read_values(words, cells, header.nodata)?;
     let (crs, notes) = projection.and_then(named_crs).unwrap_or_else(|| guess_crs(&geometry));
     let dtype = if integers { "int32" } else { "float32" };
-    let info = DemInfo { format: Format::EsriAscii, dtype, nodata: header.nodata, crs, pixel_is_point: false, notes };
+    let (nodata, values_are) = (header.nodata, Values::Heights);
+    let info =
+        DemInfo { format: Format::EsriAscii, dtype, nodata, crs, values: values_are, pixel_is_point: false, notes };
     Ok(Dem { grid: Grid::new(geometry, values), info })
 }
 

@@ -5,7 +5,7 @@
 //! georeferencing. Both stand behind [`parse`], and behind [`Raster`] for rows at a time.
 
 use super::crs::{Crs, GeoKey};
-use super::{Claimed, Dem, DemError, DemInfo, Format, MAX_CELLS, ReadOptions, Refusal, cell_count};
+use super::{Claimed, Dem, DemError, DemInfo, Format, MAX_CELLS, ReadOptions, Refusal, Values, band, cell_count};
 use geotiff_reader::geokeys::{GeoKeyDirectory, GeoKeyValue};
 use geotiff_reader::{GeoTiffFile, GeoTiffOpenOptions};
 use sastrugi_numeric::{Geometry, Grid};
@@ -153,14 +153,17 @@ impl<R: Read + Seek> Raster<R> {
         let dtype = dtype(stored.0, stored.1)?;
         let nodata = file.nodata().and_then(parse_nodata);
         let crs = Crs::from_keys(carried_keys(file.geokeys()));
+        let metadata = ifd.tag(band::TAG);
+        let values = metadata.and_then(|tag| tag.value.as_str()).map(Values::of_metadata).unwrap_or_default();
         let mut notes = crs.unit_notes();
+        notes.extend(values.note());
         let geometry = place(&file, options, &mut notes)?;
         let south_first = file.transform().is_some_and(|t| t.pixel_height >= 0.0);
         if south_first {
             notes.push("its first row is the southern one; rows were turned".to_owned());
         }
         let pixel_is_point = file.crs().raster_type == RASTER_PIXEL_IS_POINT;
-        let info = DemInfo { format: Format::GeoTiff, dtype, nodata, crs, pixel_is_point, notes };
+        let info = DemInfo { format: Format::GeoTiff, dtype, nodata, crs, values, pixel_is_point, notes };
         let block_rows = ifd.tile_height().filter(|_| ifd.is_tiled()).unwrap_or_else(|| ifd.rows_per_strip());
         let block_rows = (block_rows as usize).clamp(1, geometry.rows);
         Ok(Self {
@@ -184,10 +187,13 @@ impl<R: Read + Seek> Raster<R> {
         let [format, bits] = stored.map(|n| u16::try_from(n).unwrap_or(u16::MAX));
         let dtype = dtype(format, bits)?;
         let nodata = decoder.get_tag_ascii_string(Tag::GdalNodata).ok().and_then(|text| parse_nodata(&text));
+        let metadata = decoder.get_tag_ascii_string(Tag::Unknown(band::TAG)).ok();
+        let values = metadata.map(|text| Values::of_metadata(&text)).unwrap_or_default();
         let mut notes = vec!["the TIFF has no georeferencing".to_owned()];
+        notes.extend(values.note());
         let geometry = unplaced(rows as usize, cols as usize, options, &mut notes);
         let crs = Crs::default();
-        let info = DemInfo { format: Format::GeoTiff, dtype, nodata, crs, pixel_is_point: false, notes };
+        let info = DemInfo { format: Format::GeoTiff, dtype, nodata, crs, values, pixel_is_point: false, notes };
         let (wide, high) = decoder.chunk_dimensions();
         if wide == 0 || high == 0 {
             return Err(Refusal::new("has strips or tiles without cells"));

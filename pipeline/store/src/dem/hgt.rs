@@ -1,7 +1,7 @@
 //! SRTM tiles: big-endian 16-bit posts of one degree, 1201 or 3601 to a side, the outer ones shared with the neighbours.
 //! The name gives the south-western post; posts are cell centres, so the grid reaches half a cell beyond the degree.
 
-use super::{Crs, Dem, DemInfo, Format, Refusal};
+use super::{Crs, Dem, DemInfo, Format, Refusal, Values};
 use sastrugi_numeric::{Geometry, Grid};
 use std::path::Path;
 
@@ -24,6 +24,7 @@ pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Dem, Refusal> {
         dtype: "int16",
         nodata: Some(f64::from(VOID)),
         crs: Crs::wgs84(),
+        values: Values::Heights,
         pixel_is_point: true,
         notes: vec![],
     };

@@ -9,6 +9,7 @@
 //! asked for.
 
 mod ascii;
+mod band;
 mod blocks;
 mod crs;
 mod geotiff;
@@ -22,6 +23,7 @@ mod tiff_writer;
 #[cfg(test)]
 mod tests;
 
+pub use band::Values;
 pub use blocks::{BlockReader, open};
 pub use crs::{Crs, GeoKey};
 pub use png::{HeightScale, write_png_heights, write_png16};
@@ -62,6 +64,8 @@ pub struct DemInfo {
     pub nodata: Option<f64>,
     /// Coordinate reference system.
     pub crs: Crs,
+    /// What the values are, as the file says.
+    pub values: Values,
     /// True when the file places its values at points (and the grid was shifted by half a cell to centre them).
     pub pixel_is_point: bool,
     /// Sentences a user must know.
@@ -384,28 +388,8 @@ pub enum Compression {
     Zstd,
 }
 
-/// What the values of a raster are, for the reader of a GeoTIFF.
-#[derive(Clone, Copy, Debug, Default)]
-pub enum Values {
-    /// Heights, m.
-    #[default]
-    Heights,
-    /// Figures of another kind.
-    Figures {
-        /// Their unit, `1` for plain numbers.
-        unit: &'static str,
-        /// What they are.
-        description: &'static str,
-    },
-    /// Codes, which have no means: overviews hold one of them.
-    Codes {
-        /// What they stand for.
-        description: &'static str,
-    },
-}
-
 /// How a raster is written.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct WriteOptions {
     /// Compression of a GeoTIFF; other formats have one way.
     pub compression: Compression,

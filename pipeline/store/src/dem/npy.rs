@@ -1,6 +1,6 @@
 //! NumPy arrays, versions 1 to 3 (Kern, NumPy Enhancement Proposal 1): two dimensions of real numbers, row 0 north.
 
-use super::{Crs, Dem, DemInfo, Format, ReadOptions, Refusal, cell_count, geotiff};
+use super::{Crs, Dem, DemInfo, Format, ReadOptions, Refusal, Values, cell_count, geotiff};
 use sastrugi_numeric::Grid;
 
 /// Reads an array.
@@ -30,6 +30,7 @@ pub(super) fn parse(bytes: &[u8], options: &ReadOptions) -> Result<Dem, Refusal>
         dtype: element.name,
         nodata: None,
         crs: Crs::default(),
+        values: Values::Heights,
         pixel_is_point: false,
         notes,
     };

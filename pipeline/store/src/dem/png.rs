@@ -1,7 +1,8 @@
 //! Greyscale PNG: heights as 16-bit levels, for game engines and image programs.
 
 use super::{
-    Claimed, Crs, Dem, DemError, DemInfo, Format, MAX_CELLS, ReadOptions, Refusal, cell_count, geotiff, save, unfit,
+    Claimed, Crs, Dem, DemError, DemInfo, Format, MAX_CELLS, ReadOptions, Refusal, Values, cell_count, geotiff, save,
+    unfit,
 };
 use crate::atomic::Target;
 use sastrugi_numeric::Grid;
@@ -143,6 +144,7 @@ pub(super) fn parse(bytes: &[u8], options: &ReadOptions) -> Result<Dem, Refusal>
         dtype: if wide { "uint16" } else { "uint8" },
         nodata: None,
         crs: Crs::default(),
+        values: Values::Heights,
         pixel_is_point: false,
         notes,
     };

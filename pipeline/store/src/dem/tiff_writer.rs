@@ -9,7 +9,7 @@
 //! the bytes. Predictor 3 is that of Adobe Photoshop TIFF Technical Note 3 (2005).
 
 use super::crs::{Crs, GeoKey, RASTER_TYPE};
-use super::{Compression, NO_DATA, Refusal, Values, WriteOptions, check_single_precision, free_of_no_data_value};
+use super::{Compression, NO_DATA, Refusal, Values, WriteOptions, band, check_single_precision, free_of_no_data_value};
 use flate2::write::ZlibEncoder;
 use rayon::prelude::*;
 use sastrugi_numeric::{Geometry, Grid};
@@ -56,26 +56,12 @@ pub(super) fn heights(grid: &Grid, crs: &Crs, options: &WriteOptions) -> Result<
         |subfile| [sample_tags(code, predictor, 32, SAMPLE_FLOAT), vec![Tag::long(SUBFILE, &[subfile])]].concat();
     let image = |subfile, level: &Grid| image(tags(subfile), &single_precision(level), NO_DATA as f32, encode);
     let mut whole = image(WHOLE, &rounded)?;
-    whole.tags.push(Tag::ascii(42112, &band_metadata(options.values)));
+    whole.tags.push(Tag::ascii(band::TAG, &options.values.metadata()));
     whole.tags.extend(georeference(&grid.geometry, crs)?);
     let less = if matches!(options.values, Values::Codes { .. }) { thinned } else { halved };
     let levels = if options.cloud_optimised { overviews(&rounded, less) } else { vec![] };
     let reduced = levels.iter().map(|level| image(REDUCED, level));
     assemble(std::iter::once(Ok(whole)).chain(reduced).collect::<Result<_, _>>()?)
-}
-
-/// Unit and description of the band, where GDAL looks for them.
-fn band_metadata(values: Values) -> String {
-    let item = |name: &str, text: &str| match text {
-        "" => String::new(),
-        _ => format!("  <Item name=\"{name}\" sample=\"0\" role=\"{}\">{text}</Item>\n", name.to_ascii_lowercase()),
-    };
-    let (unit, description) = match values {
-        Values::Heights => ("m", ""),
-        Values::Figures { unit, description } => (unit, description),
-        Values::Codes { description } => ("", description),
-    };
-    format!("<GDALMetadata>\n{}{}</GDALMetadata>\n", item("UNITTYPE", unit), item("DESCRIPTION", description))
 }
 
 fn single_precision(grid: &Grid) -> Grid<f32> {

@@ -190,6 +190,7 @@ fn gridded(cloud: &Cloud, settings: &GridSettings) -> Result<Gridded, Refusal> {
         dtype: "int32",
         nodata: None,
         crs: cloud.crs.clone(),
+        values: dem::Values::Heights,
         pixel_is_point: false,
         notes,
     };

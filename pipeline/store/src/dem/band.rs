@@ -1,0 +1,162 @@
+//! What the values of a raster are, as a GeoTIFF says it: unit and description of the band in GDAL's metadata.
+
+use std::borrow::Cow;
+use std::fmt::Write;
+
+/// TIFF tag of GDAL's metadata, XML.
+pub(super) const TAG: u16 = 42112;
+/// Units that are metres, in lower case; programs write all of these.
+const METRES: [&str; 6] = ["", "m", "metre", "metres", "meter", "meters"];
+/// Item that codes have, beside those that GDAL knows.
+const CODES: &str = "VALUES";
+
+/// What the values of a raster are.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum Values {
+    /// Heights, m.
+    #[default]
+    Heights,
+    /// Figures of another kind.
+    Figures {
+        /// Their unit, `1` for plain numbers.
+        unit: Cow<'static, str>,
+        /// What they are.
+        description: Cow<'static, str>,
+    },
+    /// Codes, which have no means: overviews hold one of them.
+    Codes {
+        /// What they stand for.
+        description: Cow<'static, str>,
+    },
+}
+
+impl Values {
+    /// Their unit; none for codes.
+    pub fn unit(&self) -> Option<&str> {
+        match self {
+            Self::Heights => Some("m"),
+            Self::Figures { unit, .. } => Some(unit),
+            Self::Codes { .. } => None,
+        }
+    }
+
+    /// What they are; empty where a file does not say it.
+    pub fn description(&self) -> &str {
+        match self {
+            Self::Heights => "heights",
+            Self::Figures { description, .. } | Self::Codes { description } => description,
+        }
+    }
+
+    /// The sentence for those who take the values for heights in metres.
+    pub(super) fn note(&self) -> Option<String> {
+        let taken = "the numbers are taken as they are";
+        match self {
+            Self::Heights => None,
+            Self::Figures { unit, .. } if unit == "m" => None,
+            Self::Figures { unit, .. } => {
+                Some(format!("the file says that its values are in `{unit}`, not m; {taken}"))
+            }
+            Self::Codes { description } => Some(format!("the file says that it holds codes ({description}); {taken}")),
+        }
+    }
+
+    /// The text of the tag.
+    pub(super) fn metadata(&self) -> String {
+        let mut text = "<GDALMetadata>\n".to_owned();
+        // Writing to a string cannot fail.
+        let mut item = |name: &str, role: &str, value: &str| {
+            let role = if role.is_empty() { String::new() } else { format!(" role=\"{role}\"") };
+            let _ = writeln!(text, "  <Item name=\"{name}\" sample=\"0\"{role}>{}</Item>", escaped(value));
+        };
+        match self {
+            Self::Heights => item("UNITTYPE", "unittype", "m"),
+            Self::Figures { unit, description } => {
+                item("UNITTYPE", "unittype", unit);
+                item("DESCRIPTION", "description", description);
+            }
+            Self::Codes { description } => {
+                item("DESCRIPTION", "description", description);
+                item(CODES, "", "codes");
+            }
+        }
+        text.push_str("</GDALMetadata>\n");
+        text
+    }
+
+    /// What the text of the tag says of the first band; heights where it says nothing else.
+    pub(super) fn of_metadata(text: &str) -> Self {
+        let items: Vec<(&str, String)> = items(text).collect();
+        let find = |what: &str| items.iter().find(|(attributes, _)| attributes.contains(what)).map(|(_, value)| value);
+        let description = Cow::Owned(find("role=\"description\"").cloned().unwrap_or_default());
+        let unit = find("role=\"unittype\"").cloned().unwrap_or_default();
+        match find(&format!("name=\"{CODES}\"")).map(String::as_str) {
+            Some("codes") => Self::Codes { description },
+            _ if !METRES.contains(&unit.to_lowercase().as_str()) => {
+                Self::Figures { unit: Cow::Owned(unit), description }
+            }
+            _ if description.is_empty() => Self::Heights,
+            _ => Self::Figures { unit: Cow::Borrowed("m"), description },
+        }
+    }
+}
+
+/// Attributes and text of the items of the first band.
+fn items(text: &str) -> impl Iterator<Item = (&str, String)> {
+    let parts = text.split("<Item ").skip(1).filter_map(|part| {
+        let (attributes, rest) = part.split_once('>')?;
+        let (value, _) = rest.split_once("</Item>")?;
+        Some((attributes, unescaped(value.trim())))
+    });
+    parts.filter(|(attributes, _)| attributes.contains("sample=\"0\""))
+}
+
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
+}
+
+fn unescaped(text: &str) -> String {
+    text.replace("&lt;", "<").replace("&gt;", ">").replace("&quot;", "\"").replace("&apos;", "'").replace("&amp;", "&")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// As GDAL 3.8 writes them (`gdal_edit.py -units`, `-scale`, with statistics of several bands).
+    #[test]
+    fn val_units_of_other_programs() {
+        let of = |unit: &str| {
+            Values::of_metadata(&format!(
+                "<GDALMetadata>\n  <Item name=\"STATISTICS_MEAN\" sample=\"0\">3.5</Item>\n  <Item name=\"AREA\">x</Item>\n  \
+                 <Item name=\"DESCRIPTION\" sample=\"0\" role=\"description\">band &amp; &lt;1&gt;</Item>\n  \
+                 <Item name=\"UNITTYPE\" sample=\"1\" role=\"unittype\">K</Item>\n  \
+                 <Item name=\"UNITTYPE\" sample=\"0\" role=\"unittype\">{unit}</Item>\n</GDALMetadata>\n"
+            ))
+        };
+        let metres = Values::Figures { unit: "m".into(), description: "band & <1>".into() };
+        assert!(["m", "metre", "Meter", ""].iter().all(|unit| of(unit) == metres) && metres.note().is_none());
+        assert_eq!(of("ft"), Values::Figures { unit: "ft".into(), description: "band & <1>".into() });
+        assert!(of("ft").note().unwrap().contains("`ft`"));
+        assert_eq!(Values::of_metadata("<GDALMetadata><Item name=\"VALUES"), Values::Heights);
+    }
+
+    proptest! {
+        /// Whatever it says is read as it was written.
+        #[test]
+        fn prop_what_is_written_is_read(unit in "[a-z&<>/0-9]{1,8}", description in "[ -~]{0,40}") {
+            let description = Cow::<str>::Owned(description.trim().to_owned());
+            let codes = Values::Codes { description: description.clone() };
+            prop_assert_eq!(&Values::of_metadata(&codes.metadata()), &codes);
+            prop_assume!(!METRES.contains(&unit.as_str()) || unit == "m" && !description.is_empty());
+            let figures = Values::Figures { unit: unit.into(), description };
+            prop_assert_eq!(&Values::of_metadata(&figures.metadata()), &figures);
+        }
+
+        #[test]
+        fn prop_any_text_is_read(text in "\\PC*") {
+            let _ = Values::of_metadata(&text);
+        }
+    }
+}
