@@ -198,8 +198,8 @@ pub fn default_slope_band(g: &Geometry) -> [f64; 2] {
 
 /// Slope of log density over log frequency, by least squares over the rings of the band (inclusive, cycles/m), each with
 /// the same weight. Left out are rings of rounding noise, and gaps: a surface that varies along one axis only has no power, or what
-/// padding leaks, in rings without a mode on that axis, which occur below 11.5 cycles per `side_m`, the shortest side. NaN with fewer than two rings, or fewer than half of those of the band. A
-/// surface with Hurst exponent H has `-2 (H + 1)`.
+/// padding leaks, in rings without a mode on that axis, which occur below 11.5 cycles per `side_m`, the shortest side. NaN with fewer
+/// than two rings, or fewer than half of those of the band. A surface with Hurst exponent H has `-2 (H + 1)`.
 pub fn psd_slope(spectrum: &[SpectrumBin], band_cycles_m: [f64; 2], side_m: f64) -> f64 {
     let [low, high] = band_cycles_m;
     let inside = |b: &SpectrumBin| b.frequency_cycles_m >= low && b.frequency_cycles_m <= high;

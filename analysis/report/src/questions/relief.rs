@@ -1,4 +1,4 @@
-//! Shaded relief and deviation maps of one heightfield.
+//! Maps of one raster: shaded relief, deviations, values, codes.
 
 use crate::ReportError;
 use crate::content::{Figure, Numbers, count, number, text};

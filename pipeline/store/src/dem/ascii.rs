@@ -127,9 +127,15 @@ pub(super) fn parse(bytes: &[u8], projection: Option<&str>) -> Result<Dem, Refus
     let (values, integers) = read_values(words, cells, header.nodata)?;
     let (crs, notes) = projection.and_then(named_crs).unwrap_or_else(|| guess_crs(&geometry));
     let dtype = if integers { "int32" } else { "float32" };
-    let (nodata, values_are) = (header.nodata, Values::Heights);
-    let info =
-        DemInfo { format: Format::EsriAscii, dtype, nodata, crs, values: values_are, pixel_is_point: false, notes };
+    let info = DemInfo {
+        format: Format::EsriAscii,
+        dtype,
+        nodata: header.nodata,
+        crs,
+        values: Values::Heights,
+        pixel_is_point: false,
+        notes,
+    };
     Ok(Dem { grid: Grid::new(geometry, values), info })
 }
 
