@@ -12,7 +12,7 @@ use sastrugi_benches::floor;
 use sastrugi_numeric::fft::RealFft2;
 use sastrugi_numeric::{Geometry, Grid, Streams};
 use sastrugi_texture::covariance::masked_covariance;
-use sastrugi_texture::detrend::{BoxWindow, box_mean};
+use sastrugi_texture::detrend::{AtPartial, BoxWindow, background};
 use sastrugi_texture::{FitParameters, FitSettings};
 
 const SIZES: [usize; 2] = [2048, 4096];
@@ -53,20 +53,34 @@ fn copy(bencher: Bencher, n: usize) {
     });
 }
 
+/// The background of a whole raster: windows are partial at its border only.
+#[divan::bench(sample_count = 10, args = SIZES)]
+fn background_33_cells(bencher: Bencher, n: usize) {
+    let values: Vec<f64> = raster(n).into_iter().map(|z| if z.is_nan() { 0.0 } else { z }).collect();
+    background_of(bencher, &values, n, 33, AtPartial::Plane);
+}
+
+/// The mean of the same raster's windows.
 #[divan::bench(sample_count = 10, args = SIZES)]
 fn moving_average_33_cells(bencher: Bencher, n: usize) {
-    moving_average(bencher, n, 33);
+    let values: Vec<f64> = raster(n).into_iter().map(|z| if z.is_nan() { 0.0 } else { z }).collect();
+    background_of(bencher, &values, n, 33, AtPartial::Mean);
+}
+
+/// Scattered holes: every window is partial.
+#[divan::bench(sample_count = 10, args = SIZES)]
+fn background_33_cells_with_holes(bencher: Bencher, n: usize) {
+    background_of(bencher, &raster(n), n, 33, AtPartial::Plane);
 }
 
 #[divan::bench(sample_count = 10, args = SIZES)]
-fn moving_average_201_cells(bencher: Bencher, n: usize) {
-    moving_average(bencher, n, 201);
+fn background_201_cells_with_holes(bencher: Bencher, n: usize) {
+    background_of(bencher, &raster(n), n, 201, AtPartial::Plane);
 }
 
-fn moving_average(bencher: Bencher, n: usize, width: usize) {
-    let values = raster(n);
+fn background_of(bencher: Bencher, values: &[f64], n: usize, width: usize, at_partial: AtPartial) {
     let window = BoxWindow { half: [width / 2; 2] };
-    bencher.counter(ItemsCount::new(n * n)).bench(|| box_mean(&values, n, window));
+    bencher.counter(ItemsCount::new(n * n)).bench(|| background(values, n, window, at_partial));
 }
 
 /// The floor of the covariance.

@@ -1,31 +1,32 @@
 //! Partial windows: see [`super::filtered`].
 //!
-//! The window of a cell is cut into blocks, and each block to the rectangle that holds its data. Its share of the data is
-//! exact; it stands at one of its cells, which moves from pair to pair. The two cells of a pair have data, which scattered
-//! holes make more than the share of their block: they stand as points of their own. Where the windows overlap, a cell
-//! lacks data in both or in none: `m^2 = m` adds the variance of m at distance 0, and takes it off at the distances within
-//! the block, whose count is given. So the border, holes of a window's size and scattered cells are accounted
-//! for. Pairs and cells follow a low-discrepancy sequence (Kronecker with powers of the generalised golden ratio: Roberts,
-//! 2018): nothing is random.
+//! The window is cut into blocks. A block stands at two of its cells with data, opposite each other about its middle, which move
+//! from pair to pair; its number of cells is exact. The weights of a window's cells fall linearly across it, from 4 / n to -2 / n at a
+//! border: each point has that of its place in the plane through all points ([`Moments::plane`]; a block's share of the cells alone would
+//! err by 1 to 7 % of the variance there). So the border, holes of a window's size and scattered cells are accounted for.
+//! Pairs and cells follow a low-discrepancy sequence (Kronecker with powers of the generalised golden ratio: Roberts, 2018):
+//! nothing is random.
 
 use super::bins::{LagBins, Member, length_m};
 use super::filtered::LagField;
 use crate::bitmap::Bitmap;
-use crate::detrend::BoxWindow;
+use crate::detrend::{BoxWindow, Moments};
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Pairs with a partial window that are averaged over in each bin (about): the correction is good to 1e-4 of the variance.
-pub const PAIRS_FINE: f64 = 2048.0;
+/// Pairs with a partial window that are averaged over in each bin (about): the correction is good to 2e-4 of the variance.
+pub const PAIRS_FINE: f64 = 4096.0;
 /// The same where half that precision is enough.
-pub const PAIRS_ROUGH: f64 = 512.0;
+pub const PAIRS_ROUGH: f64 = 1024.0;
 /// Most pairs looked at in each bin.
-const PAIRS_MAX: f64 = 32_768.0;
+const PAIRS_MAX: f64 = 65_536.0;
 /// Blocks along a window for its covariance with a cell.
-const FINE_BLOCKS: usize = 8;
+const FINE_BLOCKS: usize = 6;
 /// Blocks along a window for its covariance with another window, which is smoother.
-const COARSE_BLOCKS: usize = 4;
+const COARSE_BLOCKS: usize = 3;
 
+/// Pairs whose first windows are held at once.
+const SAMPLES_AT_ONCE: usize = 512;
 /// Most cells counted at once, besides those within reach.
 const STRIP_CELLS: usize = 1 << 22;
 
@@ -75,14 +76,17 @@ impl PartialWindows {
             }
             let around = top.saturating_sub(reach[0] as usize)..(top + step + reach[0] as usize).min(cells.rows);
             let data = DataCount::new(cells, around);
-            let sampler = Sampler { cells, window, complete: CompleteTiles::new(&data, window), data };
-            sums.par_iter_mut().zip(&members).enumerate().for_each(|(bin, (line, members))| {
-                for s in samples.clone() {
-                    let draw = Draw { index: s * bins.len() + bin };
-                    let lag = members[draw.below(0, members.len())].lag;
-                    line.pairs += usize::from(sampler.add_pair(centres[s], lag, &draw, line));
-                }
-            });
+            let sampler =
+                Sampler { cells, window, stride: stride(reach), complete: CompleteTiles::new(&data, window), data };
+            for first in samples.clone().step_by(SAMPLES_AT_ONCE) {
+                let some = first..(first + SAMPLES_AT_ONCE).min(samples.end);
+                let near: Vec<Near> = some.clone().into_par_iter().map(|s| sampler.near(centres[s], s)).collect();
+                sums.par_iter_mut().zip(&members).enumerate().for_each(|(bin, (line, members))| {
+                    for (s, near) in some.clone().zip(&near) {
+                        sampler.add_pair(near, members, &Draw { index: s * bins.len() + bin }, line);
+                    }
+                });
+            }
         }
         Self { reach, weights: sums.into_iter().map(LagWeights::mean).collect() }
     }
@@ -153,7 +157,12 @@ fn centres(cells: &DetrendedCells, pairs: f64) -> Vec<usize> {
     cells.used.select(&ranks)
 }
 
-/// Weights by lag, one of two opposite lags: `row` in `0..=reach[0]` (outer), `col` in `-reach[1]..=reach[1]` (inner).
+/// Places of two neighbouring rows of lags are this far apart.
+fn stride(reach: [isize; 2]) -> isize {
+    2 * reach[1] + 1
+}
+
+/// Sums of weights by lag: `row` in `-reach[0]..=reach[0]` (outer), `col` in `-reach[1]..=reach[1]` (inner).
 struct LagWeights {
     reach: [isize; 2],
     weights: Vec<f64>,
@@ -163,155 +172,151 @@ struct LagWeights {
 
 impl LagWeights {
     fn new(reach: [isize; 2]) -> Self {
-        Self { reach, weights: vec![0.0; ((reach[0] + 1) * (2 * reach[1] + 1)) as usize], pairs: 0 }
+        Self { reach, weights: vec![0.0; ((2 * reach[0] + 1) * stride(reach)) as usize], pairs: 0 }
     }
 
-    fn add(&mut self, [row, col]: [isize; 2], weight: f64) {
-        let (row, col) = if row < 0 { (-row, -col) } else { (row, col) };
-        self.weights[(row * (2 * self.reach[1] + 1) + col + self.reach[1]) as usize] += weight;
+    /// Adds so many times the weights of points at their offsets from a place.
+    fn add(&mut self, from: isize, sign: isize, points: &[Point], times: f64) {
+        for p in points {
+            self.weights[(from + sign * p.at) as usize] += times * p.weight;
+        }
     }
 
-    /// Mean over the pairs.
-    fn mean(mut self) -> Vec<f64> {
-        self.weights.iter_mut().for_each(|w| *w /= self.pairs.max(1) as f64);
-        self.weights
+    /// Adds the products of two windows' weights, less those of complete ones.
+    fn add_product(&mut self, from: isize, near: &Window, far: &Window) {
+        near.points.iter().for_each(|n| self.add(from - n.at, 1, &far.points, n.weight));
+        near.complete.iter().for_each(|n| self.add(from - n.at, 1, &far.complete, -n.weight));
+    }
+
+    /// Place of a lag.
+    fn place(&self, [row, col]: [isize; 2]) -> isize {
+        (row + self.reach[0]) * stride(self.reach) + col + self.reach[1]
+    }
+
+    /// Mean over the pairs, of both of two opposite lags: `row` in `0..=reach[0]` (outer), `col` in `-reach[1]..=reach[1]`.
+    fn mean(self) -> Vec<f64> {
+        let middle = self.place([0, -self.reach[1]]) as usize;
+        let (north, south) = self.weights.split_at(middle);
+        let mut mean = south.to_vec();
+        let opposite = north.iter().rev();
+        mean[stride(self.reach) as usize..].iter_mut().zip(opposite).for_each(|(w, other)| *w += other);
+        mean.iter_mut().for_each(|w| *w /= self.pairs.max(1) as f64);
+        mean
     }
 }
 
-/// A block of a window, or one of the pair's cells.
+/// A cell that stands for some of a window.
 #[derive(Clone, Copy)]
-struct Part {
-    /// Share of the moving average's weight.
-    share: f64,
-    /// Offset of the cell it stands at.
-    offset: [isize; 2],
-    /// Share when the window is complete.
-    complete_share: f64,
-    /// Offset of the cell it stands at when the window is complete.
-    complete_offset: [isize; 2],
-    /// Number of cells times the variance of `D_i` in them.
-    scatter: f64,
-    /// Lag between two of its cells.
-    spread: [isize; 2],
+struct Point {
+    /// Weight in the background.
+    weight: f64,
+    /// Place of its offset.
+    at: isize,
 }
 
-impl Part {
-    /// True when it stands at the same cell as in a complete window.
-    fn in_place(&self) -> bool {
-        self.offset == self.complete_offset
-    }
+/// A window of a cell as points, and as the points it would have if it were complete.
+struct Window {
+    points: Vec<Point>,
+    complete: Vec<Point>,
+}
+
+/// The first cell of pairs.
+struct Near {
+    cell: [isize; 2],
+    /// Where its points lie in their blocks.
+    shift: [f64; 2],
+    /// Its window in fine and in coarse blocks, when it is partial.
+    partial: Option<[Window; 2]>,
 }
 
 struct Sampler<'a> {
     cells: &'a DetrendedCells<'a>,
     window: BoxWindow,
+    /// [`stride`] of the lags.
+    stride: isize,
     data: DataCount,
     complete: CompleteTiles,
 }
 
 impl Sampler<'_> {
-    /// Adds the pair of `cell` and the cell a lag away; false when that one is not used.
-    fn add_pair(&self, cell: usize, lag: [isize; 2], draw: &Draw, line: &mut LagWeights) -> bool {
-        let at = [cell / self.cells.cols, cell % self.cells.cols].map(|k| k as isize);
-        let partner = [at[0] + lag[0], at[1] + lag[1]];
+    /// The first cell of the pairs of a sample.
+    fn near(&self, cell: usize, sample: usize) -> Near {
+        let cell = [cell / self.cells.cols, cell % self.cells.cols].map(|k| k as isize);
+        let draw = Draw { index: sample };
+        let shift = [draw.unit(1), draw.unit(2)];
+        let windows = || [FINE_BLOCKS, COARSE_BLOCKS].map(|blocks| self.window(cell, blocks, shift));
+        Near { cell, shift, partial: self.is_partial(cell).then(windows) }
+    }
+
+    /// Adds a pair of `near` and a cell at one of the lags of a bin or its opposite; none when that one is not used.
+    fn add_pair(&self, near: &Near, members: &[Member], draw: &Draw, line: &mut LagWeights) {
+        let place = draw.below(0, 2 * members.len());
+        let lag = members[place / 2].lag;
+        let lag = if place.is_multiple_of(2) { lag } else { lag.map(|l| -l) };
+        let partner = [near.cell[0] + lag[0], near.cell[1] + lag[1]];
         if !self.index(partner).is_some_and(|k| self.cells.used.get(k)) {
-            return false;
+            return;
         }
-        if self.complete.at(at) && self.complete.at(partner) {
-            return true;
+        line.pairs += 1;
+        let from = line.place(lag);
+        // - D_i(j) C(h - j); on average as much as - D_(i+h)(k) C(h + k), whose pairs are those of the opposite lag.
+        if let Some([fine, _]) = &near.partial {
+            line.add(from, -1, &fine.points, -2.0);
+            line.add(from, -1, &fine.complete, 2.0);
         }
-        let counts = [at, partner].map(|[r, c]| self.data.within([self.span(0, r), self.span(1, c)]));
-        let partial = counts.map(|n| (n as usize) < self.window.area());
-        if partial.contains(&true) {
-            let shifts = [[draw.unit(1), draw.unit(2)], [draw.unit(3), draw.unit(4)]];
-            let near = |blocks| self.parts(at, counts[0], lag, blocks, shifts[0]);
-            let far = |blocks| self.parts(partner, counts[1], lag.map(|l| -l), blocks, shifts[1]);
-            // A complete window changes nothing by itself.
-            if partial[0] {
-                add_cell_window(lag, -1, &near(FINE_BLOCKS), line);
+        // D_i(j) D_(i+h)(k) C(h + k - j).
+        let far = || self.window(partner, COARSE_BLOCKS, [draw.unit(3), draw.unit(4)]);
+        match &near.partial {
+            Some([_, coarse]) => line.add_product(from, coarse, &far()),
+            None if self.is_partial(partner) => {
+                line.add_product(from, &self.window(near.cell, COARSE_BLOCKS, near.shift), &far());
             }
-            if partial[1] {
-                add_cell_window(lag, 1, &far(FINE_BLOCKS), line);
-            }
-            self.add_window_window(lag, [&near(COARSE_BLOCKS), &far(COARSE_BLOCKS)], line);
-        }
-        true
-    }
-
-    /// Rows or columns of the window about one, `from..to`.
-    fn span(&self, axis: usize, centre: isize) -> [isize; 2] {
-        let half = self.window.half[axis] as isize;
-        [centre - half, centre + half + 1]
-    }
-
-    /// `D_i(j) D_(i+h)(k) C(h + k - j)`, less the same of complete windows.
-    fn add_window_window(&self, lag: [isize; 2], [near, far]: [&[Part]; 2], line: &mut LagWeights) {
-        let half = self.window.half.map(|h| h as isize);
-        let apart = |n: [isize; 2], f: [isize; 2]| [lag[0] + f[0] - n[0], lag[1] + f[1] - n[1]];
-        for n in near {
-            for f in far {
-                let (share, complete) = (n.share * f.share, n.complete_share * f.complete_share);
-                if n.in_place() && f.in_place() {
-                    line.add(apart(n.offset, f.offset), share - complete);
-                } else {
-                    line.add(apart(n.offset, f.offset), share);
-                    line.add(apart(n.complete_offset, f.complete_offset), -complete);
-                }
-            }
-            if n.scatter > 0.0 && (0..2).all(|k| (n.offset[k] - lag[k]).abs() <= half[k]) {
-                line.add([0, 0], n.scatter);
-                line.add(n.spread, -n.scatter);
-            }
+            None => {}
         }
     }
 
-    /// The parts of the window of the cell `at`, which has data as the cell `other` away has: its blocks, `blocks` each
-    /// way, at cells given by `shift`, and the two cells.
-    fn parts(&self, at: [isize; 2], count: u32, other: [isize; 2], blocks: usize, shift: [f64; 2]) -> Vec<Part> {
-        let known: &[[isize; 2]] = if other == [0, 0] { &[[0, 0]] } else { &[[0, 0], other] };
+    /// Whether the window of a cell lacks data.
+    fn is_partial(&self, at: [isize; 2]) -> bool {
+        let span = |k: usize| [at[k] - self.window.half[k] as isize, at[k] + self.window.half[k] as isize + 1];
+        !self.complete.at(at) && (self.data.within([span(0), span(1)]) as usize) < self.window.area()
+    }
+
+    /// The window of the cell `at`: its blocks, `blocks` each way, at cells given by `shift`. Weights are those of the plane through
+    /// the points, so that the model's background reproduces planes as the data's does.
+    fn window(&self, at: [isize; 2], blocks: usize, shift: [f64; 2]) -> Window {
         let axes = [Axis::new(self.window.half[0], blocks), Axis::new(self.window.half[1], blocks)];
-        let cell_share = 1.0 / f64::from(count);
         let counts = self.data.blocks(at, &axes);
-        let mut parts = Vec::with_capacity(blocks * blocks + 2);
-        for index in 0..axes[0].blocks * axes[1].blocks {
+        let points = 2 * axes[0].blocks * axes[1].blocks;
+        let [mut complete, mut own] = [(); 2].map(|()| Vec::with_capacity(points));
+        for index in 0..points / 2 {
             let (row, col) = (index / axes[1].blocks, index % axes[1].blocks);
-            let whole = [axes[0].span(row), axes[1].span(col)];
+            let block = [axes[0].span(row), axes[1].span(col)];
             let place =
                 [fraction(shift[0] + index as f64 * LATTICE[0]), fraction(shift[1] + index as f64 * LATTICE[1])];
-            let complete_share = cells(whole) / self.window.area() as f64;
-            let complete_offset = [point(whole[0], place[0]), point(whole[1], place[1])];
+            let one = [0, 1].map(|k| point(block[k], place[k]));
+            let both = [one, [0, 1].map(|k| block[k][0] + block[k][1] - 1 - one[k])];
             let data = counts[row][col];
-            if data == 0 || f64::from(data) == cells(whole) {
-                let (share, offset) = (f64::from(data) * cell_share, complete_offset);
-                parts.push(Part { share, offset, complete_share, complete_offset, scatter: 0.0, spread: [0, 0] });
-                continue;
+            complete.extend(both.map(|offset| (offset, 0.5 * cells(block))));
+            if data > 0 {
+                let whole = f64::from(data) == cells(block);
+                let pick = |place: [f64; 2]| self.data.pick(at, block, data, place);
+                let picked = if whole { both } else { [place, place.map(|p| 1.0 - p)].map(pick) };
+                own.extend(picked.map(|offset| (offset, 0.5 * f64::from(data))));
             }
-            let filled = self.data.shrink(at, whole, data);
-            let here = known.iter().filter(|cell| (0..2).all(|k| (filled[k][0]..filled[k][1]).contains(&cell[k])));
-            let known_count = here.clone().count() as f64;
-            let others = cells(filled) - known_count;
-            let density = if others > 0.0 { (f64::from(data) - known_count) / others } else { 1.0 };
-            let offset = [0, 1].map(|k| point(filled[k], place[k]));
-            let mate = [0, 1].map(|k| point(filled[k], fraction(place[k] + MATE_STEPS * LATTICE[k])));
-            parts.push(Part {
-                share: density * cells(filled) * cell_share,
-                offset,
-                complete_share,
-                complete_offset,
-                scatter: scatter(density, cells(filled)) * cell_share * cell_share,
-                spread: [offset[0] - mate[0], offset[1] - mate[1]],
-            });
-            let share = (1.0 - density) * cell_share;
-            parts.extend(here.map(|&offset| Part {
-                share,
-                offset,
-                complete_share: 0.0,
-                complete_offset: offset,
-                scatter: 0.0,
-                spread: [0, 0],
-            }));
         }
-        parts
+        Window { points: self.weighted(&own), complete: self.weighted(&complete) }
+    }
+
+    /// Points with the weights of the plane through them, from offsets and the number of cells that each stands for.
+    fn weighted(&self, points: &[([isize; 2], f64)]) -> Vec<Point> {
+        let mut moments = Moments::default();
+        points.iter().for_each(|&(offset, count)| moments.add(offset, count));
+        let (weights, _) = moments.plane();
+        let of = |&(offset, count): &([isize; 2], f64)| Point {
+            weight: count * weights.at(offset),
+            at: offset[0] * self.stride + offset[1],
+        };
+        points.iter().map(of).collect()
     }
 
     /// Index of a cell, `None` beyond the raster.
@@ -321,25 +326,8 @@ impl Sampler<'_> {
     }
 }
 
-/// `- D_i(j) C(h - j)` (sign -1) or `- D_(i+h)(k) C(h + k)` (sign 1), less the same of a complete window.
-fn add_cell_window(lag: [isize; 2], sign: isize, parts: &[Part], line: &mut LagWeights) {
-    for p in parts {
-        let moved = |o: [isize; 2]| [lag[0] + sign * o[0], lag[1] + sign * o[1]];
-        line.add(moved(p.offset), -p.share);
-        line.add(moved(p.complete_offset), p.complete_share);
-    }
-}
-
 /// 1 / g and 1 / g^2 of the plastic number g: a lattice in the square.
 const LATTICE: [f64; 2] = [0.754_877_666_246_692_7, 0.569_840_290_998_053_2];
-
-/// Number of cells times the variance of `m` in a block whose count is given.
-fn scatter(density: f64, cells: f64) -> f64 {
-    if cells > 1.0 { density * (1.0 - density) * cells * cells / (cells - 1.0) } else { 0.0 }
-}
-
-/// Lattice steps to a second cell of a block.
-const MATE_STEPS: f64 = 37.0;
 
 /// Rows and columns `from..to`, as offsets from a cell.
 type Rectangle = [[isize; 2]; 2];
@@ -436,19 +424,18 @@ impl DataCount {
         counts
     }
 
-    /// The smallest rectangle in the block about the cell `at` that holds the block's `data` cells.
-    fn shrink(&self, at: [isize; 2], block: Rectangle, data: u32) -> Rectangle {
+    /// The offset of one of the `data` cells with data of a block about the cell `at`, at fractions of their number and of their
+    /// number in its row.
+    fn pick(&self, at: [isize; 2], block: Rectangle, data: u32, place: [f64; 2]) -> [isize; 2] {
         let moved = |span: [isize; 2], by: isize| [span[0] + by, span[1] + by];
-        let count = |r: Rectangle| self.within([moved(r[0], at[0]), moved(r[1], at[1])]);
-        let mut filled = block;
-        for axis in 0..2 {
-            let [from, to] = block[axis];
-            let with = |span: [isize; 2]| if axis == 0 { [span, filled[1]] } else { [filled[0], span] };
-            let first = bisect(from, to - 1, |s| count(with([s + 1, to])) < data);
-            let last = bisect(first, to - 1, |s| count(with([first, s + 1])) == data);
-            filled[axis] = [first, last + 1];
-        }
-        filled
+        let count = |rows: [isize; 2], cols: [isize; 2]| self.within([moved(rows, at[0]), moved(cols, at[1])]);
+        let rank = |place: f64, of: u32| ((place * f64::from(of)) as u32).min(of - 1);
+        let [[top, bottom], [left, right]] = block;
+        let wanted = rank(place[0], data);
+        let row = bisect(top, bottom - 1, |r| count([top, r + 1], [left, right]) > wanted);
+        let own = [row, row + 1];
+        let wanted = rank(place[1], count(own, [left, right]));
+        [row, bisect(left, right - 1, |c| count(own, [left, c + 1]) > wanted)]
     }
 }
 

@@ -220,7 +220,7 @@ fn partial_windows_case(missing: impl Fn(usize, usize) -> bool, range_m: f64) ->
     const SIDE: usize = 40;
     let window = crate::detrend::BoxWindow { half: [4; 2] };
     let values: Vec<f64> = (0..SIDE * SIDE).map(|k| if missing(k / SIDE, k % SIDE) { f64::NAN } else { 0.0 }).collect();
-    let count = crate::detrend::box_mean(&values, SIDE, window).count;
+    let count = crate::detrend::background(&values, SIDE, window, crate::detrend::AtPartial::Plane).count;
     let used = |k: usize| !values[k].is_nan() && count[k] > 40;
     let residual: Vec<f64> = (0..values.len()).map(|k| if used(k) { 0.0 } else { f64::NAN }).collect();
     let model = Covariance::new(model("exponential").unwrap(), 1.0, range_m).unwrap();
@@ -250,11 +250,12 @@ fn partial_windows_case(missing: impl Fn(usize, usize) -> bool, range_m: f64) ->
 
     let squares: Vec<f64> = (0..=800).map(|s| model.at_distance(f64::from(s).sqrt())).collect();
     let c = |dr: isize, dc: isize| squares[(dr * dr + dc * dc) as usize];
-    let windows: Vec<Vec<[isize; 2]>> = (0..values.len() as isize)
+    let windows: Vec<Vec<([isize; 2], f64)>> = (0..values.len() as isize)
         .map(|k| {
             let near = |x: isize| (x - 4).max(0)..(x + 5).min(SIDE as isize);
             let all = near(k / SIDE as isize).flat_map(|r| near(k % SIDE as isize).map(move |c| [r, c]));
-            all.filter(|[r, c]| !values[(r * SIDE as isize + c) as usize].is_nan()).collect()
+            let data = all.filter(|[r, c]| !values[(r * SIDE as isize + c) as usize].is_nan());
+            plane_weights([k / SIDE as isize, k % SIDE as isize], data.collect())
         })
         .collect();
     let exact_at = |lag: [isize; 2]| {
@@ -266,16 +267,30 @@ fn partial_windows_case(missing: impl Fn(usize, usize) -> bool, range_m: f64) ->
                 continue;
             }
             let (near, far) = (&windows[i], &windows[(to[0] * SIDE as isize + to[1]) as usize]);
-            let mean = |w: &Vec<[isize; 2]>, p: [isize; 2]| {
-                w.iter().map(|q| c(q[0] - p[0], q[1] - p[1])).sum::<f64>() / w.len() as f64
+            let mean = |w: &Vec<([isize; 2], f64)>, p: [isize; 2]| {
+                w.iter().map(|(q, weight)| weight * c(q[0] - p[0], q[1] - p[1])).sum::<f64>()
             };
-            let both = near.iter().map(|p| mean(far, *p)).sum::<f64>() / near.len() as f64;
+            let both = near.iter().map(|(p, weight)| weight * mean(far, *p)).sum::<f64>();
             total += c(lag[0], lag[1]) - mean(near, to) - mean(far, at) + both;
             pairs += 1.0;
         }
         total / pairs
     };
     (fast, bins.average(exact_at))
+}
+
+/// Cells and their weights in the least-squares plane at `at`, by Cramer's rule.
+fn plane_weights(at: [isize; 2], cells: Vec<[isize; 2]>) -> Vec<([isize; 2], f64)> {
+    let row = |cell: &[isize; 2]| [1.0, (cell[1] - at[1]) as f64, (cell[0] - at[0]) as f64];
+    let m = |i: usize, j: usize| cells.iter().map(|cell| row(cell)[i] * row(cell)[j]).sum::<f64>();
+    let first = [
+        m(1, 1) * m(2, 2) - m(1, 2) * m(1, 2),
+        m(0, 2) * m(1, 2) - m(0, 1) * m(2, 2),
+        m(0, 1) * m(1, 2) - m(0, 2) * m(1, 1),
+    ];
+    let determinant = m(0, 0) * first[0] + m(0, 1) * first[1] + m(0, 2) * first[2];
+    let weight = |cell: &[isize; 2]| row(cell).iter().zip(first).map(|(x, f)| x * f).sum::<f64>() / determinant;
+    cells.iter().map(|cell| (*cell, weight(cell))).collect()
 }
 
 /// Tolerance 5e-4 of the surface's variance, 1.5e-3 with scattered holes: a window of 9 cells has blocks of one or two

@@ -2,7 +2,7 @@
 
 use crate::covariance::Form;
 use crate::covariance::filtered::Measurement;
-use crate::detrend::BoxWindow;
+use crate::detrend::{AtPartial, BoxWindow};
 use sastrugi_numeric::Geometry;
 use sastrugi_schemas::ParameterError;
 use schemars::JsonSchema;
@@ -203,6 +203,14 @@ impl FitSettings {
 
     pub(super) fn find_outliers(&self) -> bool {
         self.parameters.find_outliers && self.mode() == Mode::Corrected
+    }
+
+    /// What the background of a partial window is: the published procedure knows the mean only.
+    pub(super) fn at_partial(&self) -> AtPartial {
+        match self.mode() {
+            Mode::Corrected => AtPartial::Plane,
+            Mode::Paper => AtPartial::Mean,
+        }
     }
 
     pub(super) fn trim(&self) -> f64 {

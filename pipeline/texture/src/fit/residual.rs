@@ -1,7 +1,7 @@
 //! Height less background.
 
 use super::FitSettings;
-use crate::detrend::{BoxWindow, RunningMean, band_rows};
+use crate::detrend::{BoxWindow, RunningBackground, band_rows};
 use rayon::prelude::*;
 
 /// A part of a raster of heights without outliers.
@@ -50,7 +50,7 @@ pub fn residual(heights: &[f64], cols: usize, settings: &FitSettings, window: Bo
 }
 
 impl Part<'_> {
-    /// Puts the residuals of the part into `residual`, m: NaN where a cell has no data or its window lacks data.
+    /// Puts the residuals of the part into `residual`, m: NaN where a cell has no data or no background, or its window lacks data.
     pub fn residual(&self, settings: &FitSettings, window: BoxWindow, residual: &mut Vec<f64>) -> WindowTally {
         let [rows, cols] = self.shape;
         residual.resize(rows * cols, 0.0);
@@ -65,13 +65,14 @@ impl Part<'_> {
     fn band(&self, first: usize, settings: &FitSettings, window: BoxWindow, residual: &mut [f64]) -> WindowTally {
         let needed = settings.min_valid_share * window.area() as f64;
         let ([row, col], [_, cols]) = (self.at, self.shape);
-        let mut average = RunningMean::from(self.heights, self.cols, window, row + first);
-        let (mut mean, mut count) = (vec![0.0; self.cols], vec![0; self.cols]);
+        let mut background =
+            RunningBackground::from(self.heights, self.cols, window, settings.at_partial(), row + first);
+        let (mut height_m, mut count) = (vec![0.0; self.cols], vec![0; self.cols]);
         let mut windows = WindowTally::default();
         for (r, line) in residual.chunks_exact_mut(cols).enumerate() {
-            average.next_row(&mut mean, &mut count);
+            background.next_row(&mut height_m, &mut count);
             let heights = &self.heights[(row + first + r) * self.cols + col..];
-            for (((out, &z), &m), &n) in line.iter_mut().zip(heights).zip(&mean[col..]).zip(&count[col..]) {
+            for (((out, &z), &m), &n) in line.iter_mut().zip(heights).zip(&height_m[col..]).zip(&count[col..]) {
                 *out = if f64::from(n) > needed { z - m } else { f64::NAN };
                 windows.most = windows.most.max(n);
                 if !out.is_nan() {

@@ -14,7 +14,7 @@ use crate::bitmap::Bitmap;
 use crate::covariance::masked::even_step;
 use crate::covariance::partial::DetrendedCells;
 use crate::covariance::{MaskedCovariance, PairSums};
-use crate::detrend::{BoxWindow, box_mean};
+use crate::detrend::{BoxWindow, background};
 use crate::outliers;
 use crate::sizes::Sizes;
 use sastrugi_numeric::{Geometry, sums};
@@ -191,12 +191,12 @@ impl Survey {
         Ok(part.residual)
     }
 
-    /// The moving average of all of a DEM, m; NaN where the window has no data.
+    /// The background of all of a DEM, m; NaN where there is none.
     pub fn background(&self, heights: &dyn Heights, settings: &FitSettings) -> Result<Vec<f64>, FitError> {
         let Geometry { rows, cols, .. } = self.geometry;
         let mut trusted = Vec::new();
         self.reading(heights, settings).read_trusted(&self.trusted, 0..rows, 0..cols, &mut trusted)?;
-        Ok(box_mean(&trusted, cols, self.window).mean)
+        Ok(background(&trusted, cols, self.window, settings.at_partial()).height_m)
     }
 
     fn reading<'a>(&self, heights: &'a dyn Heights, settings: &'a FitSettings) -> Reading<'a> {

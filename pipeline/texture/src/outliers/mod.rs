@@ -50,7 +50,9 @@ pub fn find(values: &[f64], cols: usize, window: BoxWindow) -> Vec<bool> {
 fn judge(values: &[f64], outlier: &[bool], cols: usize, window: BoxWindow) -> Vec<bool> {
     let deviation = deviations(values, outlier, cols, window);
     let scales = Scales::of(&deviation, cols, window);
-    let seeds = (0..deviation.len()).map(|k| scales.exceeded(k, SEED_SCALES)).collect();
+    // Where nothing is left to judge by, a cell stays what it was.
+    let stays = |k: usize| outlier[k] && deviation[k].is_nan();
+    let seeds = (0..deviation.len()).map(|k| scales.exceeded(k, SEED_SCALES) || stays(k)).collect();
     let grown = grow(seeds, cols, |k| scales.exceeded(k, GROWTH_SCALES));
     with_margin(&grown, values, cols)
 }

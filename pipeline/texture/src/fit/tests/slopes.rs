@@ -1,0 +1,194 @@
+//! Fits on slopes: acceptance 11 of the specification.
+
+use super::*;
+use crate::detrend::BoxWindow;
+use std::f64::consts::TAU;
+
+/// Standard deviation and range of the texture, m.
+pub const TRUTH: [f64; 2] = [0.05, 0.28];
+const SIDE: usize = 256;
+
+/// The field of a seed on a slope (rise over run) that falls towards an azimuth, with an undulation of 0.3 m over 40 m along it.
+fn sloping(seed: u64, slope: f64, azimuth_deg: f64) -> Grid {
+    let dem = field(TRUTH[1], SIDE, CELL_M, seed);
+    let g = dem.geometry;
+    let (sin, cos) = libm::sincos(azimuth_deg.to_radians());
+    let height = |k: usize| {
+        let along = g.x(k % SIDE) * sin + g.y(k / SIDE) * cos;
+        2000.0 - slope * along + 0.3 * libm::sin(TAU * along / 40.0) + TRUTH[0] * dem.values[k]
+    };
+    Grid::new(g, (0..dem.values.len()).map(height).collect())
+}
+
+/// A field of the table for a seed: four slopes, eight azimuths, every other one with holes.
+pub fn of_table(seed: u64) -> Grid {
+    let slope = [0.0, 0.2, 0.5, 1.0][(seed / 2 % 4) as usize];
+    let mut dem = sloping(seed, slope, 45.0 * (seed / 8 % 8) as f64 + 11.0);
+    if seed % 2 == 1 {
+        with_holes(&mut dem, seed);
+    }
+    dem
+}
+
+/// Six cones of 0.5 m height and 0.6 m radius.
+fn with_trees(dem: &mut Grid, seed: u64) {
+    let mut s = Streams::for_seed(seed, "fit-test").stream("trees");
+    let g = dem.geometry;
+    for _ in 0..6 {
+        let (x, y) = (s.uniform_in(0.0, g.size()[0]), s.uniform_in(0.0, g.size()[1]));
+        for (k, z) in dem.values.iter_mut().enumerate() {
+            let (dx, dy) = (g.x(k % g.cols) - x, g.y(k / g.cols) - y);
+            *z += (0.5 * (1.0 - (dx * dx + dy * dy).sqrt() / 0.6)).max(0.0);
+        }
+    }
+}
+
+/// 15 % of the cells, at random.
+fn with_holes(dem: &mut Grid, seed: u64) {
+    let mut s = Streams::for_seed(seed, "fit-test").stream("holes");
+    dem.values.iter_mut().filter(|_| s.uniform() < 0.15).for_each(|z| *z = f64::NAN);
+}
+
+fn with_trees_and_holes(dem: &mut Grid, seed: u64) {
+    with_trees(dem, seed);
+    with_holes(dem, seed);
+}
+
+const CONDITIONS: [(&str, Spoil); 4] =
+    [("bare", untouched), ("holes", with_holes), ("trees", with_trees), ("trees, holes", with_trees_and_holes)];
+
+/// Relative errors of sigma and b on a slope, and less those of the same field on level ground, in percent.
+fn errors(slope: f64, seeds: std::ops::Range<u64>, spoil: Spoil) -> Vec<[[f64; 2]; 2]> {
+    let s = settings(Mode::Corrected, 2.0, 0.05);
+    seeds
+        .into_par_iter()
+        .map(|seed| {
+            let of = |slope: f64| {
+                let mut dem = sloping(seed, slope, 45.0 * (seed % 8) as f64 + 11.0);
+                spoil(&mut dem, seed);
+                let found = estimate(&dem, &s);
+                [0, 1].map(|k| 100.0 * (found[k] / TRUTH[k] - 1.0))
+            };
+            let (here, level) = (of(slope), if slope == 0.0 { None } else { Some(of(0.0)) });
+            [here, level.map_or([0.0; 2], |level| [0, 1].map(|k| here[k] - level[k]))]
+        })
+        .collect()
+}
+
+/// Mean and standard error of one of [`errors`].
+fn mean(errors: &[[[f64; 2]; 2]], which: usize, parameter: usize) -> [f64; 2] {
+    let values: Vec<f64> = errors.iter().map(|e| e[which][parameter]).collect();
+    [sums::mean(&values), (sums::variance(&values) / values.len() as f64).sqrt()]
+}
+
+/// The table of slopes and conditions from so many fields each; the bias of every condition over all slopes lies within
+/// `bias` percent of the truth, the mean paired difference of every slope within `paired` percent.
+fn table(fields: u64, bias: [f64; 2], paired: [f64; 2]) {
+    let mut seed = 1000;
+    for (condition, spoil) in CONDITIONS {
+        let mut all = Vec::new();
+        for slope in [0.0, 0.1, 0.2, 0.5, 1.0] {
+            let found = errors(slope, seed..seed + fields, spoil);
+            seed += fields;
+            let [sigma, b] = [0, 1].map(|k| mean(&found, 0, k));
+            let moved = [0, 1].map(|k| mean(&found, 1, k)[0]);
+            println!(
+                "{condition}, slope {:.0} %: sigma {:+.2} +- {:.2} %, b {:+.2} +- {:.2} %; less level ground {:+.3} %, {:+.3} %",
+                100.0 * slope,
+                sigma[0],
+                sigma[1],
+                b[0],
+                b[1],
+                moved[0],
+                moved[1]
+            );
+            (0..2).for_each(|k| assert!(moved[k].abs() <= paired[k], "{condition}, {slope}: {moved:?}"));
+            all.extend(found);
+        }
+        let pooled = [0, 1].map(|k| mean(&all, 0, k));
+        println!(
+            "{condition}: sigma {:+.3} +- {:.3} %, b {:+.3} +- {:.3} %",
+            pooled[0][0], pooled[0][1], pooled[1][0], pooled[1][1]
+        );
+        (0..2).for_each(|k| assert!(pooled[k][0].abs() <= bias[k], "{condition}: {pooled:?}"));
+    }
+}
+
+/// Null: slopes change nothing. 2 fields for each of 20 cells of the table: scatter of one field 1.8 % and 4.2 %, so that the
+/// mean of 10 errs by 0.6 % and 1.3 %; limits of 3.4 % and 8 % are six of these (2e-9). What slopes do shows in the paired
+/// differences: they were 6 and 13 % at 10 %, and beyond all measure at 50 %.
+#[test]
+fn stat_slopes_do_not_bias_the_fit() {
+    table(2, [3.4, 8.0], [0.1, 0.2]);
+}
+
+/// Acceptance 11: 2080 fields in all. Standard error of a condition (520 fields) 0.08 % and 0.19 %: limits of 0.5 % and 1 % are
+/// five of these (6e-7).
+#[test]
+#[ignore = "slow: ./test --full"]
+fn stat_fits_on_slopes_are_unbiased() {
+    table(104, [0.5, 1.0], [0.1, 0.2]);
+}
+
+/// Steep ground is no object: none of its cells is left out, and six trees on it are.
+#[test]
+fn val_objects_are_not_taken_from_steep_ground() {
+    let s = settings(Mode::Corrected, 2.0, 0.05);
+    let left_out = |slope: f64, spoil: Spoil| {
+        let mut dem = sloping(7, slope, 30.0);
+        spoil(&mut dem, 7);
+        let survey = Case::new(&dem, &s).unwrap().survey;
+        (survey.measured - survey.trusted_count) as f64 / survey.measured as f64
+    };
+    for slope in [0.0, 0.5, 1.0] {
+        assert_eq!([untouched, with_holes].map(|spoil| left_out(slope, spoil)), [0.0; 2], "{slope}");
+        let trees = left_out(slope, with_trees);
+        assert!((trees - left_out(0.0, with_trees)).abs() < 1e-3 && trees > 0.015, "{slope}: {trees}");
+    }
+}
+
+/// A plane has no texture. A paraboloid that bends by c leaves `-c h (h + 1) / 3` both ways where windows are complete (h half a window in
+/// cells), and no more than that where they are not.
+#[test]
+fn val_planes_leave_nothing_and_paraboloids_their_bend() {
+    let s = settings(Mode::Corrected, 2.0, 0.05);
+    let plane = Grid::new(
+        Geometry::square(SIDE, SIDE, CELL_M),
+        (0..SIDE * SIDE).map(|k| 2000.0 + CELL_M * ((k % SIDE) as f64 - 0.3 * (k / SIDE) as f64)).collect(),
+    );
+    assert!(matches!(Case::new(&plane, &s).err(), Some(FitError::Constant { .. })));
+
+    let bend = 1e-3;
+    let part = |k: usize| (k as f64 - 100.0) * (k as f64 - 100.0) * 0.5 * bend;
+    let height = |k: usize| part(k % SIDE) + part(k / SIDE) + if k % 11 == 3 && k > 30_000 { f64::NAN } else { 0.0 };
+    let values: Vec<f64> = (0..SIDE * SIDE).map(height).collect();
+    let residual = residual::residual(&values, SIDE, &s, BoxWindow { half: [16, 16] });
+    let complete = -bend * 16.0 * 17.0 / 3.0;
+    let inner = residual[60 * SIDE + 60];
+    assert!((inner - complete).abs() < 1e-12, "{inner} {complete}");
+    let worst = residual.iter().filter(|r| !r.is_nan()).fold(0.0, |m, r| f64::max(m, r.abs()));
+    assert!(worst <= 1.01 * complete.abs(), "{worst} {complete}");
+}
+
+/// Transects that climb are fitted as level ones: their ends and gaps are partial windows too.
+#[test]
+fn val_transects_may_climb() {
+    let fit = |slope: f64| {
+        let dem = field(TRUTH[1], SIDE, CELL_M, 3);
+        let row = |r: usize| {
+            let height =
+                |c: usize| if c % 90 < 4 { f64::NAN } else { TRUTH[0] * dem.at(r, c) + slope * CELL_M * c as f64 };
+            (0..SIDE).map(height).collect::<Vec<f64>>()
+        };
+        let profiles = Profiles::new(CELL_M, &(0..40).map(|k| row(6 * k)).collect::<Vec<_>>()).unwrap();
+        let s = settings(Mode::Corrected, 2.0, 0.05);
+        let case = Case::new(&profiles, &s).unwrap();
+        let naive = ordinary(&case, &Form::parse("exponential").unwrap());
+        let found = Estimator::new(&case, &case.bins).candidates(&naive).remove(0).covariance;
+        [found.sigma_m(), found.range_m()]
+    };
+    let (level, steep) = (fit(0.0), fit(1.0));
+    for k in 0..2 {
+        assert!((steep[k] / level[k] - 1.0).abs() < 1e-3, "{level:?} {steep:?}");
+    }
+}
