@@ -1,10 +1,11 @@
 //! What a surface is like: gradients and roughness classes, heights and slopes, band roughness, spectra, structure
-//! function, areal figures of ISO 25178, scaling exponents, and what of it shakes a vehicle (RMS in a band of wavelengths, ISO
-//! 8608, IRI).
+//! function, areal figures of ISO 25178, scaling exponents, what of it shakes a vehicle (RMS in a band of wavelengths, ISO
+//! 8608, IRI), and its aerodynamic roughness length by wind direction.
 //!
 //! Every function takes a DEM in metres with NaN where there is no data, and says what it does with such cells.
 //! Roughness classes are the codes [`LOW`], [`SEMI`], [`HIGH`] and [`NO_CLASS`].
 
+mod aerodynamic;
 mod agreement;
 mod areal;
 mod band;
@@ -26,6 +27,10 @@ mod structure;
 mod summary;
 pub mod trace_moments;
 
+pub use aerodynamic::{
+    AerodynamicRoughness, ObstacleHeight, WindDirection, WindError, WindEstimate, WindMeasures, WindSettings,
+    aerodynamic_roughness, lettau_z0_m, macdonald_displacement, macdonald_z0_m, munro_z0_m,
+};
 pub use agreement::{Statistic, unfitted_statistics};
 pub use areal::{ArealFigures, areal_figures};
 pub use band::{band_rms, moving_average, odd_cells};

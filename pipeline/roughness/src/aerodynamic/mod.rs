@@ -1,0 +1,370 @@
+//! Aerodynamic roughness length z0 by wind direction, from the shape of the surface alone.
+//!
+//! # What
+//! z0 is the height at which the logarithmic wind profile `u = (u* / kappa) ln((z - d) / z0)` reaches zero. It is estimated
+//! here from obstacle height, frontal area and obstacle spacing of a detrended heightfield, for wind from any azimuth, by
+//! three published formulas: [`lettau_z0_m`], [`munro_z0_m`] and [`macdonald_z0_m`].
+//!
+//! # Formulas
+//! z' is the height above the least-squares plane, less its centred moving average over the outer scale where one is given,
+//! less its mean. The plane goes first: at borders and holes the window of a moving average is off-centre, and on a slope it
+//! would leave a bias there. The wind blows from azimuth theta, in degrees clockwise from grid north (+y); the unit vector
+//! towards its origin is `w = (sin theta, cos theta)`.
+//!
+//! | symbol | meaning |
+//! |---|---|
+//! | lambda_f | frontal-area index: windward faces projected on the plane normal to the wind, per ground area (1): `mean of max(0, -(g_x sin theta + g_y cos theta))` |
+//! | g | gradient of the bilinear surface at the centre of the patch between four cell centres, m/m: `g_x = (z_ne + z_se - z_nw - z_sw) / (2 dx)`, `g_y = (z_nw + z_ne - z_sw - z_se) / (2 dy)` |
+//! | sigma_d | standard deviation of z', m |
+//! | h* | effective obstacle height, m: [`ObstacleHeight`] |
+//! | f / X | upcrossings of the mean level per metre of profile along the wind, 1/m |
+//! | lambda_p | plan-area index of Macdonald et al. (1) |
+//!
+//! A patch with a hole counts neither as face nor as ground; a profile ends at a hole and starts anew behind it.
+//!
+//! * Lettau: `z0 = 0.5 h* s / S = 0.5 h* lambda_f`, s the silhouette area of an obstacle, S its ground area.
+//! * Munro: obstacles of height `h* = 2 sigma_d` and width `X / (2 f)`, each on ground `(X / f)^2`; so `s = h* X / (2 f)` and
+//!   `z0 = 0.5 h* s / S = f h*^2 / (4 X) = f sigma_d^2 / X`.
+//! * Macdonald et al.: `z_d / h = 1 + A^-lambda_p (lambda_p - 1)` and
+//!   `z0 / h = (1 - z_d / h) exp(-(0.5 beta (C_D / kappa^2) (1 - z_d / h) lambda_f)^-0.5)`, with A = 4.43 and beta = 1 (staggered
+//!   arrays), C_D = 1.2, kappa = 0.4.
+//!
+//! # Sources
+//! * H. Lettau (1969), J. Appl. Meteorol. 8, 828-832.
+//! * D. S. Munro (1989), J. Glaciol. 35, 328-331.
+//! * R. W. Macdonald, R. F. Griffiths and D. J. Hall (1998), Atmos. Environ. 32, 1857-1864,
+//!   doi:10.1016/S1352-2310(97)00403-2, Eq. 23 (z_d) and 26 (z0).
+//!
+//! # Where we depart
+//! * Faces of the whole surface are counted, as in raster versions of Lettau's formula (after Smith et al. 2016, J. Geophys.
+//!   Res. Earth Surf. 121, 748-766), below the mean level too, and whether sheltered or not.
+//! * sigma_d and the zero level are those of the surface, not of each profile, so that short pieces of profile between holes
+//!   weigh by their length. Upcrossings and downcrossings are averaged: opposite winds get the same f.
+//! * Profiles run along the wind, so that a row describes what the wind meets. Profiles in the field are often laid across the
+//!   wind: their value stands in the row 90 degrees on.
+//! * A continuous surface has no plan area of obstacles. lambda_p is set to lambda_f, as it is for cubes, and h to h*; drag
+//!   models of ice use one density for both (after van Tiggelen et al. 2021, The Cryosphere 15, 2601,
+//!   doi:10.5194/tc-15-2601-2021). The share of ground above the mean level, about one half whatever the slope, would put z_d
+//!   at 0.76 h and lower z0 by a factor of 15 at lambda_f = 0.1. C_D is that of cubes; rounded forms have less drag.
+//!
+//! # Uncertainty
+//! Standard errors are by the delete-one jackknife over 4 x 4 blocks of the raster. They hold sampling of the plot alone, and
+//! only where a block is wider than the surface's correlation length; the spread between formulas is usually larger.
+//!
+//! # Limits
+//! * Roughness finer than a cell is not seen, and lambda_f and f rise as cells shrink: compare z0 at equal cells only.
+//! * h* rises with the outer scale, or with the plot where none is given.
+//! * Above lambda_f of about 0.2 to 0.3 obstacles shelter one another: Lettau's formula, which has no sheltering, is too high.
+//! * Noise of the heights counts as roughness.
+//! * lambda_f of opposite winds differs by the mean slope between the two: none on a whole plot. Where it does differ, holes
+//!   hide one side of the obstacles (a scanner's shadows), or a wave longer than the plot is left.
+//!
+//! Cost: one pass over the cells for lambda_f, one for f, times the number of directions; two copies of the grid.
+
+mod block;
+mod crossings;
+mod formulas;
+#[cfg(test)]
+mod tests;
+
+pub use formulas::{lettau_z0_m, macdonald_displacement, macdonald_z0_m, munro_z0_m};
+
+use crate::band::{moving_average, odd_cells};
+use crate::plane::level;
+use block::Sums;
+use rayon::prelude::*;
+use sastrugi_numeric::{Grid, ops, sums};
+use serde::{Deserialize, Serialize};
+
+/// Frontal-area index above which obstacles shelter one another: the middle of the 0.2 to 0.3 of Macdonald et al. (1998).
+const SHELTERING_INDEX: f64 = 0.25;
+/// Fewest cells across the window of the moving average.
+const OUTER_CELLS_MIN: usize = 3;
+
+/// What stands for the height of the obstacles on a continuous surface, in the formulas of Lettau and Macdonald et al. (Munro's
+/// is always of [`ObstacleHeight::TwoSigma`]).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ObstacleHeight {
+    /// Twice the standard deviation of the detrended heights (Munro 1989).
+    #[default]
+    TwoSigma,
+    /// Mean of the detrended heights above zero (after Smith et al. 2016).
+    MeanAbove,
+}
+
+/// For which wind, and by which detrending.
+#[derive(Clone, Debug, PartialEq)]
+pub struct WindSettings {
+    /// Azimuths that the wind blows from, degrees clockwise from grid north.
+    pub azimuths_deg: Vec<f64>,
+    /// Width of the moving average that is taken off after the plane, m; the plane alone when not given.
+    pub outer_scale_m: Option<f64>,
+    /// Height of the obstacles.
+    pub obstacle_height: ObstacleHeight,
+}
+
+impl WindSettings {
+    /// Wind from `count` directions, equally spaced from north.
+    pub fn sectors(count: u16) -> Self {
+        let step_deg = 360.0 / f64::from(count.max(1));
+        let azimuths_deg = (0..count).map(|k| f64::from(k) * step_deg).collect();
+        Self { azimuths_deg, outer_scale_m: None, obstacle_height: ObstacleHeight::default() }
+    }
+}
+
+/// Why there is no aerodynamic roughness.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum WindError {
+    /// No azimuth is given.
+    #[error("at least one wind direction is needed")]
+    NoDirection,
+    /// An azimuth is not finite.
+    #[error("a wind direction must be a finite number of degrees, got {azimuth_deg}")]
+    Azimuth {
+        /// What was given, degrees.
+        azimuth_deg: f64,
+    },
+    /// The outer scale is not a positive, finite length.
+    #[error("the outer scale must be a positive length, got {outer_scale_m} m")]
+    OuterScale {
+        /// What was given, m.
+        outer_scale_m: f64,
+    },
+    /// The outer scale does not span enough cells.
+    #[error("an outer scale of {outer_scale_m} m is too narrow: it must span at least 3 cells, {needed_m} m")]
+    Narrow {
+        /// What was given, m.
+        outer_scale_m: f64,
+        /// Three cells, m.
+        needed_m: f64,
+    },
+    /// The moving average is defined nowhere.
+    #[error(
+        "an outer scale of {outer_scale_m} m is too wide: no window of that width on this surface of {x_m} x {y_m} m is more than half full"
+    )]
+    Wide {
+        /// What was given, m.
+        outer_scale_m: f64,
+        /// Extent east-west, m.
+        x_m: f64,
+        /// Extent north-south, m.
+        y_m: f64,
+    },
+}
+
+/// Measures of one wind direction, or their means over several. NaN where the surface defines none.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct WindMeasures {
+    /// Frontal-area index lambda_f.
+    pub frontal_area_index: f64,
+    /// Upcrossings of the mean level per metre along the wind, 1/m.
+    pub upcrossings_per_m: f64,
+    /// z0 after Lettau (1969), m.
+    pub z0_lettau_m: f64,
+    /// z0 after Munro (1989), m.
+    pub z0_munro_m: f64,
+    /// z0 after Macdonald et al. (1998), m.
+    pub z0_macdonald_m: f64,
+}
+
+impl WindMeasures {
+    fn from_array(values: [f64; 5]) -> Self {
+        let [frontal_area_index, upcrossings_per_m, z0_lettau_m, z0_munro_m, z0_macdonald_m] = values;
+        Self { frontal_area_index, upcrossings_per_m, z0_lettau_m, z0_munro_m, z0_macdonald_m }
+    }
+
+    fn to_array(self) -> [f64; 5] {
+        [self.frontal_area_index, self.upcrossings_per_m, self.z0_lettau_m, self.z0_munro_m, self.z0_macdonald_m]
+    }
+}
+
+/// Measures with their standard errors over blocks of the raster.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct WindEstimate {
+    /// The measures.
+    #[serde(flatten)]
+    pub measures: WindMeasures,
+    /// Their standard errors; NaN with fewer than two blocks of data.
+    pub standard_errors: WindMeasures,
+}
+
+/// Measures of one wind direction.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct WindDirection {
+    /// Where the wind blows from, degrees clockwise from grid north, from 0 to below 360.
+    pub azimuth_deg: f64,
+    /// What it meets.
+    #[serde(flatten)]
+    pub estimate: WindEstimate,
+}
+
+/// Aerodynamic roughness of a surface.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct AerodynamicRoughness {
+    /// Cell, east-west and north-south, m.
+    pub cell_m: [f64; 2],
+    /// True width of the moving average, east-west and north-south, m; none where the plane alone is taken off.
+    pub outer_scale_m: Option<[f64; 2]>,
+    /// Standard deviation of the detrended heights, m.
+    pub sigma_m: f64,
+    /// What stands for the height of the obstacles.
+    pub obstacle_height: ObstacleHeight,
+    /// That height h*, m.
+    pub obstacle_height_m: f64,
+    /// Blocks of the raster with data, for the standard errors.
+    pub blocks: usize,
+    /// One entry for each direction, as given.
+    pub directions: Vec<WindDirection>,
+    /// Arithmetic means over these directions.
+    pub mean: WindEstimate,
+    /// What to bear in mind.
+    pub notes: Vec<String>,
+}
+
+/// Aerodynamic roughness of a DEM by wind direction.
+///
+/// # Errors
+/// No direction, a direction that is not finite, an outer scale that is not positive and finite, of less than 3 cells, or too
+/// wide for the surface.
+pub fn aerodynamic_roughness(dem: &Grid, settings: &WindSettings) -> Result<AerodynamicRoughness, WindError> {
+    let winds = winds(&settings.azimuths_deg)?;
+    let (surface, outer_scale_m) = detrended(dem, settings.outer_scale_m)?;
+    let blocks = block::sums_of(&surface, &winds);
+    let blocks: Vec<Sums> = blocks.into_iter().filter(Sums::has_data).collect();
+    let total = Sums::without(&blocks, None, winds.len());
+    let measures_of = |sums: &Sums| measures(sums, settings.obstacle_height);
+    let all = measures_of(&total);
+    let others: Vec<_> = (0..blocks.len())
+        .into_par_iter()
+        .map(|left_out| measures_of(&Sums::without(&blocks, Some(left_out), winds.len())))
+        .collect();
+    let estimate = |k: usize| WindEstimate {
+        measures: all[k],
+        standard_errors: jackknife(&others.iter().map(|measures| measures[k]).collect::<Vec<_>>()),
+    };
+    let directions: Vec<WindDirection> = winds
+        .iter()
+        .enumerate()
+        .map(|(k, wind)| WindDirection { azimuth_deg: wind.azimuth_deg, estimate: estimate(k) })
+        .collect();
+    let mut roughness = AerodynamicRoughness {
+        cell_m: dem.geometry.cell,
+        outer_scale_m,
+        sigma_m: total.sigma_m(),
+        obstacle_height: settings.obstacle_height,
+        obstacle_height_m: total.obstacle_height_m(settings.obstacle_height),
+        blocks: blocks.len(),
+        directions,
+        mean: estimate(winds.len()),
+        notes: Vec::new(),
+    };
+    roughness.notes = notes(&roughness);
+    Ok(roughness)
+}
+
+/// A direction of wind.
+#[derive(Clone, Copy, Debug)]
+struct Wind {
+    azimuth_deg: f64,
+    sin: f64,
+    cos: f64,
+}
+
+fn winds(azimuths_deg: &[f64]) -> Result<Vec<Wind>, WindError> {
+    if azimuths_deg.is_empty() {
+        return Err(WindError::NoDirection);
+    }
+    let wind = |&given: &f64| {
+        if !given.is_finite() {
+            return Err(WindError::Azimuth { azimuth_deg: given });
+        }
+        // A negative rounding error becomes 360, which is north.
+        let azimuth_deg = Some(given.rem_euclid(360.0)).filter(|&a| a < 360.0).unwrap_or(0.0);
+        let (sin, cos) = libm::sincos(azimuth_deg.to_radians());
+        Ok(Wind { azimuth_deg, sin, cos })
+    };
+    azimuths_deg.iter().map(wind).collect()
+}
+
+/// Heights above the plane, and above the moving average where one is asked for, with mean 0; and the true width of that average.
+fn detrended(dem: &Grid, outer_scale_m: Option<f64>) -> Result<(Grid, Option<[f64; 2]>), WindError> {
+    let levelled = level(dem);
+    let Some(outer_scale_m) = outer_scale_m else { return Ok((centred(&levelled), None)) };
+    if !(outer_scale_m > 0.0 && outer_scale_m.is_finite()) {
+        return Err(WindError::OuterScale { outer_scale_m });
+    }
+    let cell = dem.geometry.cell;
+    let window = cell.map(|cell_m| odd_cells(outer_scale_m, cell_m));
+    if window.iter().any(|&cells| cells < OUTER_CELLS_MIN) {
+        let needed_m = OUTER_CELLS_MIN as f64 * cell[0].max(cell[1]);
+        return Err(WindError::Narrow { outer_scale_m, needed_m });
+    }
+    let left = ops::combine(&levelled, &moving_average(&levelled, window), |z, mean| z - mean);
+    if left.finite_count() == 0 && levelled.finite_count() > 0 {
+        let [x_m, y_m] = dem.geometry.size();
+        return Err(WindError::Wide { outer_scale_m, x_m, y_m });
+    }
+    Ok((centred(&left), Some([0, 1].map(|axis| window[axis] as f64 * cell[axis]))))
+}
+
+fn centred(surface: &Grid) -> Grid {
+    let mean = sums::mean(&sums::finite(&surface.values));
+    surface.map(|z| z - mean)
+}
+
+/// The measures of each direction, then their means.
+fn measures(sums: &Sums, obstacle_height: ObstacleHeight) -> Vec<WindMeasures> {
+    let (height_m, two_sigma_m) = (sums.obstacle_height_m(obstacle_height), 2.0 * sums.sigma_m());
+    let of_direction = |k: usize| {
+        let (frontal_area_index, upcrossings_per_m) = (sums.frontal_area_index(k), sums.upcrossings_per_m(k));
+        WindMeasures {
+            frontal_area_index,
+            upcrossings_per_m,
+            z0_lettau_m: lettau_z0_m(height_m, frontal_area_index),
+            z0_munro_m: munro_z0_m(two_sigma_m, upcrossings_per_m),
+            z0_macdonald_m: macdonald_z0_m(height_m, frontal_area_index, frontal_area_index),
+        }
+    };
+    let mut rows: Vec<WindMeasures> = (0..sums.directions.len()).map(of_direction).collect();
+    rows.push(each(&rows, sums::mean));
+    rows
+}
+
+/// A statistic of each measure.
+fn each(rows: &[WindMeasures], statistic: impl Fn(&[f64]) -> f64) -> WindMeasures {
+    let column = |k: usize| rows.iter().map(|row| row.to_array()[k]).collect::<Vec<f64>>();
+    WindMeasures::from_array(std::array::from_fn(|k| statistic(&column(k))))
+}
+
+/// Standard errors from the measures with each block left out in turn: `sqrt((n - 1) / n sum (t_i - mean t)^2)`.
+fn jackknife(others: &[WindMeasures]) -> WindMeasures {
+    let factor = if others.len() < 2 { f64::NAN } else { others.len() as f64 - 1.0 };
+    each(others, |values| (factor * sums::variance(values)).sqrt())
+}
+
+fn notes(roughness: &AerodynamicRoughness) -> Vec<String> {
+    let [x_m, y_m] = roughness.cell_m;
+    let widest = match roughness.outer_scale_m {
+        Some([x_m, y_m]) => format!("a moving average over {x_m:.4} x {y_m:.4} m"),
+        None => "the least-squares plane alone".to_owned(),
+    };
+    let mut notes = vec![format!(
+        "z0 holds for cells of {x_m:.4} x {y_m:.4} m and heights above {widest}: finer cells raise lambda_f, a wider outer scale raises h*"
+    )];
+    let indices = roughness.directions.iter().map(|direction| direction.estimate.measures.frontal_area_index);
+    let largest = indices.fold(f64::NAN, f64::max);
+    if largest > SHELTERING_INDEX {
+        notes.push(format!(
+            "lambda_f reaches {largest:.2}: above about {SHELTERING_INDEX} obstacles shelter one another, and Lettau's z0 is too high"
+        ));
+    }
+    if roughness.sigma_m.is_nan() {
+        notes.push("no cell is left for z0".to_owned());
+    } else if largest.is_nan() {
+        notes.push("lambda_f takes four neighbouring cells with data, and there are none".to_owned());
+    } else if roughness.blocks < 2 {
+        notes.push("data in a single block of the raster: no standard errors".to_owned());
+    }
+    notes
+}
