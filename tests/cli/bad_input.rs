@@ -267,6 +267,26 @@ fn val_bands_of_vehicles_are_refused() {
     roughness(&other, INPUT, &["other.asc", "cells"]);
 }
 
+/// A wind that has no direction, and scales that the DEM does not hold.
+#[test]
+fn val_winds_are_refused() {
+    let folder = area();
+    let path = folder.path();
+    let level = "1 ".repeat(64 * 64);
+    write(path, "dem.asc", &format!("ncols 64\nnrows 64\nxllcorner 0\nyllcorner 0\ncellsize 0.2\n{level}\n"));
+    let roughness = |more: &[&str], code: i32, words: &[&str]| {
+        refused(path, &[&["roughness", "dem.asc"], more].concat(), code, words);
+    };
+    roughness(&["--wind-from", "north"], USAGE, &["--wind-from", "north"]);
+    roughness(&["--wind-from", "0,nan"], USAGE, &["finite number of degrees"]);
+    roughness(&["--wind=0"], USAGE, &["--wind"]);
+    roughness(&["--wind", "--wind-from", "0"], USAGE, &["cannot be used with"]);
+    roughness(&["--outer-scale", "2"], USAGE, &["--wind"]);
+    roughness(&["--wind", "--outer-scale", "-2"], USAGE, &["positive length"]);
+    roughness(&["--wind", "--outer-scale", "0.2"], INPUT, &["at least 3 cells"]);
+    roughness(&["--wind", "--outer-scale", "50"], INPUT, &["too wide", "12.8 x 12.8 m"]);
+}
+
 #[test]
 fn val_rasters_that_cannot_be_fitted_say_why() {
     let folder = area();

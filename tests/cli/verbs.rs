@@ -170,6 +170,37 @@ fn val_roughness_for_a_vehicle() {
     assert!(ok_json(path, &["roughness", "dem.tif"]).get("ride").is_none());
 }
 
+/// Ridges from north to south, 1 cm high and 1 m apart, on a slope: roughness only for wind across them, in JSON and in text.
+#[test]
+fn val_roughness_by_wind_direction() {
+    let folder = area();
+    let path = folder.path();
+    let height = |row: usize, col: usize| 0.01 * f64::from(col % 20 < 10) + 0.02 * row as f64 + 0.01 * col as f64;
+    let rows: Vec<String> =
+        (0..100).map(|r| (0..100).map(|c| format!("{:.6}", height(r, c))).collect::<Vec<_>>().join(" ")).collect();
+    let head = "ncols 100\nnrows 100\nxllcorner 0\nyllcorner 0\ncellsize 0.05\n";
+    write(path, "ridges.asc", &format!("{head}{}\n", rows.join("\n")));
+    let wind = |more: &[&str]| ok_json(path, &[&["roughness", "ridges.asc"], more].concat())["aerodynamic"].clone();
+    let number = |value: &Value| value.as_f64().unwrap();
+    let explicit = wind(&["--wind-from", "0,90"]);
+    let [along, across] = [0, 1].map(|k| explicit["directions"][k].clone());
+    assert!(number(&along["z0_lettau_m"]) < 0.1 * number(&across["z0_lettau_m"]), "{explicit}");
+    // Five ridges of 1 cm in 4.95 m; the least-squares plane leans on the outermost ridge.
+    assert!((number(&across["frontal_area_index"]) / 0.01 - 1.0).abs() < 0.15, "{explicit}");
+    assert!(number(&across["standard_errors"]["z0_munro_m"]) > 0.0, "{explicit}");
+    assert!(explicit["notes"][0].as_str().unwrap().contains("least-squares plane"), "{explicit}");
+    assert_eq!(wind(&["--wind"])["directions"].as_array().unwrap().len(), 16);
+    assert_eq!(wind(&["--wind=36"])["directions"].as_array().unwrap().len(), 36);
+    let scaled = wind(&["--wind=8", "--outer-scale", "1.5", "--obstacle-height", "mean-above"]);
+    assert_eq!((&scaled["obstacle_height"], scaled["blocks"].as_u64()), (&"mean_above".into(), Some(16)));
+    assert!((number(&scaled["outer_scale_m"][0]) - 1.45).abs() < 0.11, "{scaled}");
+    let text = ok(path, &["roughness", "ridges.asc", "--wind=8"]);
+    for word in ["z0 Macdonald mm", "\n315.0000", "\nmean", "note: z0 holds for cells of 0.0500"] {
+        assert!(text.contains(word), "{word}: {text}");
+    }
+    assert!(ok_json(path, &["roughness", "ridges.asc"]).get("aerodynamic").is_none());
+}
+
 /// A patch of a world with its maps; a measured DEM refined from the file; lists of tables in `kinds`.
 #[test]
 fn val_worlds_are_cut_out_and_dems_refined() {

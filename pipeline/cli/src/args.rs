@@ -75,10 +75,13 @@ pub enum Verb {
     /// Classify and describe the roughness of a DEM.
     #[command(
         after_help = "With a vehicle or a band: RMS of profiles in that band of wavelengths, power law of their density, class of\n\
-        ISO 8608 and International Roughness Index.\n\n\
+        ISO 8608 and International Roughness Index.\n\
+        With --wind or --wind-from: aerodynamic roughness length z0 for each direction.\n\n\
         Examples:\n  sastrugi roughness terrain.tif --classes classes.tif\n  \
         sastrugi roughness terrain.tif --vehicle wb=2.7,r=0.33 --rms-map rms.txt\n  \
-        sastrugi roughness terrain.tif --band 0.3048:3.048 --detrend ma"
+        sastrugi roughness terrain.tif --band 0.3048:3.048 --detrend ma\n  \
+        sastrugi roughness ice.tif --wind --outer-scale 2\n  \
+        sastrugi roughness ice.tif --wind-from 225,240 --outer-scale 2"
     )]
     Roughness(Roughness),
     /// Drive missions over one DEM, to a release of their own.
@@ -416,6 +419,20 @@ pub struct Roughness {
     /// Raster of the RMS that was predicted (a terrain's map `rms-predicted`), for a column of `--rms-map`.
     #[arg(long, value_name = "TIF", requires = "rms_map")]
     pub rms_predicted: Option<PathBuf>,
+    /// Aerodynamic roughness length z0 for wind from N equally spaced directions (16 without N), by the formulas of Lettau,
+    /// Munro and Macdonald.
+    #[arg(long, value_name = "N", num_args = 0..=1, require_equals = true, default_missing_value = "16", group = "winds",
+        value_parser = clap::value_parser!(u16).range(1..=360))]
+    pub wind: Option<u16>,
+    /// The same for wind from these azimuths, degrees clockwise from grid north.
+    #[arg(long, value_name = "DEG,...", value_delimiter = ',', allow_negative_numbers = true, group = "winds")]
+    pub wind_from: Vec<f64>,
+    /// Width of the moving average that is taken off for z0 after the least-squares plane, m; the plane alone when absent.
+    #[arg(long, value_name = "M", allow_negative_numbers = true, requires = "winds")]
+    pub outer_scale: Option<f64>,
+    /// Height of the obstacles in the formulas of Lettau and Macdonald.
+    #[arg(long, value_enum, default_value_t = Obstacles::TwoSigma, requires = "winds")]
+    pub obstacle_height: Obstacles,
     /// How the DEM is read.
     #[command(flatten)]
     pub reading: Reading,
@@ -449,6 +466,15 @@ pub enum Detrend {
     Ma,
     /// Less a mean with exponential weights.
     Exp,
+}
+
+/// Height of the obstacles on a continuous surface.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum Obstacles {
+    /// Twice the standard deviation of the detrended heights.
+    TwoSigma,
+    /// Mean of the detrended heights above zero.
+    MeanAbove,
 }
 
 /// `traverse`.

@@ -2,10 +2,12 @@
 
 use super::{options, reading};
 use crate::Verdict;
-use crate::args::{Common, Detrend, Fit, Roughness, Terrain, Texture};
+use crate::args::{Common, Detrend, Fit, Obstacles, Roughness, Terrain, Texture};
 use crate::failure::{Code, Failure};
 use crate::output::{columns, print};
-use sastrugi_stages::verbs::roughness::{ArealFigures, Bumps, Detrender, Ride, RideRequest};
+use sastrugi_stages::verbs::roughness::{
+    AerodynamicRoughness, ArealFigures, Bumps, Detrender, ObstacleHeight, Ride, RideRequest, WindEstimate, WindSettings,
+};
 use sastrugi_stages::verbs::{self, Reading, numbers, parameters};
 use serde_json::{Value, json};
 
@@ -203,6 +205,52 @@ fn ride_request(args: &Roughness) -> Option<RideRequest<'_>> {
     Some(RideRequest { bumps, detrender, allow_coarse: args.allow_coarse, map, predicted })
 }
 
+/// The options about wind.
+fn wind_settings(args: &Roughness) -> Option<WindSettings> {
+    let azimuths_deg = match args.wind {
+        Some(count) => WindSettings::sectors(count).azimuths_deg,
+        None if args.wind_from.is_empty() => return None,
+        None => args.wind_from.clone(),
+    };
+    let obstacle_height = match args.obstacle_height {
+        Obstacles::TwoSigma => ObstacleHeight::TwoSigma,
+        Obstacles::MeanAbove => ObstacleHeight::MeanAbove,
+    };
+    Some(WindSettings { azimuths_deg, outer_scale_m: args.outer_scale, obstacle_height })
+}
+
+/// Roughness lengths by wind direction, as a table with its notes.
+fn aerodynamic(roughness: &AerodynamicRoughness) -> String {
+    let known = |value: f64, text: String| if value.is_finite() { text } else { "none".to_owned() };
+    let millimetres = |value_m: f64, error_m: f64| {
+        let error = if error_m.is_finite() { format!(" +- {:.3}", 1e3 * error_m) } else { String::new() };
+        known(value_m, format!("{:.3}{error}", 1e3 * value_m))
+    };
+    let row = |wind: String, estimate: &WindEstimate| {
+        let (m, e) = (&estimate.measures, &estimate.standard_errors);
+        vec![
+            wind,
+            known(m.frontal_area_index, format!("{:.4}", m.frontal_area_index)),
+            known(m.upcrossings_per_m, format!("{:.3}", m.upcrossings_per_m)),
+            millimetres(m.z0_lettau_m, e.z0_lettau_m),
+            millimetres(m.z0_munro_m, e.z0_munro_m),
+            millimetres(m.z0_macdonald_m, e.z0_macdonald_m),
+        ]
+    };
+    let head = ["wind from", "lambda_f", "f/X 1/m", "z0 Lettau mm", "z0 Munro mm", "z0 Macdonald mm"];
+    let mut rows = vec![head.map(str::to_owned).to_vec()];
+    rows.extend(roughness.directions.iter().map(|d| row(format!("{:.4}", d.azimuth_deg), &d.estimate)));
+    rows.push(row("mean".to_owned(), &roughness.mean));
+    let kind = match roughness.obstacle_height {
+        ObstacleHeight::TwoSigma => "twice the standard deviation",
+        ObstacleHeight::MeanAbove => "mean above zero",
+    };
+    let height = known(roughness.obstacle_height_m, format!("{:.5} m ({kind})", roughness.obstacle_height_m));
+    let mut text = format!("\n\nobstacle height h*  {height}\n{}", columns(&rows));
+    roughness.notes.iter().for_each(|note| text.push_str(&format!("\n  note: {note}")));
+    text
+}
+
 /// `roughness`.
 pub fn roughness(args: &Roughness, common: &Common) -> Verdict {
     let mut params = json!({});
@@ -214,6 +262,7 @@ pub fn roughness(args: &Roughness, common: &Common) -> Verdict {
         classes: args.classes.as_deref(),
         reading,
         ride: ride_request(args),
+        wind: wind_settings(args),
     };
     let (described, read_notes) = verbs::roughness::roughness(&request)?;
     let summary = &described.summary;
@@ -236,6 +285,7 @@ pub fn roughness(args: &Roughness, common: &Common) -> Verdict {
     let rows = rows.into_iter().chain(areal(&summary.areal)).chain(described.ride.iter().flat_map(ride));
     let rows: Vec<Vec<String>> = rows.map(|(name, value)| vec![name.to_owned(), value]).collect();
     let mut text = columns(&rows);
+    described.aerodynamic.iter().for_each(|roughness| text.push_str(&aerodynamic(roughness)));
     read_notes.iter().for_each(|note| text.push_str(&format!("\n  note: {note}")));
     print(common.json, &serde_json::to_value(&described).map_err(Failure::failed)?, &text)?;
     Ok(Code::Done)

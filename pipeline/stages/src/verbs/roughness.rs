@@ -1,4 +1,4 @@
-//! `roughness`: a DEM described and classified, and what of it shakes a vehicle.
+//! `roughness`: a DEM described and classified, what of it shakes a vehicle, and its aerodynamic roughness.
 
 use super::{Read, Reading, parameters, read};
 use crate::error::Error;
@@ -6,8 +6,12 @@ use crate::jobs::roughness::settings;
 use crate::study::check_roughness;
 use sastrugi_mobility::vehicle::TraverseParameters;
 use sastrugi_numeric::Grid;
-pub use sastrugi_roughness::{ArealFigures, Detrender, Ride};
-use sastrugi_roughness::{BandError, Summary, WaveBand, classify, describe, moore_gradient};
+pub use sastrugi_roughness::{
+    AerodynamicRoughness, ArealFigures, Detrender, ObstacleHeight, Ride, WindEstimate, WindSettings,
+};
+use sastrugi_roughness::{
+    BandError, Summary, WaveBand, WindError, aerodynamic_roughness, classify, describe, moore_gradient,
+};
 use sastrugi_schemas::kind::{read_parameters, schema_of};
 use sastrugi_schemas::study::RoughnessSection;
 use sastrugi_store::atomic;
@@ -29,6 +33,8 @@ pub struct Request<'a> {
     pub reading: Reading,
     /// What to look at for a vehicle.
     pub ride: Option<RideRequest<'a>>,
+    /// Wind whose roughness length is asked for.
+    pub wind: Option<WindSettings>,
 }
 
 /// Whose band of wavelengths counts.
@@ -62,12 +68,15 @@ pub struct Described {
     /// What of it shakes a vehicle.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ride: Option<Ride>,
+    /// Roughness length by wind direction.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub aerodynamic: Option<AerodynamicRoughness>,
 }
 
 /// Describes a DEM; returns the figures and sentences on how it was read.
 ///
 /// # Errors
-/// Unknown settings, a DEM that cannot be read or that does not hold the band, a map that cannot be written.
+/// Unknown settings, a DEM that cannot be read or that does not hold the band or the outer scale, a map that cannot be written.
 pub fn roughness(request: &Request<'_>) -> Result<(Described, Vec<String>), Error> {
     parameters::check_schema(&request.parameters, &schema_of::<RoughnessSection>(), "roughness")?;
     let section: RoughnessSection = read_parameters(&request.parameters)?;
@@ -76,11 +85,21 @@ pub fn roughness(request: &Request<'_>) -> Result<(Described, Vec<String>), Erro
     let band = request.ride.as_ref().map(|ride| band(&ride.bumps)).transpose()?;
     let Read { dem, notes, .. } = read(request.dem, &request.reading)?;
     let ride = request.ride.as_ref().zip(band).map(|(ride, band)| ride_over(&dem.grid, ride, &band)).transpose()?;
+    let aerodynamic = request.wind.as_ref().map(|wind| aerodynamic_over(&dem.grid, wind)).transpose()?;
     if let Some(path) = request.classes {
         let classes = classify(&moore_gradient(&dem.grid), &settings.thresholds);
         store::write_classes(path, &classes, &dem.info.crs).map_err(Error::failed)?;
     }
-    Ok((Described { summary: describe(&dem.grid, &settings), ride }, notes))
+    Ok((Described { summary: describe(&dem.grid, &settings), ride, aerodynamic }, notes))
+}
+
+/// Roughness length by wind direction.
+fn aerodynamic_over(dem: &Grid, wind: &WindSettings) -> Result<AerodynamicRoughness, Error> {
+    aerodynamic_roughness(dem, wind).map_err(|e| match e {
+        WindError::NoDirection | WindError::Azimuth { .. } => Error::Usage(format!("`--wind-from`: {e}")),
+        WindError::OuterScale { .. } => Error::Usage(format!("`--outer-scale`: {e}")),
+        WindError::Narrow { .. } | WindError::Wide { .. } => Error::Input(e.to_string()),
+    })
 }
 
 /// The band that is asked for.
