@@ -90,7 +90,7 @@ pub struct Source {
     /// The smooth part of the DEM that its noise was found from, when one was given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub noise_reference: Option<NoiseReference>,
-    /// The DEM that was subtracted, when one was, and how it was laid onto this one.
+    /// The DEM that was subtracted, when one was, and how it was co-registered to this one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub minus: Option<Minus>,
 }

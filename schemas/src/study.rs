@@ -220,7 +220,7 @@ pub struct FitItem {
     /// `noise_sigma_m` not stated).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub noise_reference: Option<String>,
-    /// Id of a DEM that is laid onto the first and subtracted (snow depth), both in one metric coordinate system.
+    /// Id of a DEM that is co-registered to the first and subtracted (snow depth), both in one metric coordinate system.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub minus: Option<String>,
     /// Seed of the replicates' random streams; follows from the study's seed and the id when absent.

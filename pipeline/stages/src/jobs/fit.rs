@@ -104,11 +104,12 @@ pub fn subtract(dem: &Dem, other: &Dem, file: &str, sha256: &str) -> Result<(Gri
 /// What was subtracted, for people.
 pub fn minus_note(minus: &Minus) -> String {
     let c = &minus.coregistration;
+    let [east, north] = c.shift_m.unwrap_or_default();
     let slow = if c.converged { "" } else { ", and did not come to rest" };
     format!(
-        "{} was moved {:.3} m east and {:.3} m north, raised {:.3} m and subtracted on {} cells: NMAD {:.4} m before, {:.4} m \
+        "{} was moved {east:.3} m east and {north:.3} m north, raised {:.3} m and subtracted on {} cells: NMAD {:.4} m before, {:.4} m \
          after; {} rounds{slow}",
-        minus.file, c.shift_m[0], c.shift_m[1], c.raise_m, c.cells, c.nmad_before_m, c.nmad_after_m, c.iterations
+        minus.file, c.raise_m, c.cells, c.nmad_before_m, c.nmad_after_m, c.iterations
     )
 }
 

@@ -1,4 +1,4 @@
-//! Laying one DEM onto another, and their difference (snow depth: snow-on less snow-off).
+//! Co-registration of one DEM to another, and their difference (snow depth: snow-on less snow-off).
 //!
 //! # What
 //! B is moved horizontally by (e, n), raised and tilted so that `A(x, y) - B(x - e, y - n) - w - p x - q y` is as small as
@@ -13,23 +13,32 @@
 //! is noise. Noise is in the heights, so that the quotient's weight is `tan^2 s`; with this weight the cosine becomes
 //! `dh = u dz/dx + v dz/dy + w`, no slope is left out, and raise and tilt (`+ p x + q y`), which a hillside's
 //! slope would otherwise be taken for, are found in the same equations. Outliers (trees, cars, avalanches) count little: Tukey's
-//! biweight at 4.685 NMAD (Holland and Welsch, 1977) on `dh` and on the difference of the slopes of A and B, since a tree on either
-//! falsifies the slopes of cells beside it that are right themselves. Slopes are A's, by central differences; their noise does not bias
-//! the shift, because that of a symmetric difference does not correlate with the height at its centre.
+//! biweight at 4.685 NMAD (Holland and Welsch, 1977) on `dh`; and cells are left out where the slopes of A and B disagree, since a
+//! tree on either falsifies the slopes of cells beside it that are right themselves. Slopes are A's, by central differences; their
+//! noise does not bias the shift, because that of a symmetric difference does not correlate with the height at its centre.
+//!
+//! # Uncertainty
+//! Standard errors are those of a delete-one-block jackknife ([`uncertainty`]): residuals of neighbouring cells are correlated, and
+//! errors that took them for independent would be far too small. [`gained`](Coregistration::gained) says whether the shift is more
+//! than they explain; from a cell on NMAD must fall as well, which a shift that is wrong by more than the relief's range would not
+//! bring about. Within a cell NMAD proves nothing: B read between its cells has its noise averaged, so that NMAD falls without reason
+//! where B should be read at its cells, and rises at the right shift where B lay between them.
 //!
 //! The fit starts from B where it is and finds shifts up to about the range of the terrain's relief; `nmad_after_m` says whether it
-//! did. Without stable terrain `raise_m` and `tilt` take the mean depth and its trend with them: the difference keeps the
-//! texture of the snow, not its mean depth.
+//! did. On ground without slopes in two directions B is raised and tilted alone. Without stable terrain `raise_m` and
+//! `tilt` take the mean depth and its trend with them: the difference keeps the texture of the snow, not its mean depth.
 //!
 //! # Cost
-//! Some 60 operations per cell and round, usually under 10 rounds; 40 bytes per cell of A.
+//! Some 100 operations per cell and round, usually under 10 rounds; 80 bytes per cell of A.
 
 mod rounds;
+mod uncertainty;
 
 use crate::sizes::NORMAL_CONSISTENCY;
 use rounds::{Overlay, Terms};
 use sastrugi_numeric::{Grid, sums};
-use sastrugi_schemas::coregistration::Coregistration;
+use sastrugi_schemas::coregistration::{Coregistration, StandardErrors};
+use uncertainty::Uncertainty;
 
 /// Fewest common cells.
 const CELLS_MIN: usize = 100;
@@ -37,6 +46,8 @@ const CELLS_MIN: usize = 100;
 const ROUNDS: u32 = 50;
 /// A round that moves B by less than this share of a cell is the last.
 const CONVERGED_CELLS: f64 = 0.005;
+/// A shift with a larger probability where none is needed has gained nothing.
+pub const SIGNIFICANCE: f64 = 0.05;
 
 /// A difference of DEMs.
 #[derive(Clone, Debug)]
@@ -47,7 +58,7 @@ pub struct Coregistered {
     pub coregistration: Coregistration,
 }
 
-/// DEMs that cannot be laid onto each other.
+/// DEMs that cannot be co-registered.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CoregisterError {
     /// They lie apart.
@@ -61,64 +72,102 @@ pub enum CoregisterError {
         b: [f64; 4],
     },
     /// They have too little in common.
-    #[error("the DEMs have {cells} cells with data in common; a coregistration needs at least {CELLS_MIN}")]
+    #[error("the DEMs have {cells} cells with data in common; a co-registration needs at least {CELLS_MIN}")]
     TooFewCells {
         /// Common cells.
         cells: usize,
     },
-    /// Nothing to align by.
-    #[error(
-        "the common part has no slopes in two directions, so that no horizontal shift can be found; subtract the DEMs as they are"
-    )]
-    Flat,
+    /// Data is too scattered for slopes, or lies on one line.
+    #[error("no plane can be fitted to the difference: too few common cells have data on all four sides")]
+    Scattered,
 }
 
-/// Lays B onto A and takes the difference. Both in metres and in one coordinate system; cells, origins and extents may differ.
+/// Co-registers B to A and takes the difference. Both in metres and in one coordinate system; cells, origins and extents may
+/// differ.
 ///
 /// # Errors
 /// See [`CoregisterError`].
 pub fn coregister(a: &Grid, b: &Grid) -> Result<Coregistered, CoregisterError> {
     let overlay = Overlay::new(a, b);
-    let before = overlay.difference(&Terms::default());
-    let common = sums::finite(&before);
-    if common.len() < CELLS_MIN {
-        let [ra, rb] = [rectangle(a), rectangle(b)];
-        let apart = ra[0] >= rb[2] || rb[0] >= ra[2] || ra[1] >= rb[3] || rb[1] >= ra[3];
-        return Err(if apart {
-            CoregisterError::Apart { a: ra, b: rb }
-        } else {
-            CoregisterError::TooFewCells { cells: common.len() }
-        });
+    let before = sums::finite(&overlay.difference(&Terms::default()));
+    if before.len() < CELLS_MIN {
+        return Err(too_few(a, b, before.len()));
     }
-    let (median, nmad) = centre_and_spread(&common);
-    let plane = overlay.levelled(Terms { raise: median, ..Terms::default() }).ok_or(CoregisterError::Flat)?;
-    let nmad_plane = centre_and_spread(&sums::finite(&overlay.difference(&plane))).1;
-    let cell_m = a.geometry.cell[0].min(a.geometry.cell[1]);
-    let (mut terms, mut iterations, mut converged) = (plane, 0, false);
-    while iterations < ROUNDS && !converged {
-        let next = overlay.round(&terms).ok_or(CoregisterError::Flat)?;
-        let [u, v] = [0, 1].map(|k| next.offset[k] - terms.offset[k]);
-        converged = (u * u + v * v).sqrt() < CONVERGED_CELLS * cell_m;
-        (terms, iterations) = (next, iterations + 1);
-    }
+    let (median_before_m, nmad_before_m) = centre_and_spread(&before);
+    let plane =
+        overlay.levelled(Terms { raise: median_before_m, ..Terms::default() }).ok_or(CoregisterError::Scattered)?;
+    let (median_plane_m, nmad_plane_m) = centre_and_spread(&sums::finite(&overlay.difference(&plane)));
+    let resolution_m = CONVERGED_CELLS * overlay.cell_m();
+    let shifted = shifted(&overlay, plane, resolution_m);
+    let Search { terms, iterations, converged } =
+        shifted.unwrap_or(Search { terms: plane, iterations: 0, converged: true });
     let difference = overlay.difference(&terms);
     let after = sums::finite(&difference);
     if after.len() < CELLS_MIN {
         return Err(CoregisterError::TooFewCells { cells: after.len() });
     }
+    let (median_after_m, nmad_after_m) = centre_and_spread(&after);
+    let uncertainty = if converged { overlay.uncertainty(&terms, shifted.is_some(), resolution_m) } else { None };
+    let shift_m = shifted.map(|_| terms.offset.map(|o| -o));
+    let shift_p = uncertainty.as_ref().zip(shift_m).and_then(|(u, shift)| u.probability_beyond(shift));
+    let significant = shift_p.is_some_and(|p| p < SIGNIFICANCE);
+    let near = shift_m.is_some_and(|[east, north]| (east * east + north * north).sqrt() < overlay.cell_m());
     let coregistration = Coregistration {
-        shift_m: terms.offset.map(|o| -o),
+        shift_m,
         raise_m: terms.raise,
         tilt: terms.tilt,
-        median_before_m: median,
-        nmad_before_m: nmad,
-        nmad_plane_m: nmad_plane,
-        nmad_after_m: centre_and_spread(&after).1,
+        standard_errors: uncertainty.map(Uncertainty::standard_errors),
+        shift_p,
+        gained: Some(significant && (near || nmad_after_m < nmad_plane_m)),
+        median_before_m,
+        median_plane_m: Some(median_plane_m),
+        median_after_m: Some(median_after_m),
+        nmad_before_m,
+        nmad_plane_m,
+        nmad_after_m,
         cells: after.len() as u64,
         iterations,
         converged,
     };
     Ok(Coregistered { difference: Grid::new(a.geometry, difference), coregistration })
+}
+
+/// A less B as it was moved when it was co-registered to other cells of the same raster, as those of stable terrain; on A's grid, m.
+pub fn difference(a: &Grid, b: &Grid, coregistration: &Coregistration) -> Grid {
+    let offset = coregistration.shift_m.map_or([0.0; 2], |shift| shift.map(|s| -s));
+    let terms = Terms { offset, raise: coregistration.raise_m, tilt: coregistration.tilt };
+    Grid::new(a.geometry, rounds::less(a, b, &terms))
+}
+
+/// Where the search for a shift ended.
+#[derive(Clone, Copy)]
+struct Search {
+    terms: Terms,
+    iterations: u32,
+    converged: bool,
+}
+
+/// Rounds from `start` until B moves by less than `resolution_m`; `None` where the ground has no slopes in two directions.
+fn shifted(overlay: &Overlay<'_>, start: Terms, resolution_m: f64) -> Option<Search> {
+    let mut search = Search { terms: overlay.round(&start)?, iterations: 1, converged: false };
+    let mut before = start;
+    loop {
+        let [u, v] = [0, 1].map(|k| search.terms.offset[k] - before.offset[k]);
+        search.converged = (u * u + v * v).sqrt() < resolution_m;
+        if search.converged || search.iterations == ROUNDS {
+            return Some(search);
+        }
+        // B may have been moved to where nothing is left in common.
+        let Some(next) = overlay.round(&search.terms) else { return Some(search) };
+        before = search.terms;
+        search = Search { terms: next, iterations: search.iterations + 1, converged: false };
+    }
+}
+
+fn too_few(a: &Grid, b: &Grid, cells: usize) -> CoregisterError {
+    let [a, b] = [rectangle(a), rectangle(b)];
+    let apart = a[0] >= b[2] || b[0] >= a[2] || a[1] >= b[3] || b[1] >= a[3];
+    if apart { CoregisterError::Apart { a, b } } else { CoregisterError::TooFewCells { cells } }
 }
 
 /// `[x0, y0, x1, y1]`.

@@ -1,17 +1,31 @@
 //! One round of the fit of shift, raise and tilt.
+//!
+//! Unknowns are the offset (east, north), the raise and the tilts; z is a cell's row `(dA/dx, dA/dy, 1, x, y)`, y being what A
+//! gives it, and b the same with the slopes of B as moved; d is the difference and w its weight. The fit ends where the score
+//! `sum w z d` is zero. Near there the step is `(sum w z b')^-1 sum w z d`: noise in the slopes of A and of B is independent and
+//! takes nothing from `z b'`, but adds to `z z'`, so that Gauss and Newton's step `(sum w z z')^-1 sum w z d` falls short of
+//! the end where slopes are mostly noise (attenuation). From afar slopes of A and B may disagree, and that shorter step is taken,
+//! which always leads downhill.
 
 use super::centre_and_spread;
+use super::uncertainty::Uncertainty;
 use crate::fit::least_squares::Cholesky;
 use rayon::prelude::*;
 use sastrugi_numeric::surface::Surface;
 use sastrugi_numeric::{Grid, sums};
+use std::ops::Range;
 
 /// Tukey's constant: 95 % efficiency on normal data (Holland and Welsch, 1977).
 const BIWEIGHT: f64 = 4.685;
 /// Unknowns: two offsets, raise, two tilts.
-const UNKNOWNS: usize = 5;
+pub const UNKNOWNS: usize = 5;
 /// Rounds of the plane alone.
 const PLANE_ROUNDS: usize = 10;
+/// Unknowns whose equations are closer to dependent than this cannot be told apart: smallest eigenvalue of the normal
+/// equations with unit diagonal.
+const DEPENDENT: f64 = 1e-9;
+/// Blocks that standard errors are from.
+const BLOCKS: f64 = 25.0;
 
 /// Where B is read, and the plane that is added to it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -22,6 +36,28 @@ pub struct Terms {
     pub raise: f64,
     /// Added eastwards and northwards, m/m.
     pub tilt: [f64; 2],
+}
+
+/// A less B as moved, m.
+pub fn less(a: &Grid, b: &Grid, terms: &Terms) -> Vec<f64> {
+    let g = a.geometry;
+    let centre = centre(a);
+    let mut all = vec![f64::NAN; g.len()];
+    all.par_chunks_mut(g.cols).enumerate().for_each(|(row, line)| {
+        let y = g.y(row);
+        for (col, d) in line.iter_mut().enumerate() {
+            let x = g.x(col);
+            let plane = terms.raise + terms.tilt[0] * (x - centre[0]) + terms.tilt[1] * (y - centre[1]);
+            let below = b.height(x + terms.offset[0], y + terms.offset[1]);
+            *d = below.map_or(f64::NAN, |z| a.at(row, col) - z - plane);
+        }
+    });
+    all
+}
+
+fn centre(grid: &Grid) -> [f64; 2] {
+    let (g, size) = (grid.geometry, grid.geometry.size());
+    [0, 1].map(|k| g.origin[k] + 0.5 * size[k])
 }
 
 /// A, its slopes, and B.
@@ -35,110 +71,239 @@ pub struct Overlay<'a> {
     reach: [f64; 2],
 }
 
+/// A and B as moved, cell by cell of A.
+struct Compared {
+    /// A less B, m.
+    difference: Vec<f64>,
+    /// Median of the difference, m.
+    centre: f64,
+    /// Distance from it where the biweight ends, m.
+    reach: f64,
+    /// `dz/dx` and `dz/dy` of B; NaN where it has none.
+    slopes: Vec<[f64; 2]>,
+    /// Weight by the agreement of the slopes of A and B; 0 where either has none.
+    agreement: Vec<f64>,
+}
+
+/// Sums over cells: `sum w z z'`, `sum w z b'` (row-major), `sum w z d`, and the sum of the derivatives of `w d` by d.
+#[derive(Clone, Debug)]
+pub struct Equations([f64; Self::LEN]);
+
+impl Equations {
+    const SQUARE: usize = UNKNOWNS * UNKNOWNS;
+    const DERIVATIVES: usize = 2 * Self::SQUARE + UNKNOWNS;
+    const LEN: usize = Self::DERIVATIVES + 1;
+    const NONE: Self = Self([0.0; Self::LEN]);
+
+    fn add(&mut self, z: &[f64; UNKNOWNS], b: &[f64; UNKNOWNS], weight: f64, difference: f64) {
+        for i in 0..UNKNOWNS {
+            for j in 0..UNKNOWNS {
+                self.0[i * UNKNOWNS + j] += weight * z[i] * z[j];
+                self.0[Self::SQUARE + i * UNKNOWNS + j] += weight * z[i] * b[j];
+            }
+            self.0[2 * Self::SQUARE + i] += weight * z[i] * difference;
+        }
+    }
+
+    /// Sum in a fixed order.
+    pub fn sum(all: &[Self]) -> Self {
+        let mut total = Self::NONE;
+        for (k, sum) in total.0.iter_mut().enumerate() {
+            *sum = sums::sum(&all.iter().map(|e| e.0[k]).collect::<Vec<_>>());
+        }
+        total
+    }
+
+    /// These less others.
+    pub fn without(&self, others: &Self) -> Self {
+        let mut rest = self.clone();
+        rest.0.iter_mut().zip(&others.0).for_each(|(rest, other)| *rest -= other);
+        rest
+    }
+
+    /// Sum of the weights.
+    pub fn weight(&self) -> f64 {
+        self.0[2 * (UNKNOWNS + 1)]
+    }
+
+    /// By how much less the score follows the unknowns than with fixed weights: mean derivative of `w d` over mean w, as Huber
+    /// (1981), section 7.6, has it.
+    pub fn slackening(&self) -> f64 {
+        self.0[Self::DERIVATIVES] / self.weight()
+    }
+
+    fn square(&self, from: usize, first: usize) -> Vec<f64> {
+        let rows = first..UNKNOWNS;
+        rows.clone().flat_map(|i| rows.clone().map(move |j| self.0[from + i * UNKNOWNS + j])).collect()
+    }
+
+    fn score(&self, first: usize) -> &[f64] {
+        &self.0[2 * Self::SQUARE + first..Self::DERIVATIVES]
+    }
+
+    /// Gauss and Newton's step of the unknowns from `first` on; `None` when they cannot be told apart.
+    fn downhill(&self, first: usize) -> Option<Vec<f64>> {
+        let n = UNKNOWNS - first;
+        let normal = self.square(0, first);
+        let mut scaled: Vec<f64> =
+            (0..n * n).map(|k| normal[k] / (normal[k / n * (n + 1)] * normal[k % n * (n + 1)]).sqrt()).collect();
+        (0..n).for_each(|k| scaled[k * (n + 1)] -= DEPENDENT);
+        Cholesky::new(&scaled, n)?;
+        Some(Cholesky::new(&normal, n)?.solve(self.score(first)))
+    }
+
+    /// Step of the unknowns from `first` on with the slopes of both; `None` when their products are singular.
+    pub fn straight(&self, first: usize) -> Option<Vec<f64>> {
+        solve(self.square(Self::SQUARE, first), self.score(first).to_vec())
+    }
+}
+
 impl<'a> Overlay<'a> {
     pub fn new(a: &'a Grid, b: &'a Grid) -> Self {
-        let (g, size) = (a.geometry, a.geometry.size());
-        let centre = [0, 1].map(|k| g.origin[k] + 0.5 * size[k]);
-        Self { a, b, slopes: slopes(a), centre, reach: size.map(|s| 0.5 * s) }
+        Self { a, b, slopes: slopes(a), centre: centre(a), reach: a.geometry.size().map(|s| 0.5 * s) }
+    }
+
+    /// Smaller side of A's cells, m.
+    pub fn cell_m(&self) -> f64 {
+        self.a.geometry.cell[0].min(self.a.geometry.cell[1])
     }
 
     /// A less B as moved, m.
     pub fn difference(&self, terms: &Terms) -> Vec<f64> {
-        let g = self.a.geometry;
-        let mut all = vec![f64::NAN; g.len()];
-        all.par_chunks_mut(g.cols).enumerate().for_each(|(row, line)| {
-            let y = g.y(row);
-            for (col, d) in line.iter_mut().enumerate() {
-                let x = g.x(col);
-                let plane = terms.raise + terms.tilt[0] * (x - self.centre[0]) + terms.tilt[1] * (y - self.centre[1]);
-                let below = self.b.height(x + terms.offset[0], y + terms.offset[1]);
-                *d = below.map_or(f64::NAN, |z| self.a.at(row, col) - z - plane);
-            }
-        });
-        all
+        less(self.a, self.b, terms)
     }
 
-    /// Raise and tilt alone, B where it lies.
+    /// Raise and tilt alone, B where it lies; `None` when the cells in common hold no plane.
     pub fn levelled(&self, start: Terms) -> Option<Terms> {
-        (0..PLANE_ROUNDS).try_fold(start, |terms, _| self.step(&terms, 2))
-    }
-
-    /// A round of all unknowns.
-    pub fn round(&self, terms: &Terms) -> Option<Terms> {
-        self.step(terms, 0)
-    }
-
-    /// Weighted least squares of the present difference on the unknowns from `first` on; `None` when they cannot be told apart.
-    fn step(&self, terms: &Terms, first: usize) -> Option<Terms> {
-        let difference = self.difference(terms);
-        let (centre, reach) = centre_and_reach(&difference);
-        let disagreement = self.slope_disagreement(terms);
-        let steep = centre_and_reach(&disagreement).1;
-        let weights: Vec<f64> = difference
-            .iter()
-            .zip(&disagreement)
-            .map(|(d, s)| biweight((d - centre) / reach) * biweight(s / steep))
-            .collect();
-        let (normal, gradient) = self.normal_equations(&difference, &weights, first);
-        let factor = Cholesky::new(&normal, UNKNOWNS - first)?;
-        let mut step = [0.0; UNKNOWNS];
-        step[first..].copy_from_slice(&factor.solve(&gradient));
-        Some(Terms {
-            offset: [0, 1].map(|k| terms.offset[k] + step[k]),
-            raise: terms.raise + step[2],
-            tilt: [0, 1].map(|k| terms.tilt[k] + step[3 + k] / self.reach[k]),
+        (0..PLANE_ROUNDS).try_fold(start, |terms, _| {
+            let step = self.equations(&self.compare(&terms)).downhill(2)?;
+            Some(self.moved(&terms, 2, &step))
         })
     }
 
-    /// Size of the difference of the slopes of A and of B as moved, with the sign of the eastward one, so that its median
-    /// is about 0.
-    fn slope_disagreement(&self, terms: &Terms) -> Vec<f64> {
-        let g = self.a.geometry;
-        let of = |k: usize| {
-            let (x, y) = (g.x(k % g.cols) + terms.offset[0], g.y(k / g.cols) + terms.offset[1]);
-            self.b.height_and_gradient(x, y).map_or(f64::NAN, |(_, east, north)| {
-                let [p, q] = [self.slopes[k][0] - east, self.slopes[k][1] - north];
-                (p * p + q * q).sqrt().copysign(p)
-            })
+    /// A round of all unknowns; `None` when they cannot be told apart.
+    pub fn round(&self, terms: &Terms) -> Option<Terms> {
+        let equations = self.equations(&self.compare(terms));
+        let downhill = equations.downhill(0)?;
+        let near = |step: &Vec<f64>| {
+            let length = (step[0] * step[0] + step[1] * step[1]).sqrt();
+            length < self.cell_m() && step[0] * downhill[0] + step[1] * downhill[1] > 0.0
         };
-        (0..g.len()).into_par_iter().with_min_len(1 << 12).map(of).collect()
+        Some(self.moved(terms, 0, &equations.straight(0).filter(near).unwrap_or(downhill)))
     }
 
-    /// `X'WX` (row-major) and `X'Wd`, row by row of A in order.
-    fn normal_equations(&self, difference: &[f64], weights: &[f64], first: usize) -> (Vec<f64>, Vec<f64>) {
+    /// Standard errors where the fit ended, with or without a shift among the unknowns; `None` for too little data.
+    pub fn uncertainty(&self, terms: &Terms, shifted: bool, resolution_m: f64) -> Option<Uncertainty> {
+        let units = [1.0, 1.0, 1.0, 1.0 / self.reach[0], 1.0 / self.reach[1]];
+        let blocks = self.blocks(&self.compare(terms));
+        Uncertainty::of_blocks(&blocks, if shifted { 0 } else { 2 }, units, resolution_m)
+    }
+
+    /// Terms after a step of the unknowns from `first` on.
+    fn moved(&self, terms: &Terms, first: usize, by: &[f64]) -> Terms {
+        let mut step = [0.0; UNKNOWNS];
+        step[first..].copy_from_slice(by);
+        Terms {
+            offset: [0, 1].map(|k| terms.offset[k] + step[k]),
+            raise: terms.raise + step[2],
+            tilt: [0, 1].map(|k| terms.tilt[k] + step[3 + k] / self.reach[k]),
+        }
+    }
+
+    fn compare(&self, terms: &Terms) -> Compared {
         let g = self.a.geometry;
-        let n = UNKNOWNS - first;
-        let rows: Vec<Vec<f64>> = (0..g.rows)
-            .into_par_iter()
-            .map(|row| {
-                let mut sum = vec![0.0; n * n + n];
-                for col in 0..g.cols {
-                    let k = row * g.cols + col;
-                    let (weight, [east, north]) = (weights[k], self.slopes[k]);
-                    if weight > 0.0 {
-                        let [x, y] = [(g.x(col), 0), (g.y(row), 1)].map(|(v, k)| (v - self.centre[k]) / self.reach[k]);
-                        add(&mut sum, &[east, north, 1.0, x, y][first..], weight, difference[k]);
-                    }
+        let difference = self.difference(terms);
+        let (centre, reach) = centre_and_reach(&difference);
+        let gradient = |k: usize| {
+            let (x, y) = (g.x(k % g.cols) + terms.offset[0], g.y(k / g.cols) + terms.offset[1]);
+            self.b.height_and_gradient(x, y).map_or([f64::NAN; 2], |(_, east, north)| [east, north])
+        };
+        let slopes: Vec<[f64; 2]> = (0..g.len()).into_par_iter().with_min_len(1 << 12).map(gradient).collect();
+        let agreement = agreement(&self.slopes, &slopes);
+        Compared { difference, centre, reach, slopes, agreement }
+    }
+
+    /// Of all cells, row by row of A.
+    fn equations(&self, compared: &Compared) -> Equations {
+        let g = self.a.geometry;
+        let rows: Vec<Equations> =
+            (0..g.rows).into_par_iter().map(|row| self.equations_of(compared, row..row + 1, 0..g.cols)).collect();
+        Equations::sum(&rows)
+    }
+
+    /// Of a rectangle of A.
+    fn equations_of(&self, compared: &Compared, rows: Range<usize>, cols: Range<usize>) -> Equations {
+        let g = self.a.geometry;
+        let mut sum = Equations::NONE;
+        for row in rows {
+            let y = (g.y(row) - self.centre[1]) / self.reach[1];
+            for col in cols.clone() {
+                let k = row * g.cols + col;
+                let share = (compared.difference[k] - compared.centre) / compared.reach;
+                if compared.agreement[k] > 0.0 && share.abs() < 1.0 {
+                    let x = (g.x(col) - self.centre[0]) / self.reach[0];
+                    let ([ae, an], [be, bn]) = (self.slopes[k], compared.slopes[k]);
+                    let [weight, derivative] = biweight(share).map(|w| w * compared.agreement[k]);
+                    sum.add(&[ae, an, 1.0, x, y], &[be, bn, 1.0, x, y], weight, compared.difference[k]);
+                    sum.0[Equations::DERIVATIVES] += derivative;
                 }
-                sum
-            })
-            .collect();
-        let mut total: Vec<f64> =
-            (0..n * n + n).map(|k| sums::sum(&rows.iter().map(|r| r[k]).collect::<Vec<_>>())).collect();
-        let gradient = total.split_off(n * n);
-        (total, gradient)
+            }
+        }
+        sum
+    }
+
+    /// Of nearly square blocks, some 25 of them over the rectangle that holds all cells in common.
+    fn blocks(&self, compared: &Compared) -> Vec<Equations> {
+        let g = self.a.geometry;
+        let Some([rows, cols]) = occupied(&compared.agreement, g.cols) else { return Vec::new() };
+        let [width, height] = [cols.len() as f64 * g.cell[0], rows.len() as f64 * g.cell[1]];
+        let side = (width * height / BLOCKS).sqrt();
+        let [rows, cols] = [(rows, height), (cols, width)].map(|(range, size)| parts(&range, (size / side).round()));
+        let of_row = |row: &Range<usize>| -> Vec<Equations> {
+            cols.iter().map(|col| self.equations_of(compared, row.clone(), col.clone())).collect()
+        };
+        let all: Vec<Vec<Equations>> = rows.par_iter().map(of_row).collect();
+        all.into_iter().flatten().filter(|block| block.weight() > 0.0).collect()
     }
 }
 
-/// Adds one cell to `X'WX` and `X'Wd`.
-fn add(sum: &mut [f64], x: &[f64], weight: f64, difference: f64) {
-    let n = x.len();
-    for i in 0..n {
-        for j in 0..n {
-            sum[i * n + j] += weight * x[i] * x[j];
-        }
-        sum[n * n + i] += weight * x[i] * difference;
+/// Rows and columns between the first and the last positive value.
+fn occupied(values: &[f64], cols: usize) -> Option<[Range<usize>; 2]> {
+    let mut found: Option<[Range<usize>; 2]> = None;
+    for k in (0..values.len()).filter(|&k| values[k] > 0.0) {
+        let (row, col) = (k / cols, k % cols);
+        let [rows, cols] = found.get_or_insert([row..row + 1, col..col + 1]);
+        rows.end = row + 1;
+        *cols = cols.start.min(col)..cols.end.max(col + 1);
     }
+    found
+}
+
+/// About equal parts of a range, `count` of them or as many as it has members.
+fn parts(range: &Range<usize>, count: f64) -> Vec<Range<usize>> {
+    let count = (count as usize).clamp(1, range.len().max(1));
+    let end = |k: usize| range.start + k * range.len() / count;
+    (0..count).map(|k| end(k)..end(k + 1)).collect()
+}
+
+/// Solution of `m x = v` by elimination with row pivots; `None` when m is singular.
+fn solve(mut m: Vec<f64>, mut v: Vec<f64>) -> Option<Vec<f64>> {
+    let n = v.len();
+    for k in 0..n {
+        let pivot = (k..n).max_by(|&i, &j| m[i * n + k].abs().total_cmp(&m[j * n + k].abs()))?;
+        (0..n).for_each(|j| m.swap(k * n + j, pivot * n + j));
+        v.swap(k, pivot);
+        for i in k + 1..n {
+            let factor = m[i * n + k] / m[k * n + k];
+            (k..n).for_each(|j| m[i * n + j] -= factor * m[k * n + j]);
+            v[i] -= factor * v[k];
+        }
+    }
+    for k in (0..n).rev() {
+        let known: f64 = (k + 1..n).map(|j| m[k * n + j] * v[j]).sum();
+        v[k] = (v[k] - known) / m[k * n + k];
+    }
+    v.iter().all(|x| x.is_finite()).then_some(v)
 }
 
 /// Median, and where the biweight ends. Equal values have no spread, and nothing to weigh.
@@ -147,10 +312,33 @@ fn centre_and_reach(values: &[f64]) -> (f64, f64) {
     (centre, if spread > 0.0 { BIWEIGHT * spread } else { f64::INFINITY })
 }
 
-/// Tukey's biweight; 0 for no data.
-fn biweight(share: f64) -> f64 {
+/// Tukey's biweight w, and the derivative of w times its argument, at a share below 1 of its reach.
+fn biweight(share: f64) -> [f64; 2] {
     let rest = 1.0 - share * share;
-    if rest > 0.0 { rest * rest } else { 0.0 }
+    [rest * rest, rest * (1.0 - 5.0 * share * share)]
+}
+
+/// Weights by the difference of the slopes of A and B from its median, which a tilt of the whole surface moves: 1 up to half of its
+/// reach, then falling to 0 as the biweight does. A weight that fell within what noise makes would pick cells where the noise of A
+/// and of B agree, and noise would pass for relief.
+fn agreement(a: &[[f64; 2]], b: &[[f64; 2]]) -> Vec<f64> {
+    let medians = [0, 1].map(|k| {
+        let differences: Vec<f64> = a.iter().zip(b).map(|(a, b)| a[k] - b[k]).collect();
+        sums::median(&sums::finite(&differences))
+    });
+    // With the sign of the eastward one its median is about 0.
+    let size = |(a, b): (&[f64; 2], &[f64; 2])| {
+        let [p, q] = [0, 1].map(|k| a[k] - b[k] - medians[k]);
+        (p * p + q * q).sqrt().copysign(p)
+    };
+    let sizes: Vec<f64> = a.iter().zip(b).map(size).collect();
+    let reach = centre_and_reach(&sizes).1;
+    let weight = |size: &f64| match size.abs() / reach {
+        share if share < 0.5 => 1.0,
+        share if share < 1.0 => biweight(2.0 * share - 1.0)[0],
+        _ => 0.0,
+    };
+    sizes.iter().map(weight).collect()
 }
 
 /// Central differences; NaN where a neighbour is missing.
