@@ -4,6 +4,7 @@
 
 mod bad_input;
 mod compare;
+mod coregister;
 mod metadata;
 mod minus;
 mod pack;

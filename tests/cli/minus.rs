@@ -1,5 +1,6 @@
-//! `fit A --minus B`: the DEMs are laid onto each other, and the fit is that of what lies between.
+//! `fit A --minus B`: B is co-registered to A, and the fit is that of the difference.
 
+use crate::coregister::{moved, noisy, number};
 use sastrugi_tests::{area, sastrugi_in, write};
 use serde_json::Value;
 use std::path::Path;
@@ -23,36 +24,18 @@ fn val_snow_is_found_between_two_dems() {
     let call = ["texture", "snow.json", "--size", "30x30", "--cell", "0.1", "--phase", "gaussian", "--seed", "3"];
     done(path, &[&call[..], &["--onto", "ground.asc", "-o", "snow.tif"]].concat());
     let text = std::fs::read_to_string(path.join("ground.asc")).unwrap();
-    write(path, "moved.asc", &moved(&text, [0.07, -0.04], 3.0));
+    write(path, "moved.asc", &moved(&text, [0.07, -0.04], 3.0, [0.0; 2]));
     done(path, &["fit", "snow.tif", "--minus", "moved.asc", "--bootstrap", "0", "-o", "depth.json"]);
     let fit: Value = serde_json::from_slice(&std::fs::read(path.join("depth.json")).unwrap()).unwrap();
     let minus = &fit["source"]["minus"];
     assert_eq!(minus["file"], "moved.asc");
     let c = &minus["coregistration"];
-    let number = |v: &Value| v.as_f64().unwrap();
     let shift = [number(&c["shift_m"][0]), number(&c["shift_m"][1])];
     assert!((shift[0] + 0.07).abs() < 0.005 && (shift[1] - 0.04).abs() < 0.005, "{c}");
     assert!((number(&c["raise_m"]) + 3.0).abs() < 0.05 && c["converged"] == true, "{c}");
     assert!(number(&c["nmad_after_m"]) < number(&c["nmad_before_m"]), "{c}");
     let sigma = number(&fit["parameters"]["sigma_m"]);
     assert!((sigma - 0.1).abs() < 0.005, "{fit}");
-}
-
-/// An ESRI ASCII grid whose header lies elsewhere, and whose heights are higher.
-fn moved(text: &str, by: [f64; 2], up: f64) -> String {
-    let line = |line: &str| {
-        let words: Vec<&str> = line.split_whitespace().collect();
-        match words[0].to_ascii_lowercase().as_str() {
-            "xllcorner" => format!("xllcorner {}", words[1].parse::<f64>().unwrap() + by[0]),
-            "yllcorner" => format!("yllcorner {}", words[1].parse::<f64>().unwrap() + by[1]),
-            first if first.starts_with(char::is_alphabetic) => line.to_owned(),
-            _ => {
-                let higher = |w: &&str| (w.parse::<f64>().unwrap() + up).to_string();
-                words.iter().map(higher).collect::<Vec<_>>().join(" ")
-            }
-        }
-    };
-    text.lines().map(line).collect::<Vec<_>>().join("\n") + "\n"
 }
 
 /// A study's `minus` gives the figures of the verb; what cannot be subtracted is refused with the reason.
@@ -86,7 +69,7 @@ fn val_a_study_subtracts_as_the_verb_does() {
     let ground = ["terrain", "multifractal", "--set", "size_px=[150,150]", "--set", "cell_m=0.1", "-o", "ground.asc"];
     done(path, &ground);
     let text = std::fs::read_to_string(path.join("ground.asc")).unwrap();
-    write(path, "far.asc", &moved(&text, [500.0, 0.0], 0.0));
+    write(path, "far.asc", &moved(&text, [500.0, 0.0], 0.0, [0.0; 2]));
     let jacksboro = sastrugi_fixtures::jacksboro();
     for (other, words) in [("far.asc", "do not overlap"), (jacksboro.to_str().unwrap(), "in degrees")] {
         let call = sastrugi_in(path, &["fit", "snow.tif", "--minus", other, "-o", "no.json"]);
@@ -113,7 +96,7 @@ fn val_a_measured_site_is_moved_back() {
     done(path, &["convert", site, "site.asc"]);
     let text = std::fs::read_to_string(path.join("site.asc")).unwrap();
     for by in [[0.3, -0.45], [1.7, 2.2]] {
-        write(path, "moved.asc", &moved(&text, by, 0.0));
+        write(path, "moved.asc", &moved(&text, by, 0.0, [0.0; 2]));
         done(
             path,
             &["fit", "snow.tif", "--minus", "moved.asc", "--outer-scale", "25", "--bootstrap", "0", "-o", "d.json"],
@@ -123,4 +106,77 @@ fn val_a_measured_site_is_moved_back() {
         let error = [0, 1].map(|k| shift[k].as_f64().unwrap() + by[k]);
         assert!(error.iter().all(|e| e.abs() < 0.05), "{by:?}: {shift}");
     }
+}
+
+/// DEMs that differ by noise alone have no covariance to fit: exit code 65 with the fit's sentence, and the co-registration is kept, printed and
+/// as JSON where a fit file has it, with the difference; in a study the failed item says it.
+#[test]
+fn val_a_failed_fit_keeps_the_coregistration() {
+    let folder = area();
+    let path = folder.path();
+    let ground = ["terrain", "multifractal", "--set", "size_px=[150,150]", "--set", "cell_m=0.1", "-o", "ground.asc"];
+    done(path, &ground);
+    let text = std::fs::read_to_string(path.join("ground.asc")).unwrap();
+    write(path, "one.asc", &noisy(&text, 0.02, 1));
+    write(path, "two.asc", &noisy(&moved(&text, [0.03, 0.02], 1.0, [0.0; 2]), 0.02, 2));
+    let fit = ["fit", "one.asc", "--minus", "two.asc", "--bootstrap", "0", "-o", "fit.json"];
+    let call = sastrugi_in(path, &[&fit[..], &["--difference", "depth.tif"]].concat());
+    assert!(call.code == 65 && call.stderr.contains("the residual is white"), "{} {}", call.code, call.stderr);
+    assert!(call.stdout.contains("moved east") && call.stdout.contains("NMAD"), "{}", call.stdout);
+    assert!(!path.join("fit.json").exists());
+    let depth = sastrugi_in(path, &["info", "depth.tif", "--json"]);
+    let depth: Value = serde_json::from_str(&depth.stdout).unwrap();
+    assert_eq!((&depth["rows"], &depth["unit"]), (&150.into(), &"m".into()));
+
+    let call = sastrugi_in(path, &[&fit[..], &["--json"]].concat());
+    let kept: Value = serde_json::from_str(&call.stdout).unwrap();
+    let c = &kept["source"]["minus"]["coregistration"];
+    assert!(call.code == 65 && kept["error"].as_str().unwrap().contains("white"), "{kept}");
+    assert!((number(&c["shift_m"][0]) + 0.03).abs() < 0.005 && (number(&c["raise_m"]) + 1.0).abs() < 0.005, "{c}");
+
+    let study = "[study]\nname = \"depth\"\nseed = 1\ndate = \"2026-01-01\"\n[[dem]]\nid = \"one\"\nfile = \"one.asc\"\n[[dem]]\n\
+                 id = \"two\"\nfile = \"two.asc\"\n[[fit]]\nid = \"depth\"\ndem = \"one\"\nminus = \"two\"\nbootstrap = 0\n";
+    write(path, "study.toml", study);
+    let call = sastrugi_in(path, &["run", "study.toml", "-o", "release", "--quiet"]);
+    let said = format!("{}{}", call.stdout, call.stderr);
+    assert!(
+        call.code == 3 && said.contains("white") && said.contains("two.asc was moved -0.03"),
+        "{} {said}",
+        call.code
+    );
+
+    let own = "needs its own name";
+    for (more, words) in [
+        (&["--difference", "one.asc"][..], own),
+        (&["--difference", "./two.asc"], own),
+        (&["--difference", "d.tif", "--map", "d.tif"], own),
+        (&["--difference", "d.xyz"], "names no DEM format"),
+    ] {
+        let call = sastrugi_in(path, &[&fit[..], more].concat());
+        assert!(call.code == 2 && call.stderr.contains(words), "{more:?}: {} {}", call.code, call.stderr);
+    }
+    let call = sastrugi_in(path, &["fit", "one.asc", "--difference", "d.tif", "-o", "fit.json"]);
+    assert!(call.code == 2 && call.stderr.contains("--minus"), "{} {}", call.code, call.stderr);
+}
+
+/// Without slopes in two directions the DEMs are subtracted where they lie, and the fit file warns of it.
+#[test]
+fn val_flat_ground_is_subtracted_as_it_lies() {
+    let folder = area();
+    let path = folder.path();
+    write(path, "snow.json", FIT);
+    let flat = format!(
+        "ncols 300\nnrows 300\nxllcorner 0\nyllcorner 0\ncellsize 0.1\n{}",
+        "2 ".repeat(300).trim_end().to_owned() + "\n"
+    );
+    let line = "2 ".repeat(300);
+    write(path, "flat.asc", &(flat + &format!("{}\n", line.trim_end()).repeat(299)));
+    let call = ["texture", "snow.json", "--size", "30x30", "--cell", "0.1", "--phase", "gaussian", "--seed", "3"];
+    done(path, &[&call[..], &["-o", "snow.tif"]].concat());
+    // The slopes are A's: of the flat one there are none.
+    done(path, &["fit", "flat.asc", "--minus", "snow.tif", "--bootstrap", "0", "-o", "depth.json"]);
+    let fit: Value = serde_json::from_slice(&std::fs::read(path.join("depth.json")).unwrap()).unwrap();
+    assert_eq!(fit["source"]["minus"]["coregistration"]["shift_m"], Value::Null);
+    assert!(fit["warnings"][0].as_str().unwrap().starts_with("no horizontal shift"), "{}", fit["warnings"]);
+    assert!((number(&fit["parameters"]["sigma_m"]) - 0.1).abs() < 0.01, "{}", fit["parameters"]);
 }

@@ -63,8 +63,17 @@ pub enum Verb {
         sastrugi fit snow.tif --outer-scale 2 --model auto --bootstrap 199 -o fit.json\n  \
         sastrugi fit snow.tif --outer-scale 2 --mask plot.geojson --exclude trees.geojson -o fit.json\n  \
         sastrugi fit scan.laz --cell 0.05 --statistic median --outer-scale 2 -o fit.json\n  \
-        sastrugi fit snow_on.tif --minus snow_off.tif --outer-scale 2 -o depth.json")]
+        sastrugi fit snow_on.tif --minus snow_off.tif --outer-scale 2 --difference depth.tif -o depth.json")]
     Fit(Fit),
+    /// Co-register DEM B to DEM A: shift, raise, tilt and their standard errors, NMAD before and after, and the difference.
+    #[command(
+        after_help = "The method is that of Nuth and Kääb (2011), with raise and tilt in the same equations. With --mask or --exclude\n\
+        B is fitted to stable terrain, and the difference covers all of A. Exit code 0 also when co-registration gains\n\
+        nothing or does not converge: the verdict says it.\n\n\
+        Examples:\n  sastrugi coregister flight_1.tif flight_2.tif\n  \
+        sastrugi coregister snow_on.tif snow_off.tif --mask road.geojson -o depth.tif"
+    )]
+    Coregister(Coregister),
     /// Synthesise a texture that matches a fit.
     #[command(
         after_help = "Examples:\n  sastrugi texture fit.json --size 20x20 --cell 0.1 --seed 1 -o texture.tif\n  \
@@ -151,6 +160,7 @@ impl Verb {
         match self {
             Self::Terrain(args) => Some(&args.output),
             Self::Fit(args) => Some(&args.output),
+            Self::Coregister(args) => args.output.as_deref(),
             Self::Texture(args) => Some(&args.output),
             Self::Convert(args) => Some(&args.output),
             Self::Hillshade(args) => Some(&args.output),
@@ -334,15 +344,43 @@ pub struct Fit {
     /// How the DEM is read.
     #[command(flatten)]
     pub reading: Reading,
-    /// DEM that is laid onto the first (shift, raise, tilt) and subtracted, as for snow depth.
+    /// DEM that is co-registered to the first (shift, raise, tilt) and subtracted, as for snow depth. The co-registration is
+    /// printed also when the difference cannot be fitted.
     #[arg(long, value_name = "DEM")]
     pub minus: Option<PathBuf>,
+    /// Write the difference, before it is fitted.
+    #[arg(long, value_name = "DEM", requires = "minus")]
+    pub difference: Option<PathBuf>,
     /// Covariance at every lag as a GeoTIFF, whose coordinates are the lag in m.
     #[arg(long, value_name = "MAP.tif")]
     pub map: Option<PathBuf>,
     /// Any other parameter of the fit (see `kinds fit`), `name=value`.
     #[arg(long = "set", value_name = "K=V")]
     pub set: Vec<String>,
+}
+
+/// `coregister`.
+#[derive(Debug, Args)]
+pub struct Coregister {
+    /// DEM that stays.
+    pub a: PathBuf,
+    /// DEM that is moved; metric and in A's coordinate system, its cells and extent may differ.
+    pub b: PathBuf,
+    /// DEM to write with A less B as moved; the ending gives the format.
+    #[arg(short, long, value_name = "DIFFERENCE.tif")]
+    pub output: Option<PathBuf>,
+    /// Part of A, x0,y0,x1,y1 in its own coordinates.
+    #[arg(long, value_name = "X0,Y0,X1,Y1", allow_hyphen_values = true)]
+    pub window: Option<String>,
+    /// Stable terrain: B is fitted to these cells of A; the difference covers all.
+    #[command(flatten)]
+    pub masks: Masks,
+    /// How the DEMs are read.
+    #[command(flatten)]
+    pub reading: Reading,
+    /// How the difference is written.
+    #[command(flatten)]
+    pub writing: Writing,
 }
 
 /// `texture`.

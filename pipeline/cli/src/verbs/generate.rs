@@ -1,10 +1,13 @@
 //! Verbs that make or describe one file.
 
+use super::coregister::describe;
 use super::{options, reading};
 use crate::Verdict;
 use crate::args::{Common, Detrend, Fit, Obstacles, Roughness, Terrain, Texture};
 use crate::failure::{Code, Failure};
 use crate::output::{columns, print};
+use sastrugi_schemas::fit::Source;
+use sastrugi_stages::Error;
 use sastrugi_stages::verbs::roughness::{
     AerodynamicRoughness, ArealFigures, Bumps, Detrender, ObstacleHeight, Ride, RideRequest, WindEstimate, WindSettings,
 };
@@ -112,9 +115,14 @@ pub fn fit(args: &Fit, common: &Common) -> Verdict {
         seed: args.seed,
         reading,
         minus: args.minus.as_deref(),
+        difference: args.difference.as_deref(),
         map: args.map.as_deref(),
     };
-    let (fit, read_notes) = verbs::fit::fit(&request)?;
+    let verbs::fit::Done { fit, source, notes: read_notes } = verbs::fit::fit(&request)?;
+    let fit = match fit {
+        Ok(fit) => fit,
+        Err(error) => return no_fit(&source, error, common),
+    };
     let interval = |name: &str| {
         let [low, high] = fit.intervals.as_ref()?.values.get(name)?;
         let end = |end: &Option<f64>| end.map_or_else(|| "open".to_owned(), |v| format!("{v:.6}"));
@@ -130,6 +138,16 @@ pub fn fit(args: &Fit, common: &Common) -> Verdict {
     fit.warnings.iter().for_each(|warning| text.push_str(&format!("\n  warning: {warning}")));
     print(common.json, &serde_json::to_value(&fit).map_err(Failure::failed)?, &text)?;
     Ok(Code::Done)
+}
+
+/// A co-registration stays where its difference could not be fitted: as JSON it stands where a fit file has it.
+fn no_fit(source: &Source, error: Error, common: &Common) -> Verdict {
+    if let Some(minus) = &source.minus {
+        let value = json!({ "error": error.to_string(), "source": source });
+        let text = format!("co-registration of {}, not fitted:\n{}", minus.file, describe(&minus.coregistration));
+        print(common.json, &value, &text)?;
+    }
+    Err(error.into())
 }
 
 /// Figures above the least-squares plane, as lines.

@@ -2,6 +2,7 @@
 
 mod analyze;
 mod compare;
+mod coregister;
 mod files;
 mod generate;
 mod lists;
@@ -30,6 +31,7 @@ pub fn dispatch(arguments: &Arguments) -> Verdict {
         Verb::Traverse(args) => study::traverse(args, common),
         Verb::Terrain(args) => generate::terrain(args, common),
         Verb::Fit(args) => generate::fit(args, common),
+        Verb::Coregister(args) => coregister::coregister(args, common),
         Verb::Texture(args) => generate::texture(args, common),
         Verb::Roughness(args) => generate::roughness(args, common),
         Verb::Analyze(args) => analyze::analyze(args, common),

@@ -3,7 +3,7 @@
 use super::dem::{HEIGHTS, PLACE, Place, input_error};
 use super::mask::{self, Mask};
 use super::surface::{Surface, describe_residual};
-use super::{Estimate, ItemRef, Job, JobError, Outcome, Product, Rows, Work};
+use super::{Estimate, ItemRef, Job, JobError, Outcome, Product, Rows, Work, coregistration};
 use crate::registry::{BuildError, Builder, unknown_id};
 use crate::revision::Room;
 use crate::runner::graph::Node;
@@ -17,9 +17,9 @@ use sastrugi_schemas::tables::{CandidateCurveRow, CandidateRow, CovarianceRow, F
 use sastrugi_schemas::{Kind, ParameterError};
 use sastrugi_store::dem::{Crs, Dem};
 use sastrugi_store::{atomic, dem, digest};
-use sastrugi_texture::coregister::coregister;
+use sastrugi_texture::coregister::Coregistered;
 use sastrugi_texture::noise::Noise;
-use sastrugi_texture::{FitParameters, FitSettings, shown};
+use sastrugi_texture::{FitError, FitParameters, FitSettings, shown};
 use serde_json::{Value, json};
 
 /// Name of the stage.
@@ -51,7 +51,7 @@ struct FitJob {
     cell_m: Option<f64>,
 }
 
-/// A DEM that is laid onto the fitted one and subtracted.
+/// A DEM that is co-registered to the fitted one and subtracted.
 #[derive(Clone)]
 struct Subtrahend {
     id: String,
@@ -73,52 +73,18 @@ impl Subtrahend {
         for (item, heights) in [(item, &dem.grid), (&self.dem, &other.grid)] {
             let place = Place::read(&work.parent(item, PLACE)?, &heights.geometry)?;
             if place.was_converted(&heights.geometry) {
-                return Err(JobError::input(format!("{}: {IN_DEGREES}", item.id)));
+                return Err(JobError::input(format!("{}: {}", item.id, coregistration::IN_DEGREES)));
             }
         }
-        subtract(dem, &other, &self.source.file, &self.source.sha256)
+        let Coregistered { difference, coregistration } = coregistration::coregistered(dem, &other)?;
+        let Source { file, sha256, .. } = self.source.clone();
+        Ok((difference, Minus { file, sha256, coregistration }))
     }
 }
 
-/// Degrees become metres from each DEM's own corner, and their places are lost.
-pub const IN_DEGREES: &str = "is in degrees; DEMs are subtracted in metres: reproject both (gdalwarp -t_srs EPSG:...)";
-
-/// One DEM less another, laid onto it, and the record of that.
-///
-/// # Errors
-/// DEMs in different coordinate systems, or that cannot be laid onto each other.
-pub fn subtract(dem: &Dem, other: &Dem, file: &str, sha256: &str) -> Result<(Grid, Minus), JobError> {
-    let (one, two) = (dem.info.crs.epsg, other.info.crs.epsg);
-    if let (Some(one), Some(two)) = (one, two)
-        && one != two
-    {
-        return Err(JobError::input(format!(
-            "the DEMs are in EPSG:{one} and EPSG:{two}; bring the second to the first: gdalwarp -t_srs EPSG:{one} -r bilinear"
-        )));
-    }
-    let laid = coregister(&dem.grid, &other.grid).map_err(JobError::input)?;
-    let minus = Minus { file: file.to_owned(), sha256: sha256.to_owned(), coregistration: laid.coregistration };
-    Ok((laid.difference, minus))
-}
-
-/// What was subtracted, for people.
-pub fn minus_note(minus: &Minus) -> String {
-    let c = &minus.coregistration;
-    let [east, north] = c.shift_m.unwrap_or_default();
-    let slow = if c.converged { "" } else { ", and did not come to rest" };
-    format!(
-        "{} was moved {east:.3} m east and {north:.3} m north, raised {:.3} m and subtracted on {} cells: NMAD {:.4} m before, {:.4} m \
-         after; {} rounds{slow}",
-        minus.file, c.raise_m, c.cells, c.nmad_before_m, c.nmad_after_m, c.iterations
-    )
-}
-
-/// The fit of a DEM with its source, which is warned of where DEMs were laid onto each other badly.
+/// The fit of a DEM with its source, and a warning where co-registration failed.
 pub fn with_source(fit: FitFile, source: Source) -> FitFile {
-    let restless = source.minus.as_ref().is_some_and(|m| !m.coregistration.converged);
-    let warning = restless.then(|| {
-        "the DEMs did not come to rest when they were laid onto each other: their difference holds the relief of both".to_owned()
-    });
+    let warning = source.minus.as_ref().and_then(|m| coregistration::warning(&m.coregistration));
     let warnings = warning.into_iter().chain(fit.warnings).collect();
     FitFile { source: Some(source), warnings, ..fit }
 }
@@ -224,10 +190,15 @@ impl Job for FitJob {
         if let Some(subtrahend) = &self.minus {
             let (difference, minus) = subtrahend.subtract(&self.dem, &read, work)?;
             read.grid = difference;
-            notes.push(minus_note(&minus));
+            notes.push(coregistration::sentence(&minus));
             source.minus = Some(minus);
         }
-        let outcome = sastrugi_texture::fit(&read.grid, &settings, &self.streams).map_err(JobError::new)?;
+        // A co-registration is a result whatever the fit says.
+        let failed = |e: FitError| match &source.minus {
+            Some(minus) => JobError::new(format!("{e}; {}", coregistration::sentence(minus))),
+            None => JobError::new(e),
+        };
+        let outcome = sastrugi_texture::fit(&read.grid, &settings, &self.streams).map_err(failed)?;
         let [background, residual] = outcome.rasters(&read.grid).map_err(JobError::new)?;
         let mask = shown::uses(&read.grid, &residual, &outcome);
         let band = shown::covariance_band(&residual, &outcome);
@@ -263,7 +234,7 @@ pub fn noise_reference(file: &str, sha256: &str, noise: &Noise) -> NoiseReferenc
     NoiseReference { file: file.to_owned(), sha256: sha256.to_owned(), sigma_m: noise.sigma_m, differences }
 }
 
-/// A reference holds the noise of one DEM; that of a difference is not to be had from it.
+/// A noise reference cannot be combined with `minus`: it holds the noise of one DEM, not that of a difference.
 ///
 /// # Errors
 /// When both are given.

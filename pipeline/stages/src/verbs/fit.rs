@@ -1,18 +1,19 @@
 //! `fit`: covariance of a measured DEM to a fit file.
 
+use super::coregister::pair;
 use super::{Read, Reading, parameters, read, transects};
 use crate::error::Error;
+use crate::jobs::coregistration::{self, coregistered};
 use crate::jobs::dem::{input_error, metres_note};
-use crate::jobs::fit::{
-    IN_DEGREES, STAGE, check_noise_reference, minus_note, noise_reference, subtract, to_json, with_source,
-};
+use crate::jobs::fit::{STAGE, check_noise_reference, noise_reference, to_json, with_source};
 use sastrugi_numeric::resample::in_metres;
-use sastrugi_numeric::{Geometry, Streams};
+use sastrugi_numeric::{Geometry, Grid, Streams};
 use sastrugi_schemas::coregistration::Minus;
 use sastrugi_schemas::fit::{FitFile, MaskSource, Source};
 use sastrugi_schemas::kind::{read_parameters, schema_of};
-use sastrugi_store::dem::{self, BlockReader, Crs, Dem, Format, ReadOptions};
+use sastrugi_store::dem::{self, BlockReader, Crs, Format, ReadOptions};
 use sastrugi_store::{atomic, digest};
+use sastrugi_texture::coregister::Coregistered;
 use sastrugi_texture::noise::Noise;
 use sastrugi_texture::{FitError, FitOutcome, FitParameters, FitSettings, Heights, Profiles};
 use serde_json::Value;
@@ -32,24 +33,45 @@ pub struct Request<'a> {
     pub seed: u64,
     /// What of the DEM to take, and how.
     pub reading: Reading,
-    /// DEM that is laid onto the first and subtracted.
+    /// DEM that is co-registered to the first and subtracted.
     pub minus: Option<&'a Path>,
+    /// DEM to write with the difference, before the fit.
+    pub difference: Option<&'a Path>,
     /// GeoTIFF to write with the covariance at every lag.
     pub map: Option<&'a Path>,
 }
 
-/// Fits a DEM and writes the fit file. Returns it with sentences on how the DEM was read.
+/// What came of a DEM. A co-registration in the source stands whatever the fit says.
+pub struct Done {
+    /// The fit as it was written, or why there is none.
+    pub fit: Result<FitFile, Error>,
+    /// Where the DEM came from.
+    pub source: Source,
+    /// Sentences on how the DEM was read.
+    pub notes: Vec<String>,
+}
+
+/// Fits a DEM and writes the fit file.
 ///
 /// # Errors
-/// Unknown parameters, a DEM that cannot be read or fitted, a file that cannot be written.
-pub fn fit(request: &Request<'_>) -> Result<(FitFile, Vec<String>), Error> {
+/// Unknown parameters, a DEM that cannot be read or co-registered, a file that cannot be written.
+pub fn fit(request: &Request<'_>) -> Result<Done, Error> {
     parameters::check_schema(&request.parameters, &schema_of::<FitParameters>(), "fit")?;
     let raw: FitParameters = read_parameters(&request.parameters)?;
     let settings = FitSettings::try_from(raw)?;
     check_noise_reference(request.reading.noise_reference.is_some(), request.minus.is_some())?;
-    check_map(request)?;
+    check_outputs(request)?;
     let Fitted { outcome, notes, masked_share, noise, minus } = fitted(request, &settings)?;
     let source = Source { masked_share, minus, ..source_of(request, noise.as_ref())? };
+    let fit = match outcome {
+        Ok(outcome) => Ok(written(request, outcome, source.clone())?),
+        Err(error) => Err(error),
+    };
+    Ok(Done { fit, source, notes })
+}
+
+/// Writes what was fitted.
+fn written(request: &Request<'_>, outcome: FitOutcome, source: Source) -> Result<FitFile, Error> {
     if let Some(path) = request.map {
         dem::write(path, &outcome.covariance_map(), &Crs::default(), &Default::default())
             .map_err(super::write_error)?;
@@ -57,25 +79,20 @@ pub fn fit(request: &Request<'_>) -> Result<(FitFile, Vec<String>), Error> {
     let fit = with_source(outcome.fit, source);
     atomic::write(request.output, to_json(&fit)?.as_bytes())
         .map_err(|e| Error::failed(format!("{}: {e}", request.output.display())))?;
-    Ok((fit, notes))
+    Ok(fit)
 }
 
-/// Refuses a map that no DEM format has, or that would replace a file of this fit.
-fn check_map(request: &Request<'_>) -> Result<(), Error> {
-    let Some(map) = request.map else { return Ok(()) };
-    super::check_output(map)?;
-    let files = [Some(request.dem), request.minus, Some(request.output)];
-    if files.contains(&Some(map)) {
-        return Err(Error::Usage(format!(
-            "{}: is a file of this fit as well; the map needs its own name",
-            map.display()
-        )));
-    }
-    Ok(())
+/// Refuses rasters that no DEM format has, and outputs that would replace another file of this fit.
+fn check_outputs(request: &Request<'_>) -> Result<(), Error> {
+    let rasters = [request.map, request.difference];
+    rasters.into_iter().flatten().try_for_each(super::check_output)?;
+    let outputs: Vec<&Path> = [request.output].into_iter().chain(rasters.into_iter().flatten()).collect();
+    let inputs: Vec<&Path> = [request.dem].into_iter().chain(request.minus).collect();
+    super::check_distinct(&outputs, &inputs)
 }
 
 struct Fitted {
-    outcome: FitOutcome,
+    outcome: Result<FitOutcome, Error>,
     notes: Vec<String>,
     masked_share: Option<f64>,
     noise: Option<Noise>,
@@ -86,32 +103,27 @@ struct Fitted {
 fn fitted(request: &Request<'_>, settings: &FitSettings) -> Result<Fitted, Error> {
     let streams = Streams::for_seed(request.seed, STAGE);
     let whole = |heights: &dyn Heights, settings: &FitSettings, notes: Vec<String>| {
-        let outcome = sastrugi_texture::fit(heights, settings, &streams).map_err(refused)?;
-        Ok(Fitted { outcome, notes, masked_share: None, noise: None, minus: None })
+        let outcome = sastrugi_texture::fit(heights, settings, &streams).map_err(refused);
+        Fitted { outcome, notes, masked_share: None, noise: None, minus: None }
     };
     if let Some(path) = request.minus {
-        let Read { mut dem, mut notes, masked_share, .. } = read(request.dem, &request.reading)?;
-        let minus = subtracted(&mut dem, request, path)?;
-        notes.push(minus_note(&minus));
-        return Ok(Fitted { masked_share, minus: Some(minus), ..whole(&dem.grid, settings, notes)? });
+        let (difference, Read { masked_share, notes, .. }, minus) = subtracted(request, path)?;
+        return Ok(Fitted { masked_share, minus: Some(minus), ..whole(&difference, settings, notes) });
     }
     if let Some(found) = transects(request.dem, &request.reading)? {
         let profiles = Profiles::new(found.spacing_m, &found.profiles).map_err(refused)?;
-        return whole(
-            &profiles,
-            settings,
-            vec![format!("{} transects, a height every {} m", found.names.len(), found.spacing_m)],
-        );
+        let note = format!("{} transects, a height every {} m", found.names.len(), found.spacing_m);
+        return Ok(whole(&profiles, settings, vec![note]));
     }
     if let Some((parts, notes)) = Parts::of_large(request.dem, &request.reading)? {
-        return whole(&parts, settings, notes);
+        return Ok(whole(&parts, settings, notes));
     }
     let Read { dem, notes, masked_share, noise } = read(request.dem, &request.reading)?;
     let settings = match &noise {
         Some(noise) => settings.with_noise(noise.sigma_m)?,
         None => settings.clone(),
     };
-    Ok(Fitted { masked_share, noise, ..whole(&dem.grid, &settings, notes)? })
+    Ok(Fitted { masked_share, noise, ..whole(&dem.grid, &settings, notes) })
 }
 
 /// Cells above which a GeoTIFF is read in parts: half a gigabyte of heights.
@@ -160,34 +172,35 @@ impl Heights for Parts {
 
 /// What the fit file says of the files it was made from.
 fn source_of(request: &Request<'_>, noise: Option<&Noise>) -> Result<Source, Error> {
-    let hashed = |path: &Path| {
-        let (_, sha256) = digest::of_file(path).map_err(|e| Error::Input(format!("{}: {e}", path.display())))?;
-        Ok::<_, Error>((path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned()), sha256))
-    };
     let mask = |(path, excludes): &(PathBuf, bool)| {
-        hashed(path).map(|(file, sha256)| MaskSource { file, sha256, excludes: *excludes })
+        named(path).map(|(file, sha256)| MaskSource { file, sha256, excludes: *excludes })
     };
-    let (file, sha256) = hashed(request.dem)?;
-    let reference = request.reading.noise_reference.as_deref().map(hashed).transpose()?;
+    let (file, sha256) = named(request.dem)?;
+    let reference = request.reading.noise_reference.as_deref().map(named).transpose()?;
     let noise_reference = reference.zip(noise).map(|((file, sha256), noise)| noise_reference(&file, &sha256, noise));
     let masks = request.reading.masks.iter().map(mask).collect::<Result<_, _>>()?;
     Ok(Source { file, sha256, window: request.reading.window, masks, noise_reference, ..Source::default() })
 }
 
-/// Replaces a DEM by its difference from another.
-fn subtracted(read: &mut Dem, request: &Request<'_>, path: &Path) -> Result<Minus, Error> {
-    let options = ReadOptions { cell_m: request.reading.cell_m };
-    let metric = |path: &Path| {
-        let dem = dem::read_with(path, &options).map_err(|e| Error::from(input_error(&e)))?;
-        if dem.info.crs.geographic { Err(Error::Input(format!("{}: {IN_DEGREES}", path.display()))) } else { Ok(dem) }
-    };
-    metric(request.dem)?;
-    let other = metric(path)?;
+/// A DEM less another, written where that is asked for, with how the first was read and a record of the second.
+fn subtracted(request: &Request<'_>, path: &Path) -> Result<(Grid, Read, Minus), Error> {
+    let (mut read, other) = pair(request.dem, path, &request.reading)?;
+    let Coregistered { difference, coregistration } = coregistered(&read.dem, &other.dem)?;
+    if let Some(path) = request.difference {
+        let lost =
+            dem::write(path, &difference, &read.dem.info.crs, &Default::default()).map_err(super::write_error)?;
+        read.notes.extend(lost);
+    }
+    let (file, sha256) = named(path)?;
+    let minus = Minus { file, sha256, coregistration };
+    read.notes.push(coregistration::sentence(&minus));
+    Ok((difference, read, minus))
+}
+
+/// Name of a file without its folder, and its SHA-256.
+fn named(path: &Path) -> Result<(String, String), Error> {
     let (_, sha256) = digest::of_file(path).map_err(|e| Error::Input(format!("{}: {e}", path.display())))?;
-    let file = path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
-    let (difference, minus) = subtract(read, &other, &file, &sha256)?;
-    read.grid = difference;
-    Ok(minus)
+    Ok((path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned()), sha256))
 }
 
 /// A parameter out of range is the caller's; anything else lies in the DEM.

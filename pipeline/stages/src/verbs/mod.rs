@@ -2,6 +2,7 @@
 
 pub mod analyze;
 pub mod compare;
+pub mod coregister;
 pub mod fit;
 pub mod hillshade;
 pub mod parameters;
@@ -28,6 +29,21 @@ fn check_output(path: &Path) -> Result<(), Error> {
     }
     let message = format!("{}: the ending names no DEM format; {WRITTEN_ENDINGS} do", path.display());
     Err(Error::Usage(message))
+}
+
+/// Refuses outputs of one name, or of an input's, so that no file replaces another; links and `..` are followed.
+fn check_distinct(outputs: &[&Path], inputs: &[&Path]) -> Result<(), Error> {
+    let real = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    for (k, output) in outputs.iter().enumerate() {
+        let mut others = inputs.iter().chain(&outputs[..k]);
+        if others.any(|other| real(other) == real(output)) {
+            return Err(Error::Usage(format!(
+                "{}: is another file of this call as well; every output needs its own name",
+                output.display()
+            )));
+        }
+    }
+    Ok(())
 }
 
 /// A grid that does not fit the format is the caller's choice; anything else is this machine's.
