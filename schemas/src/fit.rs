@@ -39,6 +39,12 @@ pub struct FitFile {
     /// The same by block bootstrap, where the DEM has enough blocks.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub block_intervals: Option<Intervals>,
+    /// The measured covariance by lag, where `model` is `empirical`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub map: Option<CovarianceMap>,
+    /// What of the residual a texture from this fit has.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub carried: Option<Carried>,
     /// Every model tried, the best first.
     pub candidates: Vec<Candidate>,
     /// How the likelihood falls away from the fitted range.
@@ -59,6 +65,43 @@ pub struct FitFile {
     pub settings: Value,
     /// Where the DEM came from.
     pub source: Option<Source>,
+}
+
+/// Measured covariance by lag, of a fit whose `model` is `empirical`; its lags are in cells of `cell_m`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct CovarianceMap {
+    /// What it is of: `residual` (heights less their background over `window_m`, before trimming) or `surface`.
+    pub base: String,
+    /// Covariance model, with the file's `parameters`, that continues it at wavelengths which the background has taken away.
+    pub model: String,
+    /// Largest lag, cells north-south and east-west.
+    pub max_lag: [usize; 2],
+    /// Covariance in m2 at lags of 0 to `max_lag[0]` rows southwards (outer) and -`max_lag[1]` to `max_lag[1]` columns eastwards (inner).
+    pub covariance_m2: Vec<f64>,
+}
+
+/// What of the measured residual a texture has that is detrended and trimmed as the DEM was, on average.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Carried {
+    /// Its root mean square over the residual's, both trimmed.
+    pub rms_share: f64,
+    /// The square of that.
+    pub variance_share: f64,
+    /// The same as `rms_share` before trimming: tails included.
+    pub untrimmed_rms_share: f64,
+    /// Mean square of increments over those of the residual, by octave of lag.
+    pub increments: Vec<CarriedOctave>,
+}
+
+/// An octave of lags.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CarriedOctave {
+    /// Shortest lag, m.
+    pub from_m: f64,
+    /// Longest lag, m.
+    pub to_m: f64,
+    /// Mean square increment of the texture over that of the residual.
+    pub share: f64,
 }
 
 /// Trimming of residuals.

@@ -317,7 +317,7 @@ pub struct Fit {
     /// Share of residuals trimmed as outliers.
     #[arg(long, value_name = "SHARE", allow_negative_numbers = true)]
     pub trim: Option<f64>,
-    /// Covariance model, or several with commas, or `auto`: the best by AICc is taken.
+    /// Covariance model, or several with commas, or `auto`: the best by AICc is taken. `empirical`: the measured covariance.
     #[arg(long, value_name = "MODEL,...")]
     pub model: Option<String>,
     /// Replicates of the bootstrap that gives intervals; 0 for none.
@@ -354,6 +354,9 @@ pub struct Fit {
     /// Covariance at every lag as a GeoTIFF, whose coordinates are the lag in m.
     #[arg(long, value_name = "MAP.tif")]
     pub map: Option<PathBuf>,
+    /// Background that the fit takes off, as a DEM: `texture --onto` it adds what it lacks.
+    #[arg(long, value_name = "DEM")]
+    pub background: Option<PathBuf>,
     /// Any other parameter of the fit (see `kinds fit`), `name=value`.
     #[arg(long = "set", value_name = "K=V")]
     pub set: Vec<String>,
@@ -409,12 +412,16 @@ pub struct Texture {
     /// Base DEM to add the texture to.
     #[arg(long, value_name = "DEM")]
     pub onto: Option<PathBuf>,
+    /// Covariance of the `surface`, or `residual`: what a background over the fit's window lacks of it. Default: `residual` with
+    /// `--onto` (a measured background), else `surface`.
+    #[arg(long, value_name = "surface|residual")]
+    pub covariance: Option<String>,
     /// Raster of factors, 0 or above, by which the texture is multiplied on its base.
     #[arg(long, value_name = "RASTER")]
     pub amplitude: Option<PathBuf>,
     /// Fill the holes of this DEM with texture that fits what is around them; makes no other texture. `--cell` is for a DEM that
     /// states none.
-    #[arg(long, value_name = "DEM", conflicts_with_all = ["onto", "size", "tile", "phase", "method", "set"])]
+    #[arg(long, value_name = "DEM", conflicts_with_all = ["onto", "size", "tile", "phase", "method", "covariance", "set"])]
     pub fill: Option<PathBuf>,
     /// Any other parameter of the method (see `kinds`), `name=value`.
     #[arg(long = "set", value_name = "K=V")]

@@ -38,6 +38,10 @@ pub fn kinds() -> Vec<Kind> {
 /// An unknown method (the known ones are listed); parameters or a fit that the method refuses.
 pub fn prepare(method: &str, parameters: &Value, fit: &FitFile) -> Result<Box<dyn Synthesis>, ParameterError> {
     match METHODS.into_iter().find(|(kind, _)| kind().kind == method) {
+        Some((kind, _)) if fit.map.is_some() && kind().kind != fft_ma::kind().kind => {
+            let message = format!("is `{method}`; an empirical covariance is made by `fft_ma` only");
+            Err(ParameterError::new("method", message))
+        }
         Some((_, prepare)) => prepare(parameters, Wanted::of_fit(fit)?),
         None => {
             let known = METHODS.map(|(kind, _)| kind().kind).join(", ");

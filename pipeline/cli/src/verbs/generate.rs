@@ -35,6 +35,9 @@ pub fn texture(args: &Texture, common: &Common) -> Verdict {
     if let Some(phase) = &args.phase {
         params["phase"] = json!(phase);
     }
+    if let Some(covariance) = &args.covariance {
+        params["covariance"] = json!(covariance);
+    }
     if let Some(tile) = &args.tile {
         params["tile"] = json!(numbers::<2>("--tile", tile)?.map(whole));
     }
@@ -117,6 +120,7 @@ pub fn fit(args: &Fit, common: &Common) -> Verdict {
         minus: args.minus.as_deref(),
         difference: args.difference.as_deref(),
         map: args.map.as_deref(),
+        background: args.background.as_deref(),
     };
     let verbs::fit::Done { fit, source, notes: read_notes } = verbs::fit::fit(&request)?;
     let fit = match fit {

@@ -1,13 +1,13 @@
 //! Stage `texture`: a field that matches a fit, alone or on a base heightfield.
 
-use super::dem::{HEIGHTS, input_error};
+use super::dem::{self as dem_job, HEIGHTS, input_error};
 use super::scoreboard::{self, Entrant, ScoreboardJob};
 use super::surface::{Surface, describe_residual};
 use super::{Estimate, ItemRef, Job, JobError, Outcome, Product, Rows, Work, fit, raster_options, raster_packing};
 use crate::registry::{BuildError, Builder, Heightfield, unknown_id};
 use crate::revision::Room;
 use crate::runner::graph::Node;
-use crate::study::{Entry, StudyError};
+use crate::study::{Entry, Expanded, StudyError};
 use sastrugi_numeric::{Grid, Streams};
 use sastrugi_schemas::Kind;
 use sastrugi_schemas::fit::FitFile;
@@ -76,7 +76,9 @@ impl Matched {
         match self {
             Self::Stated(fit) => FitFile::clone(fit),
             Self::Item(_) => {
-                FitFile { model: "exponential".to_owned(), parameters, height_quantiles_m, ..FitFile::default() }
+                let window_m = Some([1.0; 2]);
+                let model = "exponential".to_owned();
+                FitFile { model, parameters, height_quantiles_m, window_m, ..FitFile::default() }
             }
         }
     }
@@ -125,6 +127,7 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
         let mut ids = Vec::new();
         for one in entry.expand(&item.id, item.count, &item.sweep, &params)? {
             let side_by_side = item.methods.is_some();
+            let one = on_background(one, &base, &matched, &item);
             let streams = builder.streams(STAGE, &one.id, item.seed, one.replicate);
             let mut entrants = Vec::new();
             let mut refusal = None;
@@ -204,6 +207,16 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
         builder.name_family(&entry, &item.id, ids)?;
     }
     Ok(())
+}
+
+/// On a measured DEM a texture has what its background lacks, unless the item says otherwise.
+fn on_background(mut one: Expanded, base: &Option<(ItemRef, u64)>, matched: &Matched, item: &TextureItem) -> Expanded {
+    let measured = base.as_ref().is_some_and(|(base, _)| base.stage == dem_job::STAGE);
+    let fitted = matches!(matched, Matched::Item(_)) && item.methods.is_none() && item.method == fft_ma::kind().kind;
+    if measured && fitted && one.params["covariance"].is_null() {
+        one.params["covariance"] = json!(fft_ma::CovarianceOf::Residual);
+    }
+    one
 }
 
 /// Refuses keys that do not go together.

@@ -5,7 +5,7 @@ pub mod keys;
 pub mod terms;
 pub mod text;
 
-pub use entry::Entry;
+pub use entry::{Entry, Expanded};
 pub use text::{StudyError, StudyText};
 
 use sastrugi_schemas::ParameterError;

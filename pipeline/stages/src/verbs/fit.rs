@@ -39,6 +39,8 @@ pub struct Request<'a> {
     pub difference: Option<&'a Path>,
     /// GeoTIFF to write with the covariance at every lag.
     pub map: Option<&'a Path>,
+    /// DEM to write with the background that the fit took off.
+    pub background: Option<&'a Path>,
 }
 
 /// What came of a DEM. A co-registration in the source stands whatever the fit says.
@@ -84,11 +86,24 @@ fn written(request: &Request<'_>, outcome: FitOutcome, source: Source) -> Result
 
 /// Refuses rasters that no DEM format has, and outputs that would replace another file of this fit.
 fn check_outputs(request: &Request<'_>) -> Result<(), Error> {
-    let rasters = [request.map, request.difference];
+    let rasters = [request.map, request.difference, request.background];
     rasters.into_iter().flatten().try_for_each(super::check_output)?;
     let outputs: Vec<&Path> = [request.output].into_iter().chain(rasters.into_iter().flatten()).collect();
     let inputs: Vec<&Path> = [request.dem].into_iter().chain(request.minus).collect();
     super::check_distinct(&outputs, &inputs)
+}
+
+/// Writes the background that a fit took off, where it is asked for.
+fn write_background(
+    request: &Request<'_>,
+    outcome: &FitOutcome,
+    heights: &dyn Heights,
+    crs: &Crs,
+) -> Result<(), Error> {
+    let Some(path) = request.background else { return Ok(()) };
+    let [background, _] = outcome.rasters(heights).map_err(refused)?;
+    dem::write(path, &background, crs, &Default::default()).map_err(super::write_error)?;
+    Ok(())
 }
 
 struct Fitted {
@@ -102,28 +117,33 @@ struct Fitted {
 /// The fit of transects, of a raster that is read in parts, or of a DEM in memory.
 fn fitted(request: &Request<'_>, settings: &FitSettings) -> Result<Fitted, Error> {
     let streams = Streams::for_seed(request.seed, STAGE);
-    let whole = |heights: &dyn Heights, settings: &FitSettings, notes: Vec<String>| {
+    let whole = |heights: &dyn Heights, settings: &FitSettings, crs: &Crs, notes: Vec<String>| {
         let outcome = sastrugi_texture::fit(heights, settings, &streams).map_err(refused);
+        let outcome = outcome.and_then(|outcome| write_background(request, &outcome, heights, crs).map(|()| outcome));
         Fitted { outcome, notes, masked_share: None, noise: None, minus: None }
     };
     if let Some(path) = request.minus {
-        let (difference, Read { masked_share, notes, .. }, minus) = subtracted(request, path)?;
-        return Ok(Fitted { masked_share, minus: Some(minus), ..whole(&difference, settings, notes) });
+        let (difference, Read { masked_share, notes, dem, .. }, minus) = subtracted(request, path)?;
+        return Ok(Fitted { masked_share, minus: Some(minus), ..whole(&difference, settings, &dem.info.crs, notes) });
     }
     if let Some(found) = transects(request.dem, &request.reading)? {
         let profiles = Profiles::new(found.spacing_m, &found.profiles).map_err(refused)?;
+        if let Some(path) = request.background {
+            let message = format!("{}: transects have no background raster; leave `--background` out", path.display());
+            return Err(Error::Usage(message));
+        }
         let note = format!("{} transects, a height every {} m", found.names.len(), found.spacing_m);
-        return Ok(whole(&profiles, settings, vec![note]));
+        return Ok(whole(&profiles, settings, &Crs::default(), vec![note]));
     }
     if let Some((parts, notes)) = Parts::of_large(request.dem, &request.reading)? {
-        return Ok(whole(&parts, settings, notes));
+        return Ok(whole(&parts, settings, &parts.crs()?, notes));
     }
     let Read { dem, notes, masked_share, noise } = read(request.dem, &request.reading)?;
     let settings = match &noise {
         Some(noise) => settings.with_noise(noise.sigma_m)?,
         None => settings.clone(),
     };
-    Ok(Fitted { masked_share, noise, ..whole(&dem.grid, &settings, notes) })
+    Ok(Fitted { masked_share, noise, ..whole(&dem.grid, &settings, &dem.info.crs, notes) })
 }
 
 /// Cells above which a GeoTIFF is read in parts: half a gigabyte of heights.
@@ -155,6 +175,13 @@ impl Parts {
         }
         notes.push(format!("{} x {} cells, read in parts", own.rows, own.cols));
         Ok(Some((Self { reader: Mutex::new(reader), geometry }, notes)))
+    }
+}
+
+impl Parts {
+    fn crs(&self) -> Result<Crs, Error> {
+        let reader = self.reader.lock().map_err(|_| Error::failed("reading of the raster was given up"))?;
+        Ok(reader.info().crs.clone())
     }
 }
 

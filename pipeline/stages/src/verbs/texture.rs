@@ -9,7 +9,7 @@ use sastrugi_schemas::fit::FitFile;
 use sastrugi_store::dem::{self, Crs, WriteOptions};
 use sastrugi_store::points::GridSettings;
 use sastrugi_texture::covariance::Covariance;
-use sastrugi_texture::synth::conditional;
+use sastrugi_texture::synth::{conditional, fft_ma};
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -51,7 +51,12 @@ pub fn texture(request: &Request<'_>) -> Result<Value, Error> {
     if request.amplitude.is_some() && request.onto.is_none() {
         return Err(Error::Usage("`--amplitude` needs `--onto`, the base whose texture it changes".to_owned()));
     }
-    let synthesis = sastrugi_texture::prepare(request.method, &request.parameters, &fit)?;
+    let mut parameters = request.parameters.clone();
+    let on_background = request.onto.is_some() && fit.window_m.is_some() && request.method == fft_ma::kind().kind;
+    if on_background && parameters["covariance"].is_null() {
+        parameters["covariance"] = json!(fft_ma::CovarianceOf::Residual);
+    }
+    let synthesis = sastrugi_texture::prepare(request.method, &parameters, &fit)?;
     super::check_output(request.output)?;
     let streams = Streams::for_seed(request.seed, STAGE);
     let mut notes = synthesis.notes();

@@ -1,6 +1,8 @@
 //! Covariance: models (one file each), the estimate from a masked raster, and what detrending and trimming do to it.
 
 pub mod bins;
+pub(crate) mod density;
+pub(crate) mod empirical;
 pub mod filtered;
 pub mod form;
 pub mod masked;
@@ -57,12 +59,13 @@ impl Covariance {
         Ok(Self { structures, nugget_m2: 0.0, ratio: 1.0, azimuth_deg: 0.0 })
     }
 
-    /// The covariance a fit file states: its `model` with that model's parameters.
+    /// The covariance a fit file states: its `model` with that model's parameters; of an empirical fit, the model that continues it.
     ///
     /// # Errors
     /// An unknown model; a parameter that is missing, unknown or out of range.
     pub fn of_fit(fit: &FitFile) -> Result<Self, ParameterError> {
-        let covariance = Form::parse(&fit.model)?.covariance(&fit.parameters).map_err(|e| e.within("parameters"))?;
+        let model = fit.map.as_ref().map_or(&fit.model, |map| &map.model);
+        let covariance = Form::parse(model)?.covariance(&fit.parameters).map_err(|e| e.within("parameters"))?;
         let variance_m2 = covariance.variance_m2();
         if !(variance_m2.is_normal() && covariance.nugget_m2.is_finite()) {
             return Err(ParameterError::new(

@@ -5,6 +5,7 @@ use super::search::Coordinates;
 use super::survey::Survey;
 use super::{FitError, FitSettings};
 use crate::covariance::bins::Layout;
+use crate::covariance::empirical::REACH_WINDOWS;
 use crate::covariance::{Form, LagBins};
 use crate::detrend::BoxWindow;
 use sastrugi_numeric::Geometry;
@@ -46,7 +47,16 @@ impl<'a> Case<'a> {
         }
         let cells = |axis: usize| (max_lag_m / geometry.cell[axis] * (1.0 + 1e-9)) as usize;
         let max_lag = [if profiles { 0 } else { cells(1) }, cells(0)];
-        let survey = Survey::new(heights, settings, window, max_lag)?;
+        if settings.empirical && profiles {
+            let message = "is `empirical`, which needs covariances in two directions; a transect knows one";
+            return Err(ParameterError::new("model", message).into());
+        }
+        // Half of the DEM, which is at least three windows wide, as all lags.
+        let measured = |axis: usize| match settings.empirical {
+            true => max_lag[axis].max((REACH_WINDOWS * window.cells()[axis] as f64) as usize),
+            false => max_lag[axis],
+        };
+        let survey = Survey::new(heights, settings, window, [measured(0), measured(1)])?;
         let bins = LagBins::of(&survey.covariance, geometry.cell, max_lag_m, Layout::ISOTROPIC);
         if bins.len() < BINS_MIN {
             return Err(FitError::TooFewLags { found: bins.len(), needed: BINS_MIN });

@@ -55,6 +55,12 @@ impl Expectation<'_> {
         mean
     }
 
+    /// Variance of the residual before trimming, m2.
+    pub fn variance_m2(&self, model: &Covariance) -> f64 {
+        let measured = self.filter.measured_covariance(model);
+        self.filter.residual_covariance(&measured).at([0, 0]) + self.correction(model, &measured)[0]
+    }
+
     /// What partial windows add in each bin, m2.
     fn correction(&self, model: &Covariance, measured: &LagField) -> Vec<f64> {
         let Measurement { inner_scale_m, noise_sigma_m } = self.filter.measurement();

@@ -20,6 +20,7 @@
 //! strips of `survey.rs`, which grow with the raster's width only, two bits per cell, and 300 bytes per cell of up to a
 //! million for each replicate at work. Heights are read in parts, a few times ([`Heights`]).
 
+mod carried;
 pub(crate) mod case;
 mod error;
 pub(crate) mod estimator;
@@ -161,10 +162,12 @@ fn corrected(case: &Case, naive: &Estimate, streams: &Streams) -> Result<FitFile
         isotropy: rough.as_ref().and_then(|rough| verdicts::isotropy(rough, estimate)),
         stationarity: verdicts::stationarity(&estimator, estimate, &blocks),
         misfit_p: verdicts::misfit_p(estimate, replicates.as_ref()),
+        carried: Some(carried::by_model(on_rings, estimate)),
         normality_p: replicates.as_ref().and_then(|r| verdicts::normality_p(case, r)),
         directions: rough.map_or_else(Vec::new, |rough| report::directions(&rough, estimate)),
     };
-    Ok(report::fit_file(case, naive, estimate, on_rings.mean(&estimate.covariance), &findings))
+    let file = report::fit_file(case, naive, estimate, on_rings.mean(&estimate.covariance), &findings);
+    Ok(if settings.empirical { carried::with_map(file, case, estimate) } else { file })
 }
 
 /// A texture whose leading range lies below the cell cannot be told from noise.

@@ -3,6 +3,7 @@
 use crate::covariance::Form;
 use crate::covariance::filtered::Measurement;
 use crate::detrend::{AtPartial, BoxWindow};
+use crate::synth::EMPIRICAL;
 use sastrugi_numeric::Geometry;
 use sastrugi_schemas::ParameterError;
 use schemars::JsonSchema;
@@ -44,8 +45,8 @@ pub struct FitParameters {
     /// Significance level at which residuals are trimmed on both sides, in (0, 0.5). Default 0.05 (Vecherin et al.
     /// 2022, section 2).
     pub trim: f64,
-    /// Covariance model, or several with commas, or `auto` for the usual ones: the best by AICc is taken, all are listed. A
-    /// model is `exponential`, `gaussian`, `spherical`, `matern` or `self_affine`, a sum of two (`exponential+gaussian`),
+    /// Covariance model, or several with commas, or `auto` for the usual ones: the best by AICc is taken, all are listed.
+    /// `empirical` beside them stores the measured covariance by lag for textures; the best of the others continues it. A model is `exponential`, `gaussian`, `spherical`, `matern` or `self_affine`, a sum of two (`exponential+gaussian`),
     /// with `+nugget` after it or `anisotropic:` before it where wanted. Default `exponential` (Vecherin et al. 2022,
     /// Eq. 9).
     pub model: String,
@@ -68,6 +69,8 @@ pub struct FitParameters {
 /// What `auto` tries.
 const AUTO: [&str; 7] =
     ["exponential", "gaussian", "spherical", "matern", "self_affine", "exponential+nugget", "exponential+gaussian"];
+/// Model of the paper.
+const MODEL: &str = "exponential";
 /// Fewest replicates of which 2.5 % is one.
 const BOOTSTRAP_MIN: u32 = 39;
 /// Most replicates.
@@ -87,7 +90,7 @@ impl Default for FitParameters {
             mode: Mode::Corrected,
             outer_scale_m: OUTER_SCALE_M,
             trim: TRIM,
-            model: "exponential".to_owned(),
+            model: MODEL.to_owned(),
             max_lag_m: None,
             min_valid_share: None,
             find_outliers: true,
@@ -103,6 +106,8 @@ impl Default for FitParameters {
 pub struct FitSettings {
     parameters: FitParameters,
     pub(super) forms: Vec<Form>,
+    /// Whether the measured covariance is stored.
+    pub(super) empirical: bool,
     pub(super) min_valid_share: f64,
 }
 
@@ -134,8 +139,8 @@ impl TryFrom<FitParameters> for FitSettings {
             );
             return Err(ParameterError::new("bootstrap", message));
         }
-        let forms = forms(&parameters.model)?;
-        if parameters.mode == Mode::Paper && (forms.len() > 1 || forms[0].is_anisotropic()) {
+        let (forms, empirical) = forms(&parameters.model)?;
+        if parameters.mode == Mode::Paper && (empirical || forms.len() > 1 || forms[0].is_anisotropic()) {
             let message = format!("is `{}`; the published procedure fits one isotropic model", parameters.model);
             return Err(ParameterError::new("model", message));
         }
@@ -147,16 +152,21 @@ impl TryFrom<FitParameters> for FitSettings {
             let message = "is `paper`, which knows neither an inner scale nor noise; leave them out or fit `corrected`";
             return Err(ParameterError::new("mode", message));
         }
-        Ok(Self { parameters, forms, min_valid_share: share })
+        Ok(Self { parameters, forms, empirical, min_valid_share: share })
     }
 }
 
-/// The forms that a `model` parameter names.
-fn forms(text: &str) -> Result<Vec<Form>, ParameterError> {
-    match text.trim() {
-        "auto" => AUTO.into_iter().map(Form::parse).collect(),
-        list => list.split(',').map(|name| Form::parse(name.trim())).collect(),
-    }
+/// The forms that a `model` parameter names, and whether it names the measured covariance. Alone that is continued by the
+/// default form.
+fn forms(text: &str) -> Result<(Vec<Form>, bool), ParameterError> {
+    let (empirical, named): (Vec<&str>, Vec<&str>) =
+        text.split(',').map(str::trim).partition(|name| *name == EMPIRICAL);
+    let names = match named[..] {
+        [] => vec![MODEL],
+        ["auto"] => AUTO.to_vec(),
+        _ => named,
+    };
+    Ok((names.into_iter().map(Form::parse).collect::<Result<_, _>>()?, !empirical.is_empty()))
 }
 
 impl FitSettings {
@@ -198,7 +208,7 @@ impl FitSettings {
     /// The same fit at another outer scale.
     pub(super) fn at_outer_scale(&self, outer_scale_m: f64) -> Self {
         let parameters = FitParameters { outer_scale_m, max_lag_m: None, ..self.parameters.clone() };
-        Self { parameters, ..self.clone() }
+        Self { parameters, empirical: false, ..self.clone() }
     }
 
     pub(super) fn find_outliers(&self) -> bool {

@@ -8,7 +8,7 @@ use super::resampling::{SILL_OVER_RANGE, sill_over_range};
 use super::verdicts::{Isotropy, ScaleExplicit, Stationarity, is_range_told};
 use crate::covariance::form::Role;
 use crate::covariance::{Covariance, Form, Structure};
-use sastrugi_schemas::fit::{Candidate, DirectionBin, FitFile, GsTools, Intervals, Profile, Trim};
+use sastrugi_schemas::fit::{Candidate, Carried, DirectionBin, FitFile, GsTools, Intervals, Profile, Trim};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_2;
@@ -42,6 +42,8 @@ pub struct Findings {
     pub stationarity: Option<Stationarity>,
     pub misfit_p: Option<f64>,
     pub normality_p: Option<f64>,
+    /// What of the residual a texture from the fit has.
+    pub carried: Option<Carried>,
     pub directions: Vec<DirectionBin>,
 }
 
@@ -67,6 +69,8 @@ pub fn fit_file(case: &Case, naive: &Estimate, estimate: &Estimate, binned: Vec<
         diagnostics: figures.diagnostics(case, naive, estimate, findings),
         intervals: findings.intervals.clone(),
         block_intervals: findings.block_intervals.clone(),
+        map: None,
+        carried: findings.carried.clone(),
         candidates: findings.candidates.clone(),
         profile: findings.profile.clone(),
         directions: findings.directions.clone(),

@@ -23,7 +23,7 @@ use crate::covariance::Covariance;
 use marginal::Marginal;
 use sastrugi_numeric::{Geometry, Grid, Streams};
 use sastrugi_schemas::ParameterError;
-use sastrugi_schemas::fit::FitFile;
+use sastrugi_schemas::fit::{CovarianceMap, FitFile};
 use schemars::JsonSchema;
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
@@ -132,6 +132,11 @@ pub trait Kernel: Send + Sync {
     /// The covariance on average, m2, at lags `[east, north]` up to half a periodic tile.
     fn achieved(&self) -> Box<dyn Fn([f64; 2]) -> f64 + '_>;
 
+    /// False where the covariance asked for is that of [`Self::achieved`], not a model of the surface.
+    fn aims_at_a_model(&self) -> bool {
+        true
+    }
+
     /// One tile.
     ///
     /// # Errors
@@ -154,6 +159,9 @@ fn tidy(length_m: f64) -> f64 {
     (length_m * 1e6).round() / 1e6
 }
 
+/// Model of fits that hold a measured covariance.
+pub const EMPIRICAL: &str = "empirical";
+
 /// What a texture should match.
 #[derive(Clone)]
 pub struct Wanted {
@@ -161,6 +169,12 @@ pub struct Wanted {
     pub covariance: Covariance,
     /// Measured heights at equally spaced probabilities from 0 to 1, m; empty when not known.
     pub quantiles_m: Vec<f64>,
+    /// Window of the background that the fit took off, east-west and north-south, m.
+    pub window_m: Option<[f64; 2]>,
+    /// Cells of the fit, east-west and north-south, m.
+    pub cell_m: Option<[f64; 2]>,
+    /// Measured covariance, in the place of the model's.
+    pub map: Option<Box<CovarianceMap>>,
 }
 
 impl Wanted {
@@ -169,13 +183,22 @@ impl Wanted {
     /// # Errors
     /// An unknown model; a parameter that is missing, unknown or out of range.
     pub fn of_fit(fit: &FitFile) -> Result<Self, ParameterError> {
-        Ok(Self { covariance: Covariance::of_fit(fit)?, quantiles_m: fit.height_quantiles_m.clone() })
+        if fit.model == EMPIRICAL && fit.map.is_none() {
+            return Err(ParameterError::new("map", "is missing from the fit file, whose model is `empirical`"));
+        }
+        Ok(Self {
+            quantiles_m: fit.height_quantiles_m.clone(),
+            window_m: fit.window_m,
+            cell_m: fit.cell_m,
+            map: fit.map.clone().map(Box::new),
+            ..Covariance::of_fit(fit)?.into()
+        })
     }
 }
 
 impl From<Covariance> for Wanted {
     fn from(covariance: Covariance) -> Self {
-        Self { covariance, quantiles_m: Vec::new() }
+        Self { covariance, quantiles_m: Vec::new(), window_m: None, cell_m: None, map: None }
     }
 }
 
@@ -219,8 +242,9 @@ impl<K: Kernel> Texture<K> {
         let tile = Tile::check(parameters, periodic)?;
         let mut notes = Vec::new();
         let wanted = tile.covariance(fitted.covariance, &mut notes);
-        let marginal = tile.marginal(&fitted.quantiles_m, wanted.at_distance(0.0))?;
         let kernel = kernel(&tile, &wanted)?;
+        let variance_m2 = if kernel.aims_at_a_model() { wanted.at_distance(0.0) } else { kernel.achieved()([0.0; 2]) };
+        let marginal = tile.marginal(&fitted.quantiles_m, variance_m2)?;
         notes.extend(kernel.notes());
         Ok(Self { tile, marginal, wanted, kernel, notes })
     }
@@ -309,8 +333,10 @@ impl<K: Kernel> Synthesis for Texture<K> {
         let achieved = self.kernel.achieved();
         let variance_m2 = achieved([0.0; 2]);
         let bent = |c: f64| self.marginal.as_ref().map_or(c, |m| m.covariance_m2(c / variance_m2));
+        let model = self.kernel.aims_at_a_model();
+        let wanted = |lag_m: [f64; 2]| if model { self.wanted.at(lag_m) } else { achieved(lag_m) };
         self.lags()
-            .map(|lag_m| LagCovariance { lag_m, wanted_m2: self.wanted.at(lag_m), achieved_m2: bent(achieved(lag_m)) })
+            .map(|lag_m| LagCovariance { lag_m, wanted_m2: wanted(lag_m), achieved_m2: bent(achieved(lag_m)) })
             .collect()
     }
 

@@ -165,6 +165,11 @@ impl Tile {
         }
     }
 
+    /// Whether an anisotropy other than the fit's is asked for.
+    pub fn turns(&self) -> bool {
+        self.parameters.ratio.is_some() || self.parameters.azimuth_deg.is_some()
+    }
+
     /// All tiles together.
     pub fn whole(&self) -> Geometry {
         let [down, across] = self.parameters.tile.map(|n| n as usize);

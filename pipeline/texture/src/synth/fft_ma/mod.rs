@@ -33,11 +33,14 @@
 //! half of one for the field, a square root and a phase per mode. Memory: 11 bytes per torus cell,
 //! 17 where the axes of anisotropy are not the grid's.
 
+mod aim;
 mod spectrum;
 
 use super::tile::{self, CELLS_MAX, Tile, TileParameters};
 use super::{Kernel, Made, Synthesis, SynthesisError, Texture, Wanted, reach};
 use crate::covariance::Covariance;
+use crate::covariance::empirical::Purpose;
+use aim::Aim;
 use rayon::prelude::*;
 use sastrugi_numeric::fft::{Complex64, HalfSpectrum, RealFft2, smooth_length};
 use sastrugi_numeric::{Geometry, Grid, Stream, Streams, sums, turns};
@@ -53,6 +56,9 @@ pub const CLIP_SHARE_MAX: f64 = 1e-6;
 const TILE_RANGES_NOTE: f64 = 4.0;
 /// Bytes per torus cell while a field is made.
 const BYTES_PER_CELL: u64 = 18;
+
+/// The same while the spectrum of a residual or of a measured covariance is made.
+const AIM_BYTES_PER_CELL: u64 = 40;
 
 /// Random part of the spectrum.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -76,6 +82,17 @@ pub enum SpectrumOf {
     Eq10,
 }
 
+/// What the covariance is of.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum CovarianceOf {
+    /// The surface: for flat or synthetic ground.
+    #[default]
+    Surface,
+    /// What the background over the fit's window lacks of it: for laying a texture on a measured background.
+    Residual,
+}
+
 /// Raw parameters of an FFT-MA texture, beside those of its tile.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
@@ -86,11 +103,14 @@ pub struct FftMaParameters {
     pub periodic: bool,
     /// `covariance` (default) or `eq10` (an isotropic exponential as published, which loses variance).
     pub spectrum: SpectrumOf,
+    /// `surface` (the fit's covariance) or `residual` (what a moving average over the fit's window leaves out of it, so that a
+    /// measured background and the texture together have that covariance). Default: `residual` on a measured DEM, else `surface`.
+    pub covariance: CovarianceOf,
 }
 
 impl Default for FftMaParameters {
     fn default() -> Self {
-        Self { phase: Phase::Unit, periodic: true, spectrum: SpectrumOf::Covariance }
+        Self { phase: Phase::Unit, periodic: true, spectrum: SpectrumOf::Covariance, covariance: CovarianceOf::Surface }
     }
 }
 
@@ -98,6 +118,8 @@ impl Default for FftMaParameters {
 pub struct FftMa {
     parameters: FftMaParameters,
     covariance: Covariance,
+    /// What is made in the place of the model of the surface.
+    aim: Option<Aim>,
     tile: Geometry,
     /// Rows and columns of the torus.
     torus: [usize; 2],
@@ -119,7 +141,13 @@ pub fn kind() -> Kind {
 /// # Errors
 /// Parameters out of range.
 pub fn prepare(parameters: &Value, wanted: Wanted) -> Result<Box<dyn Synthesis>, ParameterError> {
-    super::prepare(parameters, wanted, |own: &FftMaParameters| own.periodic, FftMa::new)
+    let fitted = wanted.clone();
+    super::prepare(
+        parameters,
+        wanted,
+        |own: &FftMaParameters| own.periodic,
+        |own, tile, covariance| FftMa::new(own, tile, covariance, &fitted),
+    )
 }
 
 /// The texture of a covariance.
@@ -131,41 +159,65 @@ pub fn texture(
     own: FftMaParameters,
     covariance: Covariance,
 ) -> Result<Texture<FftMa>, ParameterError> {
-    Texture::new(of_tile, own.periodic, covariance.into(), |tile, wanted| FftMa::new(own, tile, wanted))
+    let fitted: Wanted = covariance.into();
+    Texture::new(of_tile, own.periodic, fitted.clone(), |tile, wanted| FftMa::new(own, tile, wanted, &fitted))
 }
 
 impl FftMa {
-    /// The method for one tile of a covariance.
+    /// The method for one tile of a covariance, of a fit.
     ///
     /// # Errors
-    /// Eq. 10 of a covariance that is no isotropic exponential.
-    pub fn new(parameters: FftMaParameters, tile: &Tile, wanted: &Covariance) -> Result<Self, ParameterError> {
+    /// Eq. 10 of a covariance that is no isotropic exponential; a residual of a fit without a window; see [`Aim::of`].
+    pub fn new(
+        parameters: FftMaParameters,
+        tile: &Tile,
+        wanted: &Covariance,
+        fitted: &Wanted,
+    ) -> Result<Self, ParameterError> {
+        let purpose = match parameters.covariance {
+            CovarianceOf::Surface => Purpose::Surface,
+            CovarianceOf::Residual => Purpose::Residual,
+        };
+        let aim = Aim::of(fitted, purpose, tile.geometry.cell)?;
+        if parameters.spectrum == SpectrumOf::Eq10 && aim.is_some() {
+            let message = "is `eq10`, which is the spectrum of a surface's exponential alone";
+            return Err(ParameterError::new("spectrum", message));
+        }
+        if fitted.map.is_some() && tile.turns() {
+            let message = "is given, but the fit's covariance is empirical: it has the direction that was measured";
+            return Err(ParameterError::new("azimuth_deg", message));
+        }
         if parameters.spectrum == SpectrumOf::Eq10 && !is_plain_exponential(wanted) {
             let message = "is `eq10`, which is an isotropic exponential without nugget; the fit is another model";
             return Err(ParameterError::new("spectrum", message));
         }
         let Geometry { rows, cols, cell: [dx, dy], .. } = tile.geometry;
-        let [width_m, height_m] = reach::torus_m(wanted);
+        let [width_m, height_m] =
+            aim.as_ref().map_or_else(|| reach::torus_m(wanted), |aim| aim.torus_m(tile.geometry.cell));
+        let oversampling = aim.as_ref().map_or(1, Aim::oversampling) as f64;
         let enough = [(rows, height_m, dy), (cols, width_m, dx)].map(|(n, side_m, cell_m)| match parameters.periodic {
             true => n as f64,
             false => (2.0 * n as f64).max((side_m / cell_m).ceil()),
         });
-        if enough[0] * enough[1] > CELLS_MAX as f64 {
+        if oversampling * enough[0] * enough[1] > CELLS_MAX as f64 {
             let message = format!(
                 "is false, for which the range of {} m needs a torus of {:.1e} cells; at most {CELLS_MAX} are made: larger cells, \
                  or a shorter range",
                 wanted.range_m(),
-                enough[0] * enough[1]
+                oversampling * enough[0] * enough[1]
             );
             return Err(ParameterError::new("periodic", message));
         }
         let torus = enough.map(|n| if parameters.periodic { n as usize } else { smooth_length(n as usize) });
-        Ok(Self { parameters, covariance: wanted.clone(), tile: tile.geometry, torus })
+        Ok(Self { parameters, covariance: wanted.clone(), aim, tile: tile.geometry, torus })
     }
 
     fn spectrum(&self) -> Spectrum {
         let term = &self.covariance.structures[0];
         match self.parameters.spectrum {
+            SpectrumOf::Covariance if let Some(aim) = &self.aim => {
+                aim.spectrum(&self.covariance, self.torus, self.tile.cell).0
+            }
             SpectrumOf::Covariance => Spectrum::of(&self.covariance, self.torus, self.tile.cell),
             SpectrumOf::Eq10 => Spectrum::eq10(term.sigma_m, term.range_m, self.torus, self.tile.cell),
         }
@@ -174,6 +226,27 @@ impl FftMa {
     /// The torus, its south-west corner the origin.
     fn torus_geometry(&self) -> Geometry {
         Geometry { rows: self.torus[0], cols: self.torus[1], ..self.tile }
+    }
+
+    /// What a residual or measured covariance is made of.
+    fn aim_notes(&self) -> Vec<String> {
+        let Some(aim) = &self.aim else { return Vec::new() };
+        let (spectrum, made) = aim.spectrum(&self.covariance, self.torus, self.tile.cell);
+        let rms_m = (spectrum.total() / (self.torus[0] * self.torus[1]) as f64).sqrt();
+        let of = match self.parameters.covariance {
+            CovarianceOf::Surface => "the surface",
+            CovarianceOf::Residual => "what a background over the fit's window lacks",
+        };
+        let mut notes = vec![format!("covariance of {of}: RMS {rms_m:.3e} m")];
+        if let Aim::Empirical { .. } = aim {
+            notes.push(format!(
+                "measured covariance: {:.2} % of its spectrum was negative and set to 0, {:.1} % of the variance is continued by \
+                 the model",
+                100.0 * made.clip_share,
+                100.0 * made.continued_share
+            ));
+        }
+        notes
     }
 
     fn refusal(&self, clip_share: f64) -> SynthesisError {
@@ -215,7 +288,8 @@ impl Kernel for FftMa {
     }
 
     fn memory_bytes(&self) -> u64 {
-        BYTES_PER_CELL * self.torus[0] as u64 * self.torus[1] as u64 + 8 * self.tile.len() as u64
+        let fine = self.aim.as_ref().map_or(0, |aim| AIM_BYTES_PER_CELL * aim.oversampling() as u64);
+        (BYTES_PER_CELL + fine) * self.torus[0] as u64 * self.torus[1] as u64 + 8 * self.tile.len() as u64
     }
 
     fn operations(&self) -> f64 {
@@ -226,11 +300,13 @@ impl Kernel for FftMa {
     }
 
     fn notes(&self) -> Vec<String> {
-        let FftMaParameters { phase, periodic, spectrum } = self.parameters;
-        let mut notes = size_notes(&self.covariance, &self.tile, periodic);
+        let FftMaParameters { phase, periodic, spectrum, .. } = self.parameters;
+        let mut notes =
+            if self.aim.is_none() { size_notes(&self.covariance, &self.tile, periodic) } else { Vec::new() };
         if !periodic && phase == Phase::Unit {
             notes.push("unit phases are exact on the whole torus; the covariance of this crop scatters".to_owned());
         }
+        notes.extend(self.aim_notes());
         if spectrum == SpectrumOf::Eq10 {
             let made_m2 = self.spectrum().total() / (self.torus[0] * self.torus[1]) as f64;
             let share = 100.0 * made_m2 / self.covariance.at_distance(0.0);
@@ -242,13 +318,17 @@ impl Kernel for FftMa {
     }
 
     fn achieved(&self) -> Box<dyn Fn([f64; 2]) -> f64 + '_> {
-        if self.parameters.spectrum == SpectrumOf::Covariance {
+        if self.parameters.spectrum == SpectrumOf::Covariance && self.aim.is_none() {
             return Box::new(|lag_m| self.covariance.at(lag_m));
         }
         let ([rows, cols], [dx, dy]) = (self.torus, self.tile.cell);
         let covariance = self.spectrum().covariance();
         let cell = |lag: f64, side: f64, n: usize| ((lag / side).round() as isize).rem_euclid(n as isize) as usize;
         Box::new(move |[x, y]| covariance[cell(y, dy, rows) * cols + cell(x, dx, cols)])
+    }
+
+    fn aims_at_a_model(&self) -> bool {
+        self.aim.is_none()
     }
 
     fn make(&self, streams: &Streams) -> Result<Made, SynthesisError> {

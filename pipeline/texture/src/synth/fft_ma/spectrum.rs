@@ -33,6 +33,11 @@ impl Spectrum {
         }
     }
 
+    /// A spectrum in the order of a half spectrum.
+    pub fn of_values([rows, cols]: [usize; 2], values: Vec<f64>) -> Self {
+        Self { rows, cols, stored: rows, values }
+    }
+
     /// Of a covariance that is isotropic once cells have these sides.
     fn even(covariance: &Covariance, [rows, cols]: [usize; 2], [dx, dy]: [f64; 2]) -> Self {
         // Square cells: whole numbers under the root, so that cells as far from the origin have the same bits.

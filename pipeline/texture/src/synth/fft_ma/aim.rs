@@ -1,0 +1,120 @@
+//! What the covariance of a texture is of, and the spectrum that follows.
+
+use super::spectrum::Spectrum;
+use crate::covariance::Covariance;
+use crate::covariance::empirical::{self, Composition, Purpose};
+use crate::detrend::BoxWindow;
+use crate::synth::Wanted;
+use sastrugi_numeric::fft::HalfSpectrum;
+use sastrugi_schemas::ParameterError;
+use sastrugi_schemas::fit::CovarianceMap;
+
+/// A cell that is a whole multiple of another is one to this relative precision.
+const MULTIPLE_TOLERANCE: f64 = 1e-6;
+
+/// A spectrum that is not that of a covariance model alone.
+#[derive(Clone)]
+pub enum Aim {
+    /// What a background over the window lacks of the model.
+    Residual { window: BoxWindow },
+    /// A measured covariance, on cells `times` finer (north-south and east-west) than the texture's.
+    Empirical { map: Box<CovarianceMap>, window: BoxWindow, purpose: Purpose, times: [usize; 2] },
+}
+
+impl Aim {
+    /// What a fit and a purpose ask for; `None` where it is the model of the surface.
+    ///
+    /// # Errors
+    /// A fit without a window; cells that are no multiples of the measured ones.
+    pub fn of(wanted: &Wanted, purpose: Purpose, cell_m: [f64; 2]) -> Result<Option<Self>, ParameterError> {
+        let window_at = |cell_m: [f64; 2]| {
+            let [x_m, y_m] = wanted.window_m.ok_or_else(|| {
+                let message = "is `residual`, but the fit file has no `window_m`, the background's window";
+                ParameterError::new("covariance", message)
+            })?;
+            let [across, down] = [(x_m, cell_m[0]), (y_m, cell_m[1])].map(|(m, cell)| BoxWindow::nearest(m, [cell; 2]));
+            Ok::<_, ParameterError>(BoxWindow { half: [down.half[0], across.half[1]] })
+        };
+        let Some(map) = &wanted.map else {
+            return match purpose {
+                Purpose::Surface => Ok(None),
+                Purpose::Residual => Ok(Some(Self::Residual { window: window_at(cell_m)? })),
+            };
+        };
+        empirical::check(map)?;
+        let Some(measured_m) = wanted.cell_m else {
+            return Err(ParameterError::new(
+                "cell_m",
+                "is missing from the fit file; an empirical covariance needs it",
+            ));
+        };
+        let ratio = [1, 0].map(|k| cell_m[k] / measured_m[k]);
+        let times = ratio.map(|r| r.round().max(1.0));
+        if [0, 1].iter().any(|&k| (ratio[k] / times[k] - 1.0).abs() > MULTIPLE_TOLERANCE) {
+            let message = format!(
+                "is {} x {} m; the covariance was measured on cells of {} x {} m and is known at whole multiples of these only",
+                cell_m[0], cell_m[1], measured_m[0], measured_m[1]
+            );
+            return Err(ParameterError::new("cell_m", message));
+        }
+        let needs_window = map.base != "surface" || purpose == Purpose::Residual;
+        let window = if needs_window { window_at(measured_m)? } else { BoxWindow { half: [0, 0] } };
+        let times = times.map(|t| t as usize);
+        Ok(Some(Self::Empirical { map: map.clone(), window, purpose, times }))
+    }
+
+    /// Cells computed with for each cell of the texture.
+    pub fn oversampling(&self) -> usize {
+        match self {
+            Self::Residual { .. } => 1,
+            Self::Empirical { times, .. } => times[0] * times[1],
+        }
+    }
+
+    /// Sides, east-west and north-south, that a torus needs to hold the measured lags, m.
+    pub fn torus_m(&self, cell_m: [f64; 2]) -> [f64; 2] {
+        match self {
+            Self::Residual { window } => window.size_m(cell_m).map(|side| 2.0 * side),
+            Self::Empirical { map, times, .. } => {
+                [0, 1].map(|k| (2 * map.max_lag[1 - k] + 2) as f64 * cell_m[k] / times[1 - k] as f64)
+            }
+        }
+    }
+
+    /// The spectrum on a torus of the texture's cells.
+    pub fn spectrum(&self, model: &Covariance, torus: [usize; 2], cell_m: [f64; 2]) -> (Spectrum, Composition) {
+        match self {
+            Self::Residual { window } => {
+                let values = empirical::residual_spectrum(model, *window, torus, cell_m);
+                let none = Composition { values: Vec::new(), clip_share: 0.0, continued_share: 0.0 };
+                (Spectrum::of_values(torus, values), none)
+            }
+            Self::Empirical { map, window, purpose, times } => {
+                let fine = [0, 1].map(|k| torus[k] * times[k]);
+                let fine_m = [0, 1].map(|k| cell_m[k] / times[1 - k] as f64);
+                let mut made = empirical::spectrum(map, model, *window, *purpose, fine, fine_m);
+                let half = HalfSpectrum { rows: fine[0], cols: fine[1], values: Vec::new() };
+                let values = folded(&half, std::mem::take(&mut made.values), *times);
+                (Spectrum::of_values(torus, values), made)
+            }
+        }
+    }
+}
+
+/// The spectrum of every `times[0]`-th row and `times[1]`-th column: the mean over the modes that look alike on them.
+fn folded(fine: &HalfSpectrum, values: Vec<f64>, times: [usize; 2]) -> Vec<f64> {
+    if times == [1, 1] {
+        return values;
+    }
+    let (rows, cols) = (fine.rows / times[0], fine.cols / times[1]);
+    // Modes beyond the half are those opposite.
+    let at = |ky: usize, kx: usize| match 2 * kx > fine.cols {
+        true => values[(fine.cols - kx) * fine.rows + (fine.rows - ky) % fine.rows],
+        false => values[kx * fine.rows + ky],
+    };
+    let mean = |kx: usize, ky: usize| {
+        let alike = (0..times[0]).flat_map(|i| (0..times[1]).map(move |j| (ky + i * rows, kx + j * cols)));
+        alike.map(|(ky, kx)| at(ky, kx)).sum::<f64>() / (times[0] * times[1]) as f64
+    };
+    (0..=cols / 2).flat_map(|kx| (0..rows).map(move |ky| (kx, ky))).map(|(kx, ky)| mean(kx, ky)).collect()
+}
