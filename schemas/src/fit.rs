@@ -58,13 +58,39 @@ pub struct FitFile {
     /// The model as GSTools' classes take it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gstools: Option<GsTools>,
-    /// Sentences a reader must know.
+    /// One sentence or two: what describes the surface at this scale, what may be published, what a texture from the fit is good for.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub verdict: String,
+    /// What speaks against the fit, the most consequential first.
     pub warnings: Vec<String>,
     /// Every parameter of the fit, as a study states them; absent in a hand-written file.
     #[serde(skip_serializing_if = "Value::is_null")]
     pub settings: Value,
     /// Where the DEM came from.
     pub source: Option<Source>,
+}
+
+impl FitFile {
+    /// Level of the test of misfit from which on parametric intervals are not to be trusted.
+    const MISFIT_LEVEL: f64 = 0.01;
+
+    /// The intervals to quote, and what they are: those by blocks where the model misfits and there are any.
+    pub fn quoted_intervals(&self) -> Option<(&Intervals, &'static str)> {
+        let p = self.diagnostics.get("misfit_p").and_then(Value::as_f64);
+        let misfits = p.is_some_and(|p| p <= Self::MISFIT_LEVEL);
+        match (misfits, &self.block_intervals, &self.intervals) {
+            (true, Some(blocks), _) => Some((blocks, "block bootstrap, as the model misfits")),
+            (_, _, Some(own)) if own.from_profile => Some((own, "profile likelihood")),
+            (_, _, Some(own)) => Some((own, "parametric bootstrap")),
+            (_, Some(blocks), None) => Some((blocks, "block bootstrap")),
+            (_, None, None) => None,
+        }
+    }
+
+    /// Whether the search for the range ended at its bound: then range and sigma are no estimates, only their lower limits are known.
+    pub fn range_at_bound(&self) -> bool {
+        self.diagnostics.get("range_at_search_bound").and_then(Value::as_bool).unwrap_or(false)
+    }
 }
 
 /// Measured covariance by lag, of a fit whose `model` is `empirical`; its lags are in cells of `cell_m`.
@@ -111,7 +137,7 @@ pub struct Trim {
     pub level: f64,
     /// Residuals beyond this absolute value were dropped, m.
     pub threshold_m: f64,
-    /// Share of the DEM's cells that did not enter the covariance (no data, border, outliers, trimmed).
+    /// Share of the DEM's cells that did not enter the covariance (no data, border, objects, trimmed).
     pub masked_share: f64,
 }
 

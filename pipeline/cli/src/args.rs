@@ -314,7 +314,7 @@ pub struct Fit {
     /// `corrected` for detrending and trimming, or as in the `paper`.
     #[arg(long, value_name = "corrected|paper")]
     pub mode: Option<String>,
-    /// Share of residuals trimmed as outliers.
+    /// Share of residuals trimmed on both sides together.
     #[arg(long, value_name = "SHARE", allow_negative_numbers = true)]
     pub trim: Option<f64>,
     /// Covariance model, or several with commas, or `auto`: the best by AICc is taken. `empirical`: the measured covariance.

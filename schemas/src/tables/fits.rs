@@ -25,7 +25,7 @@ super::table! {
         window_x_m: f64 ["m"],
         /// True window of the moving average (an odd number of cells), north-south.
         window_y_m: f64 ["m"],
-        /// Share of residuals trimmed as outliers.
+        /// Share of residuals trimmed.
         trim_level: f64 ["1"],
         /// Residuals beyond this were trimmed.
         trim_threshold_m: f64 ["m"],

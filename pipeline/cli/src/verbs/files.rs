@@ -89,9 +89,12 @@ pub fn info(args: &Info, common: &Common) -> Verdict {
         "json" => fit(&args.path)?,
         _ => raster(&args.path, &args.reading)?,
     };
-    let rows: Vec<Vec<String>> =
-        result.as_object().into_iter().flatten().map(|(key, value)| vec![key.clone(), plain(value)]).collect();
-    print(common.json, &result, &columns(&rows))?;
+    let notes = result["notes"].as_array().cloned().unwrap_or_default();
+    let rows = result.as_object().into_iter().flatten().filter(|(key, _)| *key != "notes");
+    let rows: Vec<Vec<String>> = rows.map(|(key, value)| vec![key.clone(), plain(value)]).collect();
+    let mut text = columns(&rows);
+    notes.iter().for_each(|note| text.push_str(&format!("\n  note: {}", plain(note))));
+    print(common.json, &result, &text)?;
     Ok(Code::Done)
 }
 
@@ -124,6 +127,8 @@ fn raster(path: &Path, settings: &args::Reading) -> Result<Value, Failure> {
             _ => key.to_owned(),
         };
         all.extend(grid.iter().map(|(key, value)| (name(key), value.clone())));
+        let share = read.grid.finite_count() as f64 / (read.grid.geometry.len() as f64).max(1.0);
+        all.insert("valid_share".to_owned(), json!((1e4 * share).round() / 1e4));
         all.insert("heights_sha256".to_owned(), json!(sastrugi_store::digest::heights(&read.grid)));
         all.insert("notes".to_owned(), json!(info.notes));
     }
@@ -149,6 +154,7 @@ fn fit(path: &Path) -> Result<Value, Failure> {
         "what": "covariance fit",
         "mode": fit.mode,
         "model": fit.model,
+        "verdict": fit.verdict,
         "parameters": fit.parameters,
         "window_m": fit.window_m,
         "bins": fit.lags_m.len(),

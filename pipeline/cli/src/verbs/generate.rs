@@ -6,7 +6,7 @@ use crate::Verdict;
 use crate::args::{Common, Detrend, Fit, Obstacles, Roughness, Terrain, Texture};
 use crate::failure::{Code, Failure};
 use crate::output::{columns, print};
-use sastrugi_schemas::fit::Source;
+use sastrugi_schemas::fit::{FitFile, Source};
 use sastrugi_stages::Error;
 use sastrugi_stages::verbs::roughness::{
     AerodynamicRoughness, ArealFigures, Bumps, Detrender, ObstacleHeight, Ride, RideRequest, WindEstimate, WindSettings,
@@ -127,17 +127,11 @@ pub fn fit(args: &Fit, common: &Common) -> Verdict {
         Ok(fit) => fit,
         Err(error) => return no_fit(&source, error, common),
     };
-    let interval = |name: &str| {
-        let [low, high] = fit.intervals.as_ref()?.values.get(name)?;
-        let end = |end: &Option<f64>| end.map_or_else(|| "open".to_owned(), |v| format!("{v:.6}"));
-        Some(format!(" [{}, {}]", end(low), end(high)))
-    };
-    let parameters: Vec<String> = fit
-        .parameters
-        .iter()
-        .map(|(name, value)| format!("{name} = {value:.6}{}", interval(name).unwrap_or_default()))
-        .collect();
-    let mut text = format!("{}: {} ({}), {}", args.output.display(), fit.model, fit.mode, parameters.join(", "));
+    let mut text = format!("{}: {} ({})", args.output.display(), fit.model, fit.mode);
+    if !fit.verdict.is_empty() {
+        text.push_str(&format!("\n  {}", fit.verdict));
+    }
+    text.push_str(&format!("\n  {}", fitted_parameters(&fit)));
     read_notes.iter().for_each(|note| text.push_str(&format!("\n  note: {note}")));
     fit.warnings.iter().for_each(|warning| text.push_str(&format!("\n  warning: {warning}")));
     print(common.json, &serde_json::to_value(&fit).map_err(Failure::failed)?, &text)?;
@@ -152,6 +146,27 @@ fn no_fit(source: &Source, error: Error, common: &Common) -> Verdict {
         print(common.json, &value, &text)?;
     }
     Err(error.into())
+}
+
+/// Parameters with the intervals to quote. Where the search for the range ended at its bound only lower limits are known.
+fn fitted_parameters(fit: &FitFile) -> String {
+    let quoted = fit.quoted_intervals();
+    let ends = |name: &str| quoted.and_then(|(intervals, _)| intervals.values.get(name).copied());
+    let lower = |name: &str| fit.intervals.as_ref().and_then(|intervals| intervals.values.get(name)?[0]);
+    let one = |(name, value): (&String, &f64)| match (ends(name), fit.range_at_bound()) {
+        (_, true) if name == "range_m" || name == "sigma_m" => match lower(name) {
+            Some(low) => format!("{name} at least {low:.6} (profile likelihood)"),
+            None => format!("{name} not identified ({value:.6} is where the search ended)"),
+        },
+        (Some([low, high]), _) => {
+            let end = |end: Option<f64>| end.map_or_else(|| "open".to_owned(), |v| format!("{v:.6}"));
+            format!("{name} = {value:.6} [{}, {}]", end(low), end(high))
+        }
+        (None, _) => format!("{name} = {value:.6}"),
+    };
+    let kind =
+        quoted.map_or_else(String::new, |(intervals, kind)| format!(" ({:.0} %, {kind})", 100.0 * intervals.level));
+    format!("{}{kind}", fit.parameters.iter().map(one).collect::<Vec<_>>().join(", "))
 }
 
 /// Figures above the least-squares plane, as lines.

@@ -399,7 +399,8 @@ impl Job for TextureJob {
             sastrugi_texture::prepare(&self.method, &self.draft.parameters(), &fit).map_err(JobError::new)?;
         let TextureOutcome { grid, covariance_error_max_m2, clip_share } =
             synthesis.generate(&self.streams).map_err(JobError::new)?;
-        let mut notes = synthesis.notes();
+        let mut notes = sastrugi_texture::fit_notes(&fit);
+        notes.extend(synthesis.notes());
         if self.one_of_many && synthesis.parameters()["phase"] == "unit" {
             notes.push(
                 "one of several textures with unit phases, which are too alike: for their spread take phase = \"gaussian\""

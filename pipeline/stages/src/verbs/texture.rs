@@ -59,7 +59,8 @@ pub fn texture(request: &Request<'_>) -> Result<Value, Error> {
     let synthesis = sastrugi_texture::prepare(request.method, &parameters, &fit)?;
     super::check_output(request.output)?;
     let streams = Streams::for_seed(request.seed, STAGE);
-    let mut notes = synthesis.notes();
+    let mut notes = sastrugi_texture::fit_notes(&fit);
+    notes.extend(synthesis.notes());
     let outcome = synthesis.generate(&streams).map_err(|e| Error::Usage(e.to_string()))?;
     let (heights, crs) = match request.onto {
         None => (outcome.grid, Crs::default()),

@@ -10,8 +10,7 @@ use super::case::Case;
 use super::estimator::{Estimate, Estimator};
 use crate::covariance::empirical;
 use crate::covariance::trimmed::TrimmedNormal;
-use crate::synth::EMPIRICAL;
-use sastrugi_schemas::fit::{Carried, CarriedOctave, FitFile};
+use sastrugi_schemas::fit::{Carried, CarriedOctave, CovarianceMap};
 use sastrugi_statistics::normal;
 
 /// What a texture from a model has; the estimator is one on rings.
@@ -22,8 +21,8 @@ pub fn by_model(estimator: &Estimator, estimate: &Estimate) -> Carried {
     carried(case, &binned, variance_m2)
 }
 
-/// The fit with the measured covariance, and what a texture from it has.
-pub fn with_map(fit: FitFile, case: &Case, estimate: &Estimate) -> FitFile {
+/// The measured covariance, continued by a model, and what a texture from it has.
+pub fn by_map(case: &Case, estimate: &Estimate) -> (CovarianceMap, Carried) {
     let trimmed = TrimmedNormal::new(threshold(case));
     let noise_m = case.settings.measurement().noise_sigma_m;
     let map = empirical::covariance_map(&case.survey.covariance, &trimmed, noise_m, estimate.form.name());
@@ -31,7 +30,7 @@ pub fn with_map(fit: FitFile, case: &Case, estimate: &Estimate) -> FitFile {
     let variance_m2 = residual.at([0, 0]);
     let binned = case.bins.average(|lag| variance_m2 * trimmed.covariance(residual.at(lag) / variance_m2));
     let carried = carried(case, &binned, variance_m2);
-    FitFile { model: EMPIRICAL.to_owned(), map: Some(map), carried: Some(carried), ..fit }
+    (map, carried)
 }
 
 /// Where the level of trimming cuts a unit normal.

@@ -12,6 +12,8 @@ use sastrugi_numeric::Geometry;
 use sastrugi_schemas::ParameterError;
 use std::ops::Range;
 
+/// Correlation of neighbouring cells below which a residual may be white: an exponential of a range of one cell has 0.37.
+const WHITE_CORRELATION: f64 = 0.5;
 /// Fewest bins for two parameters.
 const BINS_MIN: usize = 3;
 
@@ -67,6 +69,11 @@ impl<'a> Case<'a> {
             return Err(ParameterError::new("noise_sigma_m", message).into());
         }
         Ok(Self { heights, settings, geometry, window, max_lag, max_lag_m, survey, bins })
+    }
+
+    /// True when neighbouring cells of the residual hardly know each other.
+    pub fn is_white(&self) -> bool {
+        self.bins.covariance_m2[1] < WHITE_CORRELATION * self.bins.covariance_m2[0]
     }
 
     /// The bins of another layout.

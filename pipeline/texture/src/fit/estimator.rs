@@ -137,6 +137,10 @@ impl<'a> Estimator<'a> {
             }
             let next = self.search(form, &end.at, weights.as_ref());
             steps += next.steps;
+            // Weights of a model that misfits can lead to ever shorter ranges.
+            if self.is_white(&coordinates.decode(&next.at)) && !self.is_white(&coordinates.decode(&end.at)) {
+                break;
+            }
             let moved = difference(&next.at, &end.at).iter().fold(0.0, |m, d| f64::max(m, d.abs()));
             end = next;
             if moved < CONVERGED {
@@ -145,6 +149,12 @@ impl<'a> Estimator<'a> {
         }
         let likelihood = weights.map(|weights| self.likelihood(form, &end, weights));
         Estimate { form: form.clone(), covariance: coordinates.decode(&end.at), at: end.at, steps, likelihood }
+    }
+
+    /// True of a model whose range is not above one cell while neighbouring cells of the data are correlated.
+    fn is_white(&self, covariance: &Covariance) -> bool {
+        let [x, y] = self.case.geometry.cell;
+        covariance.is_stationary() && covariance.range_m() <= x.max(y) && !self.case.is_white()
     }
 
     fn likelihood(&self, form: &Form, end: &Minimum, weights: Cholesky) -> Likelihood {

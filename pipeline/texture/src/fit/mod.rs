@@ -1,6 +1,6 @@
 //! Covariance of the texture of a measured DEM.
 //!
-//! 1. Cells that are no texture are found and left out ([`crate::outliers`]; not in `paper` mode).
+//! 1. Cells that are no texture are found and left out ([`crate::objects`]; not in `paper` mode).
 //! 2. Background: the moving average over the outer scale ([`crate::detrend`]); residual: height less background, on
 //!    cells whose window has data enough.
 //! 3. Residuals beyond a symmetric threshold are trimmed at the significance level.
@@ -15,7 +15,7 @@
 //! as `paper`: on surfaces that are exactly exponential it gives sigma 19 % and b 42 % too small at b = 0.14 windows,
 //! 43 % and 76 % at half a window (`docs/papers/vecherin.md`).
 //!
-//! Cost without intervals: dominated by the moving averages of the outlier search and four real transforms of the raster;
+//! Cost without intervals: dominated by the moving averages of the object search and four real transforms of the raster;
 //! a replicate costs a surface of four times as many cells (at most a million of them) and another such fit. Memory: the
 //! strips of `survey.rs`, which grow with the raster's width only, two bits per cell, and 300 bytes per cell of up to a
 //! million for each replicate at work. Heights are read in parts, a few times ([`Heights`]).
@@ -45,6 +45,7 @@ pub use params::{FitParameters, FitSettings, Mode};
 
 use crate::covariance::bins::Layout;
 use crate::covariance::{Form, LagBins};
+use crate::synth::EMPIRICAL;
 use crate::synth::marginal::quantiles_m;
 use case::Case;
 use estimator::{Estimate, Estimator, best, ordinary};
@@ -100,6 +101,7 @@ impl FitOutcome {
 /// # Errors
 /// See [`FitError`].
 pub fn fit(heights: &dyn Heights, settings: &FitSettings, streams: &Streams) -> Result<FitOutcome, FitError> {
+    let settings = &if heights.are_profiles() { settings.of_transects() } else { settings.clone() };
     let case = Case::new(heights, settings)?;
     let naive = ordinary(&case, &Form::parse("exponential")?);
     let fit = match settings.mode() {
@@ -142,11 +144,13 @@ fn corrected(case: &Case, naive: &Estimate, streams: &Streams) -> Result<FitFile
         (settings.bootstrap() > 0).then(|| resampling::parametric(&estimator, estimate, settings.bootstrap(), streams));
     let blocks = resampling::blocks(case, bins, settings.bootstrap() > 0)?;
     let resampled = resampling::block_replicates(&estimator, estimate, &blocks, settings.bootstrap(), streams);
-    let windows = Windows::of(examined(case)?.as_ref(), case, estimate);
+    let windows = Windows::of(examined(case)?.as_ref(), case, estimate)?;
     let rough = (!case.heights.are_profiles()).then(|| Estimator::rough(case, &by_direction));
     let rough_rings = directional.then(|| Estimator::rough(case, &case.bins));
     let on_rings = rough_rings.as_ref().unwrap_or(&estimator);
     let disagreement = verdicts::window_disagreement(&windows);
+    let measured = settings.empirical.then(|| carried::by_map(case, estimate));
+    let (map, carried) = measured.map_or_else(|| (None, carried::by_model(on_rings, estimate)), |(m, c)| (Some(m), c));
     let findings = Findings {
         scale_explicit: verdicts::no_scale_separation(disagreement)
             .then(|| verdicts::scale_explicit(on_rings, &estimates, &windows)),
@@ -162,19 +166,24 @@ fn corrected(case: &Case, naive: &Estimate, streams: &Streams) -> Result<FitFile
         isotropy: rough.as_ref().and_then(|rough| verdicts::isotropy(rough, estimate)),
         stationarity: verdicts::stationarity(&estimator, estimate, &blocks),
         misfit_p: verdicts::misfit_p(estimate, replicates.as_ref()),
-        carried: Some(carried::by_model(on_rings, estimate)),
+        carried: Some(carried),
+        sill_over_range_spread: windows.sill_over_range_spread(),
+        replicates: replicates.as_ref().map_or(0, |r| r.at.len()),
         normality_p: replicates.as_ref().and_then(|r| verdicts::normality_p(case, r)),
         directions: rough.map_or_else(Vec::new, |rough| report::directions(&rough, estimate)),
     };
     let file = report::fit_file(case, naive, estimate, on_rings.mean(&estimate.covariance), &findings);
-    Ok(if settings.empirical { carried::with_map(file, case, estimate) } else { file })
+    Ok(match map {
+        Some(map) => FitFile { model: EMPIRICAL.to_owned(), map: Some(map), ..file },
+        None => file,
+    })
 }
 
-/// A texture whose leading range lies below the cell cannot be told from noise.
+/// A texture whose leading range lies below the cell, and whose neighbouring cells hardly know each other, cannot be told from noise.
 fn refuse_white(case: &Case, estimate: &Estimate) -> Result<(), FitError> {
     let cell = case.geometry.cell[0].max(case.geometry.cell[1]);
     let longest = estimate.covariance.range_m();
-    if estimate.covariance.is_stationary() && longest <= cell {
+    if estimate.covariance.is_stationary() && longest <= cell && case.is_white() {
         return Err(FitError::White { range_m: longest, cell_m: cell });
     }
     Ok(())

@@ -56,7 +56,7 @@ pub struct FitParameters {
     pub min_valid_share: Option<f64>,
     /// Whether objects (trees, rocks, structures) are found and left out before the moving average. Default true. Of a bare
     /// site with steep steps (gullies, cliffs) it takes up to a tenth away: set it to false there. `paper` mode looks for none.
-    pub find_outliers: bool,
+    pub find_objects: bool,
     /// Replicates of the parametric bootstrap that gives intervals; 0 for none. Default 99. `paper` mode has none.
     pub bootstrap: u32,
     /// Standard deviation of the Gaussian point spread that blurred the DEM (photogrammetry's smoothing), m. Default 0.
@@ -67,8 +67,17 @@ pub struct FitParameters {
 }
 
 /// What `auto` tries.
-const AUTO: [&str; 7] =
-    ["exponential", "gaussian", "spherical", "matern", "self_affine", "exponential+nugget", "exponential+gaussian"];
+const AUTO: [&str; 9] = [
+    "exponential",
+    "gaussian",
+    "spherical",
+    "matern",
+    "self_affine",
+    "exponential+nugget",
+    "exponential+gaussian",
+    "anisotropic:exponential",
+    "anisotropic:matern",
+];
 /// Model of the paper.
 const MODEL: &str = "exponential";
 /// Fewest replicates of which 2.5 % is one.
@@ -93,7 +102,7 @@ impl Default for FitParameters {
             model: MODEL.to_owned(),
             max_lag_m: None,
             min_valid_share: None,
-            find_outliers: true,
+            find_objects: true,
             bootstrap: 99,
             inner_scale_m: 0.0,
             noise_sigma_m: 0.0,
@@ -108,6 +117,8 @@ pub struct FitSettings {
     pub(super) forms: Vec<Form>,
     /// Whether the measured covariance is stored.
     pub(super) empirical: bool,
+    /// Whether the forms are the usual ones.
+    auto: bool,
     pub(super) min_valid_share: f64,
 }
 
@@ -152,7 +163,8 @@ impl TryFrom<FitParameters> for FitSettings {
             let message = "is `paper`, which knows neither an inner scale nor noise; leave them out or fit `corrected`";
             return Err(ParameterError::new("mode", message));
         }
-        Ok(Self { parameters, forms, empirical, min_valid_share: share })
+        let auto = parameters.model.split(',').any(|name| name.trim() == "auto");
+        Ok(Self { parameters, forms, empirical, auto, min_valid_share: share })
     }
 }
 
@@ -205,14 +217,20 @@ impl FitSettings {
         FitParameters { noise_sigma_m: sigma_m, ..self.parameters.clone() }.try_into()
     }
 
+    /// The same fit of transects: what `auto` tries has no direction.
+    pub(super) fn of_transects(&self) -> Self {
+        let is_tried = |form: &&Form| !(self.auto && form.is_anisotropic());
+        Self { forms: self.forms.iter().filter(is_tried).cloned().collect(), ..self.clone() }
+    }
+
     /// The same fit at another outer scale.
     pub(super) fn at_outer_scale(&self, outer_scale_m: f64) -> Self {
         let parameters = FitParameters { outer_scale_m, max_lag_m: None, ..self.parameters.clone() };
         Self { parameters, empirical: false, ..self.clone() }
     }
 
-    pub(super) fn find_outliers(&self) -> bool {
-        self.parameters.find_outliers && self.mode() == Mode::Corrected
+    pub(super) fn find_objects(&self) -> bool {
+        self.parameters.find_objects && self.mode() == Mode::Corrected
     }
 
     /// What the background of a partial window is: the published procedure knows the mean only.

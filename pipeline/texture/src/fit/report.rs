@@ -8,7 +8,9 @@ use super::resampling::{SILL_OVER_RANGE, sill_over_range};
 use super::verdicts::{Isotropy, ScaleExplicit, Stationarity, is_range_told};
 use crate::covariance::form::Role;
 use crate::covariance::{Covariance, Form, Structure};
-use sastrugi_schemas::fit::{Candidate, Carried, DirectionBin, FitFile, GsTools, Intervals, Profile, Trim};
+use sastrugi_schemas::fit::{
+    Candidate, Carried, CarriedOctave, DirectionBin, FitFile, GsTools, Intervals, Profile, Trim,
+};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_2;
@@ -17,8 +19,12 @@ use std::f64::consts::FRAC_PI_2;
 const NAIVE_RANGE_MAX: f64 = 0.12;
 /// Misfit over variance above which the model is called wrong whatever the p-value.
 const MISFIT_MAX: f64 = 0.05;
-/// Share of measured cells taken for outliers above which the site is called cluttered.
-const OUTLIER_SHARE_MAX: f64 = 0.1;
+/// Share of measured cells taken for objects that is worth a warning.
+const OBJECT_SHARE_MAX: f64 = 0.1;
+/// Spread of sigma^2 / b between windows that is worth a word.
+const SPREAD_WORTH_A_WARNING: f64 = 1.25;
+/// Share of the residual's RMS below which a texture is called too weak.
+const CARRIED_MIN: f64 = 0.95;
 /// Level of every warning that comes from a test.
 const TEST_LEVEL: f64 = 0.01;
 /// Least elongation that is worth a warning, as a ratio of ranges.
@@ -42,6 +48,10 @@ pub struct Findings {
     pub stationarity: Option<Stationarity>,
     pub misfit_p: Option<f64>,
     pub normality_p: Option<f64>,
+    /// Largest over smallest sigma^2 / b of all windows.
+    pub sill_over_range_spread: Option<f64>,
+    /// Replicates that p-values rest on; 0 for theory's nulls.
+    pub replicates: usize,
     /// What of the residual a texture from the fit has.
     pub carried: Option<Carried>,
     pub directions: Vec<DirectionBin>,
@@ -50,6 +60,7 @@ pub struct Findings {
 /// The fit file; `binned` is the model in the rings as the estimator sees it, m2.
 pub fn fit_file(case: &Case, naive: &Estimate, estimate: &Estimate, binned: Vec<f64>, findings: &Findings) -> FitFile {
     let figures = Figures::of(case, naive, estimate, &binned);
+    let (verdict, warnings) = figures.words(case, naive, estimate, findings);
     FitFile {
         mode: case.settings.mode().name().to_owned(),
         model: estimate.form.name().to_owned(),
@@ -75,7 +86,8 @@ pub fn fit_file(case: &Case, naive: &Estimate, estimate: &Estimate, binned: Vec<
         profile: findings.profile.clone(),
         directions: findings.directions.clone(),
         gstools: gstools(&estimate.form, &estimate.covariance),
-        warnings: figures.warnings(case, naive, estimate, findings),
+        verdict,
+        warnings,
         // A plain struct of numbers and words always has a JSON form.
         settings: serde_json::to_value(case.settings.parameters()).unwrap_or_default(),
         source: None,
@@ -167,11 +179,12 @@ impl Figures {
             ("naive_range_windows", json!(self.naive_range_windows)),
             ("iterations", json!(estimate.steps)),
             ("misfit_m2", json!(self.misfit_m2)),
+            ("range_at_search_bound", json!(!is_range_told(case, estimate))),
             ("lag_max_m", json!(case.max_lag_m)),
             ("window_cells", json!([case.window.cells()[1], case.window.cells()[0]])),
             ("min_valid_share", json!(case.settings.min_valid_share)),
             ("no_data_share", json!(1.0 - self.share(survey.measured))),
-            ("outlier_share", json!(self.share(survey.measured - self.trusted))),
+            ("object_share", json!(self.share(survey.measured - self.trusted))),
             ("window_lacks_data_share", json!(self.share(self.trusted - survey.detrended))),
             ("trimmed_share", json!(self.share(survey.detrended - survey.kept))),
         ];
@@ -188,6 +201,7 @@ impl Figures {
             ("block_sigma_max_over_min", findings.stationarity.as_ref().map(|s| s.sigma_max_over_min)),
             ("chi2_rise_at_3b", self.rise_at_3b(findings)),
             ("band_rms_m", Some(survey.trim.rms_m)),
+            ("sigma2_over_range_spread", findings.sill_over_range_spread),
             ("effective_resolution_m", resolution_m(case, &estimate.covariance)),
             ("increment_1m_m", self_affine.map(|s| s.sigma_m)),
             ("hurst", self_affine.map(|s| s.shape)),
@@ -208,82 +222,154 @@ impl Figures {
         Some(profile.chi2_rise[at] / self.misfit_ratio.unwrap_or(1.0).max(1.0))
     }
 
-    fn warnings(&self, case: &Case, naive: &Estimate, estimate: &Estimate, findings: &Findings) -> Vec<String> {
-        let paper = (case.settings.mode() == Mode::Paper).then(|| {
-            "paper mode: the fit does not correct for the moving average and the trimming, which make sigma and b too \
-             small (19 % and 42 % for an exponential of b = 0.14 windows, 43 % and 76 % at half a window)"
-                .to_owned()
-        });
-        let all = [
-            paper,
-            separation_warning(estimate, findings),
-            self.range_warning(case, naive, estimate),
-            self.flat_warning(case, estimate, findings),
-            self.misfit_warning(case, estimate, findings),
-            resolution_warning(case, estimate),
-            isotropy_warning(estimate, findings),
-            stationarity_warning(findings),
-            normality_warning(findings),
-            self.clutter_warning(case),
-        ];
-        all.into_iter().flatten().collect()
+    /// What is said of the fit: one verdict, then warnings in the order of their consequence.
+    fn words(&self, case: &Case, naive: &Estimate, estimate: &Estimate, findings: &Findings) -> (String, Vec<String>) {
+        if case.settings.mode() == Mode::Paper {
+            let verdict = "published procedure: sigma and b are those of the detrended, trimmed residual, not of the surface; use \
+                           them to compare with other results in paper mode only";
+            let warning = "paper mode: not corrected for detrending and trimming, which make sigma and b too small (19 % and 42 % for \
+                           an exponential of b = 0.14 windows, 43 % and 76 % at half a window)";
+            return (verdict.to_owned(), vec![warning.to_owned()]);
+        }
+        let doubts = Doubts {
+            noise: resolution_warning(case, estimate),
+            misfit: self.misfit_warning(case, estimate, findings),
+            scale: separation_warning(findings),
+            range: self.range_warning(case, naive, estimate, findings),
+            site: stationarity_warning(findings),
+            direction: isotropy_warning(estimate, findings),
+            heights: normality_warning(findings),
+            objects: self.object_warning(case),
+        };
+        let verdict = doubts.verdict(case, estimate, findings);
+        (verdict, doubts.list())
     }
 
-    fn range_warning(&self, case: &Case, naive: &Estimate, estimate: &Estimate) -> Option<String> {
-        let told = sill_over_range(&estimate.covariance)?;
-        (self.naive_range_windows > NAIVE_RANGE_MAX).then(|| {
-            format!(
-                "b is not identifiable from this window: the uncorrected fit gives {} m, {:.2} of the window of {} m, where \
-                 every exponential ends up near 0.135 or below; sigma^2 / b = {} m is what the data tells",
-                figure(naive.covariance.range_m()),
-                self.naive_range_windows,
-                figure(case.window_m()),
-                figure(told),
-            )
-        })
-    }
-
-    fn flat_warning(&self, case: &Case, estimate: &Estimate, findings: &Findings) -> Option<String> {
+    /// b is not told: the search ended at its bound, the likelihood is flat, or the uncorrected range lies where every exponential ends up.
+    fn range_warning(&self, case: &Case, naive: &Estimate, estimate: &Estimate, findings: &Findings) -> Option<String> {
         let b = estimate.covariance.structures[0].range_m;
         estimate.coordinate(Role::Range(0))?;
+        let moves = findings
+            .sill_over_range_spread
+            .filter(|spread| *spread > SPREAD_WORTH_A_WARNING)
+            .map_or_else(String::new, |spread| {
+                format!("; sigma^2 / b moves by a factor of {spread:.2} between windows")
+            });
         if !is_range_told(case, estimate) {
+            return Some(format!("b is not identified: the search ended at its bound of {} m{moves}", figure(b)));
+        }
+        if self.rise_at_3b(findings).is_some_and(|rise| rise < LIKELIHOOD_RISE) {
             return Some(format!(
-                "b = {} m is where the search ends: all that the data tells is that b is long",
-                figure(b)
+                "b is not identified: b = {} m fits as well as {} m{moves}",
+                figure(b),
+                figure(3.0 * b)
             ));
         }
-        let flat = self.rise_at_3b(findings)? < LIKELIHOOD_RISE;
-        flat.then(|| format!("the likelihood is flat: b = {} m cannot be told from {} m", figure(b), figure(3.0 * b)))
+        (self.naive_range_windows > NAIVE_RANGE_MAX && sill_over_range(&estimate.covariance).is_some()).then(|| {
+            format!(
+                "b is not identified: the uncorrected range of {} m is {:.2} windows, near the ceiling of 0.135 for any exponential{moves}",
+                figure(naive.covariance.range_m()),
+                self.naive_range_windows,
+            )
+        })
     }
 
     fn misfit_warning(&self, case: &Case, estimate: &Estimate, findings: &Findings) -> Option<String> {
         let misfit = self.misfit_m2 / case.bins.covariance_m2[0];
         let rejected = findings.misfit_p.is_some_and(|p| p <= TEST_LEVEL);
-        let how = findings.misfit_p.map_or_else(String::new, |p| format!(", {}", p_value(p)));
+        let how = findings.misfit_p.map_or_else(String::new, |p| format!(", {}", p_value(p, findings.replicates)));
         (misfit > MISFIT_MAX || rejected).then(|| {
             format!(
-                "the {} model does not describe the residual: its root mean square misfit is {:.1} % of the variance{how}",
+                "the {} model misfits the covariance (RMS misfit {:.1} % of the variance{how}); its parametric intervals are too narrow",
                 estimate.form.name(),
                 100.0 * misfit
             )
         })
     }
 
-    fn clutter_warning(&self, case: &Case) -> Option<String> {
-        let outliers = (case.survey.measured - self.trusted) as f64 / case.survey.measured as f64;
-        (outliers > OUTLIER_SHARE_MAX).then(|| {
+    fn object_warning(&self, case: &Case) -> Option<String> {
+        let objects = (case.survey.measured - self.trusted) as f64 / case.survey.measured as f64;
+        (objects > OBJECT_SHARE_MAX).then(|| {
             format!(
-                "{:.1} % of the measured cells were taken for outliers: objects are better masked by hand, and a bare site fitted \
-                 with find_outliers = false",
-                100.0 * outliers
+                "{:.1} % of the cells were taken for objects; on a bare site set find_objects = false",
+                100.0 * objects
             )
         })
     }
 }
 
-/// `p = 0.003`, or `p < 0.001`.
-fn p_value(p: f64) -> String {
-    if p < 1e-3 { "p < 0.001".to_owned() } else { format!("p = {p:.3}") }
+/// What speaks against a fit, as warnings.
+struct Doubts {
+    noise: Option<String>,
+    misfit: Option<String>,
+    scale: Option<String>,
+    range: Option<String>,
+    site: Option<String>,
+    direction: Option<String>,
+    heights: Option<String>,
+    objects: Option<String>,
+}
+
+impl Doubts {
+    /// The most consequential first.
+    fn list(self) -> Vec<String> {
+        let Self { noise, misfit, scale, range, site, direction, heights, objects } = self;
+        [noise, misfit, scale, range, site, direction, heights, objects].into_iter().flatten().collect()
+    }
+
+    /// What describes the surface at this scale, what may be published, and what a texture from the fit is good for.
+    fn verdict(&self, case: &Case, estimate: &Estimate, findings: &Findings) -> String {
+        let window_m = figure(case.window_m());
+        let rms_m = figure(case.survey.trim.rms_m);
+        let model = estimate.form.name();
+        let described = if self.noise.is_some() {
+            format!("mostly noise below {window_m} m: publish no texture parameters")
+        } else if self.scale.is_some() || self.misfit.is_some() {
+            let growth = findings.scale_explicit.as_ref().and_then(ScaleExplicit::words).unwrap_or_default();
+            format!("no single scale below {window_m} m: publish band RMS {rms_m} m{growth}, not sigma and b")
+        } else if self.range.is_some() {
+            let told = sill_over_range(&estimate.covariance);
+            let told = told.map_or_else(String::new, |told| format!("sigma^2 / b = {} m and ", figure(told)));
+            format!(
+                "only the short-range slope of the covariance is known below {window_m} m: publish {told}band RMS {rms_m} m"
+            )
+        } else {
+            format!(
+                "the {model} model describes the surface below {window_m} m: its parameters may be published with their intervals"
+            )
+        };
+        let carried = findings.carried.as_ref().map(carried_words).unwrap_or_default();
+        format!("{described}{carried}")
+    }
+}
+
+/// What a texture has, for the end of a verdict.
+fn carried_words(carried: &Carried) -> String {
+    let per_octave = |o: &CarriedOctave| format!("{:.0} % at {}-{} m", 100.0 * o.share, short(o.from_m), short(o.to_m));
+    let octaves: Vec<String> = carried.increments.iter().map(per_octave).collect();
+    let better = if carried.rms_share < CARRIED_MIN { "; model = \"empirical\" carries all of it" } else { "" };
+    format!(
+        ". A texture from it carries {:.0} % of the residual's RMS ({:.0} % of its variance; increments: {}){better}",
+        100.0 * carried.rms_share,
+        100.0 * carried.variance_share,
+        octaves.join(", ")
+    )
+}
+
+/// A positive figure to two digits.
+fn short(value: f64) -> String {
+    let decimals = 1.0 - libm::floor(libm::log10(value));
+    format!("{value:.*}", decimals.clamp(0.0, 12.0) as usize)
+}
+
+/// `p = 0.003`, or `p < 0.001`; with what so many replicates can tell at least.
+fn p_value(p: f64, replicates: usize) -> String {
+    let least = 1.0 / (replicates + 1) as f64;
+    match p {
+        p if replicates > 0 && p <= least => format!("p <= {least:.3}, the least of {replicates} replicates"),
+        p if p < 1e-3 => "p < 0.001".to_owned(),
+        p => format!("p = {p:.3}"),
+    }
 }
 
 /// A positive figure to four digits.
@@ -298,29 +384,27 @@ impl ScaleExplicit {
         self.self_affine.as_ref()?.covariance.structures.first().copied()
     }
 
-    fn words(&self, estimate: &Estimate) -> String {
-        let band = |[below_m, rms_m]: &[f64; 2]| format!("{} m below {below_m} m", figure(*rms_m));
-        let bands = self.bands.iter().map(band).collect::<Vec<_>>().join(", ");
-        let growth = self.structure().map(|s| {
-            // The search ends just below 1.
-            let more = s.model.shape().is_some_and(|shape| s.shape > 0.999 * shape.bounds.1);
-            let more = if more { ", or more" } else { "" };
-            format!("; increments grow as {} m (lag / 1 m)^{:.2} (Hurst exponent{more})", figure(s.sigma_m), s.shape)
-        });
-        let told = sill_over_range(&estimate.covariance).map(|told| format!("; sigma^2 / b = {} m", figure(told)));
-        format!("root mean square heights of {bands}{}{}", growth.unwrap_or_default(), told.unwrap_or_default())
+    /// Root mean square heights and growth of increments, after that of the fit's own band.
+    fn words(&self) -> Option<String> {
+        let band = |[below_m, rms_m]: &[f64; 2]| format!("{} m below {} m", figure(*rms_m), short(*below_m));
+        let bands = self.bands.iter().filter(|b| b[1].is_finite()).map(band).collect::<Vec<_>>().join(", ");
+        let structure = self.structure()?;
+        // The search ends just below 1.
+        let at_least = structure.model.shape().is_some_and(|shape| structure.shape > 0.999 * shape.bounds.1);
+        let at_least = if at_least { "at least " } else { "" };
+        Some(format!(
+            " (on the same cells {bands}) and increments of {} m (lag / 1 m)^{:.2} (Hurst exponent {at_least}{:.2})",
+            figure(structure.sigma_m),
+            structure.shape,
+            structure.shape
+        ))
     }
 }
 
-/// Where there is no one scale, what is true at each comes first.
-fn separation_warning(estimate: &Estimate, findings: &Findings) -> Option<String> {
-    let (z, explicit) = (findings.disagreement?, findings.scale_explicit.as_ref()?);
-    Some(format!(
-        "no scale separation: {}; fits at half and twice the outer scale disagree by {z:.1} standard errors, so that the \
-         parameters of the {} model belong to this window, not to the surface",
-        explicit.words(estimate),
-        estimate.form.name()
-    ))
+/// Fits at other windows are other fits.
+fn separation_warning(findings: &Findings) -> Option<String> {
+    let (z, _) = (findings.disagreement?, findings.scale_explicit.as_ref()?);
+    Some(format!("no scale separation: fits at half and twice the outer scale disagree by {z:.1} standard errors"))
 }
 
 /// Shortest lag at which the DEM tells more of the texture than of itself, m: increments of the texture (along its long axis)
@@ -348,10 +432,7 @@ fn resolution_m(case: &Case, covariance: &Covariance) -> Option<f64> {
 
 fn resolution_warning(case: &Case, estimate: &Estimate) -> Option<String> {
     resolution_m(case, &estimate.covariance).is_none().then(|| {
-        format!(
-            "noise is larger than the texture's increments up to the largest lag of {} m: what is fitted is mostly noise",
-            figure(case.max_lag_m)
-        )
+        format!("noise exceeds the texture's increments at all lags of the fit, to {} m", figure(case.max_lag_m))
     })
 }
 
@@ -359,9 +440,8 @@ fn isotropy_warning(estimate: &Estimate, findings: &Findings) -> Option<String> 
     let found = findings.isotropy.as_ref().filter(|_| !estimate.form.is_anisotropic())?;
     (found.p <= TEST_LEVEL && found.ratio < RATIO_WORTH_A_WARNING).then(|| {
         format!(
-            "the texture is not isotropic ({}): it is longer by {:.2} along azimuth {:.0} degrees; try \
-             anisotropic:{}",
-            p_value(found.p),
+            "not isotropic ({}): ranges {:.2} times as long along azimuth {:.0} degrees; try --model anisotropic:{}",
+            p_value(found.p, 0),
             1.0 / found.ratio,
             found.azimuth_deg,
             estimate.form.name()
@@ -373,9 +453,8 @@ fn stationarity_warning(findings: &Findings) -> Option<String> {
     let found = findings.stationarity.as_ref()?;
     (found.p <= TEST_LEVEL && found.sigma_max_over_min > SIGMAS_WORTH_A_WARNING).then(|| {
         format!(
-            "the site is not stationary ({}): sigma differs by a factor of {:.2} between its blocks; the parametric \
-             intervals are too narrow",
-            p_value(found.p),
+            "not stationary ({}): sigma differs by a factor of {:.2} between blocks; parametric intervals are too narrow",
+            p_value(found.p, 0),
             found.sigma_max_over_min
         )
     })
@@ -384,7 +463,8 @@ fn stationarity_warning(findings: &Findings) -> Option<String> {
 fn normality_warning(findings: &Findings) -> Option<String> {
     let p = findings.normality_p.filter(|p| *p <= 2.0 * TEST_LEVEL)?;
     Some(format!(
-        "the residual is not normal ({}): trimming took another share of its variance than the fit assumes",
-        p_value(p)
+        "heights are not normal (p = {p:.3}; {} replicates tell no less than {:.3}): the correction for trimming assumes they are",
+        findings.replicates,
+        2.0 / (findings.replicates + 1) as f64
     ))
 }

@@ -4,7 +4,7 @@ use super::FitSettings;
 use crate::detrend::{BoxWindow, RunningBackground, band_rows};
 use rayon::prelude::*;
 
-/// A part of a raster of heights without outliers.
+/// A part of a raster of heights without objects.
 pub struct Part<'a> {
     /// Heights of the raster, m; NaN where there is no data or none that is trusted.
     pub heights: &'a [f64],
@@ -41,7 +41,7 @@ impl WindowTally {
     }
 }
 
-/// The residuals of a raster of heights without outliers (NaN: no data), in rows of `cols`, m.
+/// The residuals of a raster of heights without objects (NaN: no data), in rows of `cols`, m.
 pub fn residual(heights: &[f64], cols: usize, settings: &FitSettings, window: BoxWindow) -> Vec<f64> {
     let rows = heights.len().checked_div(cols).unwrap_or(0);
     let mut residual = Vec::new();

@@ -1,6 +1,6 @@
 //! What a fit knows of a DEM: which cells count, where residuals are cut off, and the covariance of what is left.
 //!
-//! Rows are read in strips, three times: to find outliers (each strip judged by its own robust scale, with two windows
+//! Rows are read in strips, three times: to find objects (each strip judged by its own robust scale, with two windows
 //! around it), to find the threshold, and to add up pairs of residuals. So memory is bounded by the strip and two bits per
 //! cell: two million cells, or eight windows (four of them around it) or four of the largest lags times the width where
 //! that is more, at about 40 bytes each. It grows with the raster's width, not with its length. Heights and residuals of a
@@ -15,7 +15,7 @@ use crate::covariance::masked::even_step;
 use crate::covariance::partial::DetrendedCells;
 use crate::covariance::{MaskedCovariance, PairSums};
 use crate::detrend::{BoxWindow, background};
-use crate::outliers;
+use crate::objects;
 use crate::sizes::Sizes;
 use sastrugi_numeric::{Geometry, sums};
 use sastrugi_statistics::normal;
@@ -247,13 +247,13 @@ impl Reading<'_> {
         for strip in self.strips() {
             let wide = self.widened(&strip, margin, rows);
             self.read(wide.clone(), 0..cols, &mut heights)?;
-            let outlier = match self.settings.find_outliers() {
-                true => outliers::find(&heights, cols, self.window),
+            let object = match self.settings.find_objects() {
+                true => objects::find(&heights, cols, self.window),
                 false => Vec::new(),
             };
             let own = (strip.start - wide.start) * cols..(strip.end - wide.start) * cols;
-            let found = outlier.get(own.clone()).unwrap_or_default().iter().copied().chain(repeat(false));
-            trusted.extend(heights[own.clone()].iter().zip(found).map(|(z, outlier)| !(z.is_nan() || outlier)));
+            let found = object.get(own.clone()).unwrap_or_default().iter().copied().chain(repeat(false));
+            trusted.extend(heights[own.clone()].iter().zip(found).map(|(z, object)| !(z.is_nan() || object)));
             for z in &heights[own] {
                 measured += usize::from(!z.is_nan());
                 lowest_m = f64::min(lowest_m, *z);

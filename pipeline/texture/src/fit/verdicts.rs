@@ -1,10 +1,10 @@
 //! What the data says about the fit: is there one scale, one model, one direction, one site?
 
+use super::FitError;
 use super::case::Case;
 use super::estimator::{Estimate, Estimator};
 use super::heights::Heights;
-use super::params::FitSettings;
-use super::resampling::{Block, Replicates, two_sided_p, upper_p};
+use super::resampling::{Block, Replicates, sill_over_range, two_sided_p, upper_p};
 use crate::covariance::Form;
 use crate::covariance::bins::Layout;
 use crate::covariance::form::Role;
@@ -28,7 +28,7 @@ pub struct AtWindow {
     pub estimate: Estimate,
     /// Whether the search for b ended within its bounds.
     is_range_told: bool,
-    /// Root mean square of what is below that scale, m.
+    /// Root mean square of what is below that scale, on the cells that all windows use, m.
     pub rms_m: f64,
 }
 
@@ -40,31 +40,60 @@ pub struct Windows {
 
 impl Windows {
     /// The fits of a part of the DEM, or of all of it: then `case` and `estimate` are the own fit.
-    pub fn of(part: &dyn Heights, case: &Case, estimate: &Estimate) -> Self {
-        let (settings, scale_m) = (case.settings, case.settings.outer_scale_m());
+    ///
+    /// # Errors
+    /// Heights that cannot be read.
+    pub fn of(part: &dyn Heights, case: &Case, estimate: &Estimate) -> Result<Self, FitError> {
+        let scale_m = case.settings.outer_scale_m();
         let is_whole = part.geometry().len() == case.geometry.len();
+        let settings = [1.0, 0.5, 2.0].map(|factor| case.settings.at_outer_scale(factor * scale_m));
         // Places of a site differ: windows are compared on the same ones.
-        let of_part = (!is_whole).then(|| at_window(part, settings, estimate, scale_m)).flatten();
-        let own = of_part.unwrap_or_else(|| AtWindow {
-            outer_scale_m: scale_m,
-            estimate: estimate.clone(),
-            is_range_told: is_range_told(case, estimate),
-            rms_m: case.survey.trim.rms_m,
+        let mut cases: Vec<Option<Case>> = settings.iter().map(|s| Case::new(part, s).ok()).collect();
+        let residuals =
+            cases.iter().map(|case| case.as_ref().map(Case::residual).transpose()).collect::<Result<Vec<_>, _>>()?;
+        let rms_m = common_rms_m(&residuals);
+        let others = cases.split_off(1).into_iter().zip(&rms_m[1..]);
+        let others = others.filter_map(|(case, rms_m)| Some(at_window(&case?, estimate, *rms_m))).collect();
+        let own = cases.pop().flatten().map(|own| match is_whole {
+            true => AtWindow::of(case, estimate.clone(), rms_m[0]),
+            false => at_window(&own, estimate, rms_m[0]),
         });
-        let others = [0.5, 2.0].into_iter().filter_map(|factor| at_window(part, settings, estimate, factor * scale_m));
-        Self { others: others.collect(), own }
+        Ok(Self { others, own: own.unwrap_or_else(|| AtWindow::of(case, estimate.clone(), case.survey.trim.rms_m)) })
+    }
+
+    /// Largest over smallest `sigma^2 / b` of all windows.
+    pub fn sill_over_range_spread(&self) -> Option<f64> {
+        let all = self.others.iter().chain([&self.own]).map(|w| sill_over_range(&w.estimate.covariance));
+        let all = all.collect::<Option<Vec<f64>>>()?;
+        let (low, high) = all.iter().fold((f64::INFINITY, 0.0f64), |(l, h), v| (l.min(*v), h.max(*v)));
+        (all.len() > 1).then_some(high / low)
     }
 }
 
-fn at_window(dem: &dyn Heights, settings: &FitSettings, estimate: &Estimate, outer_scale_m: f64) -> Option<AtWindow> {
-    let there = settings.at_outer_scale(outer_scale_m);
-    let case = Case::new(dem, &there).ok()?;
+/// Root mean square of each residual on the cells that all have, m; NaN for one that there is not.
+fn common_rms_m(residuals: &[Option<Vec<f64>>]) -> Vec<f64> {
+    let all: Vec<&Vec<f64>> = residuals.iter().flatten().collect();
+    let cells = all.first().map_or(0, |first| first.len());
+    let common: Vec<usize> = (0..cells).filter(|&k| all.iter().all(|residual| !residual[k].is_nan())).collect();
+    let of = |residual: Option<&Vec<f64>>| match residual {
+        Some(r) => sums::mean(&common.iter().map(|&k| r[k] * r[k]).collect::<Vec<_>>()).sqrt(),
+        None => f64::NAN,
+    };
+    residuals.iter().map(|residual| of(residual.as_ref())).collect()
+}
+
+fn at_window(case: &Case, estimate: &Estimate, rms_m: f64) -> AtWindow {
     let layout = if estimate.form.is_anisotropic() { Layout::DIRECTIONAL } else { Layout::ISOTROPIC };
     let bins = case.bins_of(layout);
     let (sigma_m, range_m) = (estimate.covariance.sigma_m(), estimate.covariance.range_m());
-    let estimate = Estimator::rough(&case, &bins).fit(&estimate.form, sigma_m, range_m);
-    let is_range_told = is_range_told(&case, &estimate);
-    Some(AtWindow { outer_scale_m, estimate, is_range_told, rms_m: case.survey.trim.rms_m })
+    AtWindow::of(case, Estimator::rough(case, &bins).fit(&estimate.form, sigma_m, range_m), rms_m)
+}
+
+impl AtWindow {
+    fn of(case: &Case, estimate: Estimate, rms_m: f64) -> Self {
+        let is_range_told = is_range_told(case, &estimate);
+        Self { outer_scale_m: case.settings.outer_scale_m(), estimate, is_range_told, rms_m }
+    }
 }
 
 /// Figures that are true at their scale where the surface has none of its own.

@@ -196,6 +196,18 @@ impl Wanted {
     }
 }
 
+/// What a reader of a texture must know of the fit that it is made from.
+pub fn fit_notes(fit: &FitFile) -> Vec<String> {
+    let range_m = fit.parameters.get("range_m").copied().filter(|_| fit.range_at_bound() && fit.map.is_none());
+    let bound = range_m.map(|range_m| {
+        format!(
+            "the fit did not identify the range: its search ended at {range_m:.4} m; the texture has the fit's increments at lags below its \
+             window, and waves longer than that by assumption"
+        )
+    });
+    bound.into_iter().collect()
+}
+
 impl From<Covariance> for Wanted {
     fn from(covariance: Covariance) -> Self {
         Self { covariance, quantiles_m: Vec::new(), window_m: None, cell_m: None, map: None }

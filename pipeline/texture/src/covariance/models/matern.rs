@@ -30,7 +30,7 @@ impl Model for Matern {
         Kind {
             family: "covariance",
             kind: "matern",
-            summary: "Matern or von Karman: smoothness nu, exponential at nu = 1/2",
+            summary: "Matern or von Karman: sigma^2 2^(1 - nu) / Gamma(nu) (lag / b)^nu K_nu(lag / b), smoothness nu (1/2: exponential)",
             source: "von Karman 1948; Matern 1960; Stein 1999, section 2.7",
             parameters: schema_of::<MaternParameters>(),
         }

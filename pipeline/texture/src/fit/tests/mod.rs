@@ -241,6 +241,9 @@ fn val_the_fit_file_is_complete() {
     let k = residual.values.iter().position(|r| !r.is_nan()).unwrap();
     assert_eq!(dem.values[k] - background.values[k], residual.values[k]);
     assert!(fit.warnings.is_empty(), "{:?}", fit.warnings);
+    assert!(fit.verdict.starts_with("the exponential model describes the surface below 1.980 m"), "{}", fit.verdict);
+    let carried = fit.carried.unwrap();
+    assert!((carried.rms_share - 1.0).abs() < 0.03 && carried.increments.len() == 4, "{carried:?}");
     for key in ["sigma2_over_range_m", "naive_range_m", "iterations", "misfit_m2", "lag_max_m", "trimmed_share"] {
         assert!(fit.diagnostics.contains_key(key), "{key}");
     }
@@ -251,7 +254,7 @@ fn val_the_fit_file_is_complete() {
 fn val_a_range_beyond_the_window_is_called_unidentifiable() {
     let s = settings(Mode::Corrected, 2.0, 0.05);
     let fit = fit(&field(6.0, 256, CELL_M, 1), &s, &streams()).unwrap().fit;
-    assert!(fit.warnings.iter().any(|w| w.starts_with("b is not identifiable")), "{:?}", fit.warnings);
+    assert!(fit.warnings.iter().any(|w| w.starts_with("b is not identified")), "{:?}", fit.warnings);
     let paper = super::fit(&field(0.28, 256, CELL_M, 1), &settings(Mode::Paper, 2.0, 0.05), &streams()).unwrap().fit;
     assert!(paper.warnings[0].starts_with("paper mode"));
 }
@@ -292,7 +295,7 @@ fn prop_strips_change_nothing_that_matters() {
     assert!((share - 0.95).abs() < 1e-5, "{share}");
 }
 
-/// The residual of a DEM without outliers by the background of all of it.
+/// The residual of a DEM without objects by the background of all of it.
 fn masked_residual(dem: &Grid, settings: &FitSettings, threshold_m: f64) -> Vec<f64> {
     let window = settings.window(&dem.geometry, false).unwrap();
     let found = crate::detrend::background(&dem.values, dem.cols(), window, settings.at_partial());
@@ -481,7 +484,7 @@ fn val_models_are_recovered() {
 fn val_a_full_fit_has_intervals_and_verdicts() {
     let dem = field(0.15, 256, CELL_M, 4);
     let fit = fit(&dem, &with_bootstrap("auto", 99), &streams()).unwrap().fit;
-    assert_eq!(fit.candidates.len(), 7);
+    assert_eq!(fit.candidates.len(), 9);
     assert_eq!(fit.candidates[0].aicc_above_best, Some(0.0));
     let exponential = fit.candidates.iter().find(|c| c.model == "exponential").unwrap();
     assert!(exponential.aicc_above_best.unwrap() < 6.0, "{:?}", fit.candidates);
@@ -543,7 +546,8 @@ fn val_effective_resolution() {
 fn val_no_scale_leads_with_scale_explicit_figures() {
     let truth = covariance("self_affine", &[("increment_1m_m", 0.1), ("hurst", 0.8)]);
     let found = fit(&field_of(&truth, 400, 3), &with_bootstrap("exponential", 0), &streams()).unwrap().fit;
-    assert!(found.warnings[0].starts_with("no scale separation: root mean square heights of"), "{:?}", found.warnings);
+    assert!(found.verdict.starts_with("no single scale below 1.980 m: publish band RMS"), "{}", found.verdict);
+    assert!(found.warnings.iter().any(|w| w.starts_with("no scale separation")), "{:?}", found.warnings);
     let figure = |name: &str| found.diagnostics[name].as_f64().unwrap();
     assert!((figure("hurst") - 0.8).abs() < 0.04 && (figure("increment_1m_m") / 0.1 - 1.0).abs() < 0.1, "{found:?}");
     // Below twice the window there is 2^H times the height.

@@ -3,7 +3,7 @@
 //! They must be found before the moving average, which would smear them over a window, and against a background that
 //! they do not move. So detection and background alternate: the residual to the moving average of the cells still
 //! trusted is compared with a robust scale (1.4826 times the median absolute residual, the standard deviation of
-//! normal data: Hampel, 1974); cells beyond [`SEED_SCALES`] are outliers, and so are the cells joined to them through
+//! normal data: Hampel, 1974); cells beyond [`SEED_SCALES`] are objects, and so are the cells joined to them through
 //! cells beyond [`GROWTH_SCALES`] (the skirt of a tree), with a margin of one cell. Every round judges all cells
 //! afresh, so that a cell pulled down by a tree nearby is taken back once the tree is out.
 //!
@@ -23,35 +23,35 @@ use crate::sizes::{NORMAL_CONSISTENCY, Sizes};
 use std::cell::OnceCell;
 use std::ops::Range;
 
-/// Robust standard deviations beyond which a cell is an outlier by itself.
+/// Robust standard deviations beyond which a cell is an object by itself.
 pub const SEED_SCALES: f64 = 5.0;
-/// Robust standard deviations beyond which a neighbour of an outlier is one too.
+/// Robust standard deviations beyond which a neighbour of an object is one too.
 pub const GROWTH_SCALES: f64 = 2.5;
 /// Blocks of a window whose median says what the surroundings of a cell are like.
 const BLOCKS: usize = 9;
 /// Most rounds of detection.
 const ROUNDS: usize = 12;
 
-/// True for the outliers of the row-major `values` (rows of `cols`, NaN where no data) about the moving average over
+/// True for the objects of the row-major `values` (rows of `cols`, NaN where no data) about the moving average over
 /// `window`.
 pub fn find(values: &[f64], cols: usize, window: BoxWindow) -> Vec<bool> {
-    let mut outlier = vec![false; values.len()];
+    let mut object = vec![false; values.len()];
     for _ in 0..ROUNDS {
-        let next = judge(values, &outlier, cols, window);
-        if next == outlier {
+        let next = judge(values, &object, cols, window);
+        if next == object {
             break;
         }
-        outlier = next;
+        object = next;
     }
-    outlier
+    object
 }
 
-/// Outliers about the background of the cells not marked in `outlier`.
-fn judge(values: &[f64], outlier: &[bool], cols: usize, window: BoxWindow) -> Vec<bool> {
-    let deviation = deviations(values, outlier, cols, window);
+/// Objects about the background of the cells not marked in `object`.
+fn judge(values: &[f64], object: &[bool], cols: usize, window: BoxWindow) -> Vec<bool> {
+    let deviation = deviations(values, object, cols, window);
     let scales = Scales::of(&deviation, cols, window);
     // Where nothing is left to judge by, a cell stays what it was.
-    let stays = |k: usize| outlier[k] && deviation[k].is_nan();
+    let stays = |k: usize| object[k] && deviation[k].is_nan();
     let seeds = (0..deviation.len()).map(|k| scales.exceeded(k, SEED_SCALES) || stays(k)).collect();
     let grown = grow(seeds, cols, |k| scales.exceeded(k, GROWTH_SCALES));
     with_margin(&grown, values, cols)

@@ -4,15 +4,15 @@ use sastrugi_numeric::Streams;
 const COLS: usize = 200;
 
 fn noise() -> Vec<f64> {
-    let mut s = Streams::for_seed(1, "outliers-test").stream("field");
+    let mut s = Streams::for_seed(1, "objects-test").stream("field");
     (0..COLS * COLS).map(|_| s.normal()).collect()
 }
 
 /// White normal cells: 40 000 cells, chance of any beyond 5 standard deviations 2.3 %; this field has none.
 #[test]
 fn val_a_surface_without_objects_is_left_alone() {
-    let outlier = find(&noise(), COLS, BoxWindow { half: [8, 8] });
-    assert_eq!(outlier.iter().filter(|&&o| o).count(), 0);
+    let object = find(&noise(), COLS, BoxWindow { half: [8, 8] });
+    assert_eq!(object.iter().filter(|&&o| o).count(), 0);
 }
 
 /// A cone 20 standard deviations high is taken out down to its skirt, and the hollow that it pulls into the moving
@@ -28,9 +28,9 @@ fn val_a_tree_is_found_whole() {
     for (k, v) in values.iter_mut().enumerate() {
         *v += (20.0 * (1.0 - radius(k) / 6.0)).max(0.0);
     }
-    let outlier = find(&values, COLS, BoxWindow { half: [8, 8] });
-    assert!((0..values.len()).filter(|&k| radius(k) < 4.0).all(|k| outlier[k]));
-    assert!((0..values.len()).filter(|&k| radius(k) > 12.0).all(|k| !outlier[k]));
+    let object = find(&values, COLS, BoxWindow { half: [8, 8] });
+    assert!((0..values.len()).filter(|&k| radius(k) < 4.0).all(|k| object[k]));
+    assert!((0..values.len()).filter(|&k| radius(k) > 12.0).all(|k| !object[k]));
 }
 
 #[test]
@@ -56,9 +56,9 @@ fn val_rough_places_are_no_objects() {
             *v += (20.0 * rough(top) * (1.0 - (x * x + y * y).sqrt() / 6.0)).max(0.0);
         }
     }
-    let outlier = find(&values, COLS, window);
-    assert!(tops.iter().all(|&top| outlier[top]));
-    assert!(outlier.iter().filter(|&&o| o).count() < 2 * 250);
+    let object = find(&values, COLS, window);
+    assert!(tops.iter().all(|&top| object[top]));
+    assert!(object.iter().filter(|&&o| o).count() < 2 * 250);
 }
 
 /// One line of cells: nine blocks along it.
@@ -66,9 +66,9 @@ fn val_rough_places_are_no_objects() {
 fn val_transects() {
     let mut values = noise()[..400].to_vec();
     values[200..206].iter_mut().for_each(|v| *v += 30.0);
-    let outlier = find(&values, 400, BoxWindow { half: [0, 15] });
-    assert!(outlier[200..206].iter().all(|o| *o));
-    assert!(outlier.iter().filter(|&&o| o).count() < 12);
+    let object = find(&values, 400, BoxWindow { half: [0, 15] });
+    assert!(object[200..206].iter().all(|o| *o));
+    assert!(object.iter().filter(|&&o| o).count() < 12);
 }
 
 /// Scales asked for cell by cell are those of the definition: medians of all blocks, then of nine about each.
