@@ -60,7 +60,7 @@ pub enum Verb {
     Terrain(Terrain),
     /// Fit the covariance of a measured DEM.
     #[command(after_help = "Examples:\n  sastrugi fit snow.tif --outer-scale 2 -o fit.json\n  \
-        sastrugi fit snow.tif --outer-scale 2 --model auto --bootstrap 199 -o fit.json\n  \
+        sastrugi fit snow.tif --outer-scale 2 --model auto --bootstrap 199 --plot fit.svg -o fit.json\n  \
         sastrugi fit snow.tif --outer-scale 2 --mask plot.geojson --exclude trees.geojson -o fit.json\n  \
         sastrugi fit scan.laz --cell 0.05 --statistic median --outer-scale 2 -o fit.json\n  \
         sastrugi fit snow_on.tif --minus snow_off.tif --outer-scale 2 --difference depth.tif -o depth.json")]
@@ -357,9 +357,20 @@ pub struct Fit {
     /// Background that the fit takes off, as a DEM: `texture --onto` it adds what it lacks.
     #[arg(long, value_name = "DEM")]
     pub background: Option<PathBuf>,
+    /// Other files that show the fit.
+    #[command(flatten)]
+    pub shown: FitShown,
     /// Any other parameter of the fit (see `kinds fit`), `name=value`.
     #[arg(long = "set", value_name = "K=V")]
     pub set: Vec<String>,
+}
+
+/// Files that show a fit.
+#[derive(Debug, Args)]
+pub struct FitShown {
+    /// Plot of the fit (.svg): covariance by lag and structure function, measured and model, and covariance by direction.
+    #[arg(long, value_name = "FILE.svg")]
+    pub plot: Option<PathBuf>,
 }
 
 /// `coregister`.

@@ -1,6 +1,7 @@
 //! Verbs that make or describe one file.
 
 use super::coregister::describe;
+use super::shown::ShownFiles;
 use super::{options, reading};
 use crate::Verdict;
 use crate::args::{Common, Detrend, Fit, Obstacles, Roughness, Terrain, Texture};
@@ -111,6 +112,7 @@ pub fn fit(args: &Fit, common: &Common) -> Verdict {
     let window = args.window.as_deref().map(|w| numbers::<4>("--window", w)).transpose()?;
     let noise_reference = args.noise_reference.clone();
     let reading = Reading { window, masks: args.masks.all(), noise_reference, ..reading(&args.reading)? };
+    let shown = ShownFiles::of(&args.shown)?;
     let request = verbs::fit::Request {
         dem: &args.dem,
         output: &args.output,
@@ -121,12 +123,14 @@ pub fn fit(args: &Fit, common: &Common) -> Verdict {
         difference: args.difference.as_deref(),
         map: args.map.as_deref(),
         background: args.background.as_deref(),
+        beside: shown.files(),
     };
     let verbs::fit::Done { fit, source, notes: read_notes } = verbs::fit::fit(&request)?;
     let fit = match fit {
         Ok(fit) => fit,
         Err(error) => return no_fit(&source, error, common),
     };
+    shown.write(&fit)?;
     let interval = |name: &str| {
         let [low, high] = fit.intervals.as_ref()?.values.get(name)?;
         let end = |end: &Option<f64>| end.map_or_else(|| "open".to_owned(), |v| format!("{v:.6}"));

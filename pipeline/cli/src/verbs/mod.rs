@@ -6,6 +6,7 @@ mod coregister;
 mod files;
 mod generate;
 mod lists;
+mod shown;
 mod study;
 
 use crate::Verdict;

@@ -41,6 +41,8 @@ pub struct Request<'a> {
     pub map: Option<&'a Path>,
     /// DEM to write with the background that the fit took off.
     pub background: Option<&'a Path>,
+    /// Other files that the caller writes about the fit: none may replace another file of this call.
+    pub beside: Vec<&'a Path>,
 }
 
 /// What came of a DEM. A co-registration in the source stands whatever the fit says.
@@ -88,9 +90,16 @@ fn written(request: &Request<'_>, outcome: FitOutcome, source: Source) -> Result
 fn check_outputs(request: &Request<'_>) -> Result<(), Error> {
     let rasters = [request.map, request.difference, request.background];
     rasters.into_iter().flatten().try_for_each(super::check_output)?;
-    let outputs: Vec<&Path> = [request.output].into_iter().chain(rasters.into_iter().flatten()).collect();
-    let inputs: Vec<&Path> = [request.dem].into_iter().chain(request.minus).collect();
+    let beside = request.beside.iter().copied();
+    let outputs: Vec<&Path> = [request.output].into_iter().chain(rasters.into_iter().flatten()).chain(beside).collect();
+    let inputs: Vec<&Path> = inputs(request).collect();
     super::check_distinct(&outputs, &inputs)
+}
+
+/// Every file that a fit reads.
+fn inputs<'a>(request: &'a Request<'_>) -> impl Iterator<Item = &'a Path> {
+    let masks = request.reading.masks.iter().map(|(path, _)| path.as_path());
+    [request.dem].into_iter().chain(request.minus).chain(masks).chain(request.reading.noise_reference.as_deref())
 }
 
 /// Writes the background that a fit took off, where it is asked for.
