@@ -1,6 +1,7 @@
 //! What `fit` writes beside its fit file.
 
 use sastrugi_tests::{area, sastrugi_in, write};
+use serde_json::Value;
 use std::path::Path;
 use tempfile::TempDir;
 
@@ -59,4 +60,32 @@ fn val_a_plot_shows_measured_and_model() {
         let arguments = ["snow.tif", "--exclude", "mask.svg", "--plot", same, "-o", "refused.svg"];
         refused(path, &arguments, "another file of this call");
     }
+}
+
+#[test]
+fn val_bins_are_flat_and_those_of_the_fit_file() {
+    let folder = site();
+    let path = folder.path();
+    assert_eq!(fit(path, &["snow.tif", "--csv", "bins.csv", "-o", "fit.json"]).code, 0);
+    let fit_file: Value = serde_json::from_str(&text(path, "fit.json")).unwrap();
+    let bins = text(path, "bins.csv");
+    let mut lines = bins.lines();
+    let header = "kind,lag_m,azimuth_deg,covariance_m2,pairs,model_m2,surface_model_m2";
+    assert_eq!(lines.next(), Some(header));
+    let rows: Vec<Vec<&str>> = lines.map(|line| line.split(',').collect()).collect();
+    assert!(rows.iter().all(|row| row.len() == 7));
+    let number = |text: &str| text.parse::<f64>().unwrap();
+    let (rings, directions): (Vec<_>, Vec<_>) = rows.iter().partition(|row| row[0] == "ring");
+    for (name, column) in [("lags_m", 1), ("covariance_m2", 3), ("pairs", 4), ("model_m2", 5), ("surface_model_m2", 6)] {
+        let stated: Vec<f64> = fit_file[name].as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect();
+        assert_eq!(rings.iter().map(|row| number(row[column])).collect::<Vec<_>>(), stated, "{name}");
+    }
+    let stated = fit_file["directions"].as_array().unwrap();
+    assert_eq!(directions.len(), stated.len());
+    for (row, bin) in directions.iter().zip(stated) {
+        assert_eq!([number(row[1]), number(row[2])], ["lag_m", "azimuth_deg"].map(|k| bin[k].as_f64().unwrap()));
+        assert!(row[0] == "direction" && row[6].is_empty());
+    }
+    refused(path, &["snow.tif", "--csv", "bins.txt", "-o", "refused.json"], ".csv");
+    refused(path, &["snow.tif", "--csv", "refused.csv", "-o", "refused.csv"], "another file of this call");
 }

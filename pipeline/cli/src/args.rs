@@ -371,6 +371,10 @@ pub struct FitShown {
     /// Plot of the fit (.svg): covariance by lag and structure function, measured and model, and covariance by direction.
     #[arg(long, value_name = "FILE.svg")]
     pub plot: Option<PathBuf>,
+    /// Bins of the covariance as flat CSV: kind (ring or direction), lag_m, azimuth_deg (clockwise from grid north),
+    /// covariance_m2, pairs, model_m2 (as the estimator sees it), surface_model_m2 (rings only).
+    #[arg(long, value_name = "FILE.csv")]
+    pub csv: Option<PathBuf>,
 }
 
 /// `coregister`.

@@ -4,12 +4,14 @@ use crate::args::FitShown;
 use crate::failure::Failure;
 use sastrugi_report::fit_svg;
 use sastrugi_schemas::fit::FitFile;
+use sastrugi_stages::verbs::fit::write_bins;
 use sastrugi_store::atomic;
 use std::path::Path;
 
 /// The files asked for, with endings that are known.
 pub struct ShownFiles<'a> {
     plot: Option<&'a Path>,
+    csv: Option<&'a Path>,
 }
 
 impl<'a> ShownFiles<'a> {
@@ -18,12 +20,14 @@ impl<'a> ShownFiles<'a> {
         let plot = args.plot.as_deref();
         let why = "plots are written as .svg, which browsers and drawing programs open and export to PNG or PDF";
         plot.into_iter().try_for_each(|path| check_ending(path, &["svg"], why))?;
-        Ok(Self { plot })
+        let csv = args.csv.as_deref();
+        csv.into_iter().try_for_each(|path| check_ending(path, &["csv"], "`--csv` writes a file that ends in .csv"))?;
+        Ok(Self { plot, csv })
     }
 
     /// All of them.
     pub fn files(&self) -> Vec<&'a Path> {
-        self.plot.into_iter().collect()
+        self.plot.into_iter().chain(self.csv).collect()
     }
 
     /// Writes them.
@@ -31,6 +35,9 @@ impl<'a> ShownFiles<'a> {
         if let Some(path) = self.plot {
             let name = fit.source.as_ref().map_or("fit", |source| source.file.as_str());
             write(path, &fit_svg(fit, name))?;
+        }
+        if let Some(path) = self.csv {
+            write_bins(path, fit)?;
         }
         Ok(())
     }

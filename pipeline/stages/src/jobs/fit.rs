@@ -328,7 +328,7 @@ fn misfit(fit: &FitFile) -> f64 {
 }
 
 /// Rings, then sectors.
-fn covariance_rows(id: &str, fit: &FitFile, band: &[[f64; 2]]) -> Vec<CovarianceRow> {
+pub fn covariance_rows(id: &str, fit: &FitFile, band: &[[f64; 2]]) -> Vec<CovarianceRow> {
     let at = |values: &[f64], bin: usize| values.get(bin).copied().unwrap_or(f64::NAN);
     let rings = fit.lags_m.len();
     let ring = |bin: usize| {

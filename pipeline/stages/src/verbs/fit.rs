@@ -5,14 +5,15 @@ use super::{Read, Reading, parameters, read, transects};
 use crate::error::Error;
 use crate::jobs::coregistration::{self, coregistered};
 use crate::jobs::dem::{input_error, metres_note};
-use crate::jobs::fit::{STAGE, check_noise_reference, noise_reference, to_json, with_source};
+use crate::jobs::fit::{STAGE, check_noise_reference, covariance_rows, noise_reference, to_json, with_source};
 use sastrugi_numeric::resample::in_metres;
 use sastrugi_numeric::{Geometry, Grid, Streams};
+use sastrugi_schemas::Cell;
 use sastrugi_schemas::coregistration::Minus;
 use sastrugi_schemas::fit::{FitFile, MaskSource, Source};
 use sastrugi_schemas::kind::{read_parameters, schema_of};
 use sastrugi_store::dem::{self, BlockReader, Crs, Format, ReadOptions};
-use sastrugi_store::{atomic, digest};
+use sastrugi_store::{atomic, csv, digest};
 use sastrugi_texture::coregister::Coregistered;
 use sastrugi_texture::noise::Noise;
 use sastrugi_texture::{FitError, FitOutcome, FitParameters, FitSettings, Heights, Profiles};
@@ -84,6 +85,32 @@ fn written(request: &Request<'_>, outcome: FitOutcome, source: Source) -> Result
     atomic::write(request.output, to_json(&fit)?.as_bytes())
         .map_err(|e| Error::failed(format!("{}: {e}", request.output.display())))?;
     Ok(fit)
+}
+
+/// Writes the bins of a fit as flat CSV: rings, then directions.
+///
+/// # Errors
+/// The file system refused.
+pub fn write_bins(path: &Path, fit: &FitFile) -> Result<(), Error> {
+    csv::write_rows(path, &BIN_COLUMNS, bins(fit)).map_err(|e| Error::failed(format!("{}: {e}", path.display())))
+}
+
+/// Columns of the bins.
+const BIN_COLUMNS: [&str; 7] =
+    ["kind", "lag_m", "azimuth_deg", "covariance_m2", "pairs", "model_m2", "surface_model_m2"];
+
+fn bins(fit: &FitFile) -> impl Iterator<Item = Vec<Cell>> {
+    covariance_rows("", fit, &[]).into_iter().map(|row| {
+        vec![
+            Cell::Text(if row.azimuth_deg.is_none() { "ring" } else { "direction" }.to_owned()),
+            Cell::F64(row.lag_m),
+            row.azimuth_deg.map_or(Cell::Null, Cell::F64),
+            Cell::F64(row.covariance_m2),
+            Cell::I64(row.pairs),
+            Cell::F64(row.model_m2),
+            Cell::F64(row.surface_model_m2),
+        ]
+    })
 }
 
 /// Refuses rasters that no DEM format has, and outputs that would replace another file of this fit.
