@@ -1,6 +1,7 @@
 //! Verbs that make or describe one file.
 
 use super::coregister::describe;
+use super::fits;
 use super::shown::ShownFiles;
 use super::{options, reading};
 use crate::Verdict;
@@ -95,27 +96,14 @@ fn notes(list: &Value) -> String {
 
 /// `fit`.
 pub fn fit(args: &Fit, common: &Common) -> Verdict {
-    let mut params = json!({});
-    parameters::assign(&mut params, &args.set)?;
-    let mut put = |key: &str, value: Option<Value>| {
-        if let Some(value) = value {
-            params[key] = value;
-        }
+    let ([dem], Some(output), None) = (&args.dems[..], &args.output, &args.table) else {
+        return fits::fits(args, common);
     };
-    put("outer_scale_m", args.outer_scale.map(|v| json!(v)));
-    put("mode", args.mode.as_ref().map(|v| json!(v)));
-    put("trim", args.trim.map(|v| json!(v)));
-    put("model", args.model.as_ref().map(|v| json!(v)));
-    put("bootstrap", args.bootstrap.map(|v| json!(v)));
-    put("noise_sigma_m", args.noise_sigma.map(|v| json!(v)));
-    put("inner_scale_m", args.inner_scale.map(|v| json!(v)));
-    let window = args.window.as_deref().map(|w| numbers::<4>("--window", w)).transpose()?;
-    let noise_reference = args.noise_reference.clone();
-    let reading = Reading { window, masks: args.masks.all(), noise_reference, ..reading(&args.reading)? };
+    let (params, reading) = (fit_parameters(args)?, fit_reading(args)?);
     let shown = ShownFiles::of(&args.shown)?;
     let request = verbs::fit::Request {
-        dem: &args.dem,
-        output: &args.output,
+        dem,
+        output: Some(output),
         parameters: params,
         seed: args.seed,
         reading,
@@ -141,11 +129,37 @@ pub fn fit(args: &Fit, common: &Common) -> Verdict {
         .iter()
         .map(|(name, value)| format!("{name} = {value:.6}{}", interval(name).unwrap_or_default()))
         .collect();
-    let mut text = format!("{}: {} ({}), {}", args.output.display(), fit.model, fit.mode, parameters.join(", "));
+    let mut text = format!("{}: {} ({}), {}", output.display(), fit.model, fit.mode, parameters.join(", "));
     read_notes.iter().for_each(|note| text.push_str(&format!("\n  note: {note}")));
     fit.warnings.iter().for_each(|warning| text.push_str(&format!("\n  warning: {warning}")));
     print(common.json, &serde_json::to_value(&fit).map_err(Failure::failed)?, &text)?;
     Ok(Code::Done)
+}
+
+/// Parameters of a fit as the options state them.
+pub fn fit_parameters(args: &Fit) -> Result<Value, Failure> {
+    let mut params = json!({});
+    parameters::assign(&mut params, &args.set)?;
+    let mut put = |key: &str, value: Option<Value>| {
+        if let Some(value) = value {
+            params[key] = value;
+        }
+    };
+    put("outer_scale_m", args.outer_scale.map(|v| json!(v)));
+    put("mode", args.mode.as_ref().map(|v| json!(v)));
+    put("trim", args.trim.map(|v| json!(v)));
+    put("model", args.model.as_ref().map(|v| json!(v)));
+    put("bootstrap", args.bootstrap.map(|v| json!(v)));
+    put("noise_sigma_m", args.noise_sigma.map(|v| json!(v)));
+    put("inner_scale_m", args.inner_scale.map(|v| json!(v)));
+    Ok(params)
+}
+
+/// What of a DEM is fitted, and how it is read.
+pub fn fit_reading(args: &Fit) -> Result<Reading, Failure> {
+    let window = args.window.as_deref().map(|w| numbers::<4>("--window", w)).transpose()?;
+    let noise_reference = args.noise_reference.clone();
+    Ok(Reading { window, masks: args.masks.all(), noise_reference, ..reading(&args.reading)? })
 }
 
 /// A co-registration stays where its difference could not be fitted: as JSON it stands where a fit file has it.

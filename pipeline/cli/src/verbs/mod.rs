@@ -4,6 +4,7 @@ mod analyze;
 mod compare;
 mod coregister;
 mod files;
+mod fits;
 mod generate;
 mod lists;
 mod shown;

@@ -251,7 +251,8 @@ pub fn to_json(fit: &FitFile) -> Result<String, JobError> {
     serde_json::to_string_pretty(fit).map(|text| text + "\n").map_err(JobError::new)
 }
 
-fn fit_row(id: &str, dem_id: &str, fit: &FitFile) -> FitRow {
+/// A fit as a row of the table `fits`.
+pub fn fit_row(id: &str, dem_id: &str, fit: &FitFile) -> FitRow {
     let parameter = |name: &str| fit.parameters.get(name).copied().unwrap_or(f64::NAN);
     let window = fit.window_m.unwrap_or([f64::NAN; 2]);
     // A sum of terms has no one sigma and b.

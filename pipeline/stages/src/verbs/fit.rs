@@ -26,8 +26,8 @@ use std::sync::Mutex;
 pub struct Request<'a> {
     /// Measured DEM.
     pub dem: &'a Path,
-    /// Fit file to write.
-    pub output: &'a Path,
+    /// Fit file to write, where one is wanted.
+    pub output: Option<&'a Path>,
     /// Parameters of the fit.
     pub parameters: Value,
     /// Seed of the replicates' random streams.
@@ -61,9 +61,7 @@ pub struct Done {
 /// # Errors
 /// Unknown parameters, a DEM that cannot be read or co-registered, a file that cannot be written.
 pub fn fit(request: &Request<'_>) -> Result<Done, Error> {
-    parameters::check_schema(&request.parameters, &schema_of::<FitParameters>(), "fit")?;
-    let raw: FitParameters = read_parameters(&request.parameters)?;
-    let settings = FitSettings::try_from(raw)?;
+    let settings = settings(&request.parameters)?;
     check_noise_reference(request.reading.noise_reference.is_some(), request.minus.is_some())?;
     check_outputs(request)?;
     let Fitted { outcome, notes, masked_share, noise, minus } = fitted(request, &settings)?;
@@ -75,6 +73,16 @@ pub fn fit(request: &Request<'_>) -> Result<Done, Error> {
     Ok(Done { fit, source, notes })
 }
 
+/// Checked parameters of a fit.
+///
+/// # Errors
+/// Unknown parameters, and those out of range.
+pub fn settings(parameters: &Value) -> Result<FitSettings, Error> {
+    parameters::check_schema(parameters, &schema_of::<FitParameters>(), "fit")?;
+    let raw: FitParameters = read_parameters(parameters)?;
+    Ok(FitSettings::try_from(raw)?)
+}
+
 /// Writes what was fitted.
 fn written(request: &Request<'_>, outcome: FitOutcome, source: Source) -> Result<FitFile, Error> {
     if let Some(path) = request.map {
@@ -82,8 +90,10 @@ fn written(request: &Request<'_>, outcome: FitOutcome, source: Source) -> Result
             .map_err(super::write_error)?;
     }
     let fit = with_source(outcome.fit, source);
-    atomic::write(request.output, to_json(&fit)?.as_bytes())
-        .map_err(|e| Error::failed(format!("{}: {e}", request.output.display())))?;
+    if let Some(path) = request.output {
+        atomic::write(path, to_json(&fit)?.as_bytes())
+            .map_err(|e| Error::failed(format!("{}: {e}", path.display())))?;
+    }
     Ok(fit)
 }
 
@@ -118,7 +128,7 @@ fn check_outputs(request: &Request<'_>) -> Result<(), Error> {
     let rasters = [request.map, request.difference, request.background];
     rasters.into_iter().flatten().try_for_each(super::check_output)?;
     let beside = request.beside.iter().copied();
-    let outputs: Vec<&Path> = [request.output].into_iter().chain(rasters.into_iter().flatten()).chain(beside).collect();
+    let outputs: Vec<&Path> = request.output.into_iter().chain(rasters.into_iter().flatten()).chain(beside).collect();
     let inputs: Vec<&Path> = inputs(request).collect();
     super::check_distinct(&outputs, &inputs)
 }
