@@ -5,6 +5,7 @@
 mod bad_input;
 mod compare;
 mod coregister;
+mod fit_outputs;
 mod metadata;
 mod minus;
 mod pack;

@@ -4,6 +4,7 @@
 //! * [`questions`]: one folder per question that the page answers (query, figure, table), listed in one registry.
 //! * [`papers`]: published figures as data.
 //! * [`releases`]: two releases beside each other, for the page and for the verb `compare`.
+//! * [`fit_svg`]: the picture of one fit file, for the verb `fit`.
 //! * [`mod@render`]: drawing, which knows nothing of what it draws.
 //! * [`data`]: the only way to the release's rows and files.
 //!
@@ -20,9 +21,11 @@ pub mod render;
 #[cfg(test)]
 mod tests;
 
+mod fit_figure;
 mod release;
 mod write;
 
+pub use fit_figure::fit_svg;
 pub use write::{Summary, render, render_with};
 
 use std::path::PathBuf;

@@ -59,10 +59,12 @@ pub enum Verb {
         sastrugi terrain weierstrass_mandelbrot --set fractal_dimension=2.4 --set size_px='[512, 512]' -o wm.png")]
     Terrain(Terrain),
     /// Fit the covariance of a measured DEM.
-    #[command(after_help = "Examples:\n  sastrugi fit snow.tif --outer-scale 2 -o fit.json\n  \
-        sastrugi fit snow.tif --outer-scale 2 --model auto --bootstrap 199 -o fit.json\n  \
+    #[command(after_help = "Exit code 3: some of several DEMs could not be fitted; 1: none of them.\n\n\
+        Examples:\n  sastrugi fit snow.tif --outer-scale 2 -o fit.json\n  \
+        sastrugi fit snow.tif --outer-scale 2 --model auto --bootstrap 199 --plot fit.svg -o fit.json\n  \
         sastrugi fit snow.tif --outer-scale 2 --mask plot.geojson --exclude trees.geojson -o fit.json\n  \
         sastrugi fit scan.laz --cell 0.05 --statistic median --outer-scale 2 -o fit.json\n  \
+        sastrugi fit march.tif april.tif may.tif --outer-scale 2 --table season.csv\n  \
         sastrugi fit snow_on.tif --minus snow_off.tif --outer-scale 2 --difference depth.tif -o depth.json")]
     Fit(Fit),
     /// Co-register DEM B to DEM A: shift, raise, tilt and their standard errors, NMAD before and after, and the difference.
@@ -159,7 +161,7 @@ impl Verb {
     pub fn output_file(&self) -> Option<&Path> {
         match self {
             Self::Terrain(args) => Some(&args.output),
-            Self::Fit(args) => Some(&args.output),
+            Self::Fit(args) => args.output.as_deref(),
             Self::Coregister(args) => args.output.as_deref(),
             Self::Texture(args) => Some(&args.output),
             Self::Convert(args) => Some(&args.output),
@@ -303,11 +305,16 @@ impl Masks {
 /// `fit`.
 #[derive(Debug, Args)]
 pub struct Fit {
-    /// Measured DEM.
-    pub dem: PathBuf,
-    /// Fit file to write.
-    #[arg(short, long, value_name = "FIT.json")]
-    pub output: PathBuf,
+    /// Measured DEM, or several to fit with the same settings.
+    #[arg(required = true, value_name = "DEM")]
+    pub dems: Vec<PathBuf>,
+    /// Fit file to write. Of several DEMs a folder, with a fit file named after each.
+    #[arg(short, long, value_name = "FIT.json", required_unless_present = "table")]
+    pub output: Option<PathBuf>,
+    /// Table with one row for each DEM, .parquet or .csv: file, the columns of `schema fits` with intervals, and error,
+    /// why a DEM could not be fitted.
+    #[arg(long, value_name = "FILE")]
+    pub table: Option<PathBuf>,
     /// Window of the moving average that separates background from texture, m.
     #[arg(long, value_name = "M", allow_negative_numbers = true)]
     pub outer_scale: Option<f64>,
@@ -357,9 +364,24 @@ pub struct Fit {
     /// Background that the fit takes off, as a DEM: `texture --onto` it adds what it lacks.
     #[arg(long, value_name = "DEM")]
     pub background: Option<PathBuf>,
+    /// Other files that show the fit.
+    #[command(flatten)]
+    pub shown: FitShown,
     /// Any other parameter of the fit (see `kinds fit`), `name=value`.
     #[arg(long = "set", value_name = "K=V")]
     pub set: Vec<String>,
+}
+
+/// Files that show a fit.
+#[derive(Debug, Args)]
+pub struct FitShown {
+    /// Plot of the fit (.svg): covariance by lag and structure function, measured and model, and covariance by direction.
+    #[arg(long, value_name = "FILE.svg")]
+    pub plot: Option<PathBuf>,
+    /// Bins of the covariance as flat CSV: kind (ring or direction), lag_m, azimuth_deg (clockwise from grid north),
+    /// covariance_m2, pairs, model_m2 (as the estimator sees it), surface_model_m2 (rings only).
+    #[arg(long, value_name = "FILE.csv")]
+    pub csv: Option<PathBuf>,
 }
 
 /// `coregister`.

@@ -10,6 +10,7 @@
 //! * Errors tell data that cannot be used (`unusable_input()`) from a file system that failed.
 
 pub mod atomic;
+pub mod csv;
 pub mod dem;
 pub mod digest;
 pub mod mask;

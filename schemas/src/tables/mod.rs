@@ -5,6 +5,7 @@
 pub mod candidate_curves;
 pub mod candidates;
 pub mod covariance;
+pub mod dem_fits;
 pub mod fits;
 pub mod height_distribution;
 pub mod likelihood_profile;
@@ -23,6 +24,7 @@ pub mod terrains;
 pub use candidate_curves::CandidateCurveRow;
 pub use candidates::CandidateRow;
 pub use covariance::CovarianceRow;
+pub use dem_fits::DemFitRow;
 pub use fits::FitRow;
 pub use height_distribution::HeightDistributionRow;
 pub use likelihood_profile::LikelihoodProfileRow;
@@ -85,7 +87,7 @@ pub struct Table {
 }
 
 /// All tables, in the order of the report and of `schema`.
-pub const ALL: [&Table; 18] = [
+pub const ALL: [&Table; 19] = [
     &TerrainRow::TABLE,
     &SurfaceRow::TABLE,
     &FitRow::TABLE,
@@ -104,6 +106,7 @@ pub const ALL: [&Table; 18] = [
     &SampleRow::TABLE,
     &ParameterRow::TABLE,
     &LogRow::TABLE,
+    &DemFitRow::TABLE,
 ];
 
 /// The table of that name.

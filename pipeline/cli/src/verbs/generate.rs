@@ -1,6 +1,8 @@
 //! Verbs that make or describe one file.
 
 use super::coregister::describe;
+use super::fits;
+use super::shown::ShownFiles;
 use super::{options, reading};
 use crate::Verdict;
 use crate::args::{Common, Detrend, Fit, Obstacles, Roughness, Terrain, Texture};
@@ -94,6 +96,42 @@ fn notes(list: &Value) -> String {
 
 /// `fit`.
 pub fn fit(args: &Fit, common: &Common) -> Verdict {
+    let ([dem], Some(output), None) = (&args.dems[..], &args.output, &args.table) else {
+        return fits::fits(args, common);
+    };
+    let (params, reading) = (fit_parameters(args)?, fit_reading(args)?);
+    let shown = ShownFiles::of(&args.shown)?;
+    let request = verbs::fit::Request {
+        dem,
+        output: Some(output),
+        parameters: params,
+        seed: args.seed,
+        reading,
+        minus: args.minus.as_deref(),
+        difference: args.difference.as_deref(),
+        map: args.map.as_deref(),
+        background: args.background.as_deref(),
+        beside: shown.files(),
+    };
+    let verbs::fit::Done { fit, source, notes: read_notes } = verbs::fit::fit(&request)?;
+    let fit = match fit {
+        Ok(fit) => fit,
+        Err(error) => return no_fit(&source, error, common),
+    };
+    shown.write(&fit)?;
+    let mut text = format!("{}: {} ({})", output.display(), fit.model, fit.mode);
+    if !fit.verdict.is_empty() {
+        text.push_str(&format!("\n  {}", fit.verdict));
+    }
+    text.push_str(&format!("\n  {}", fitted_parameters(&fit)));
+    read_notes.iter().for_each(|note| text.push_str(&format!("\n  note: {note}")));
+    fit.warnings.iter().for_each(|warning| text.push_str(&format!("\n  warning: {warning}")));
+    print(common.json, &serde_json::to_value(&fit).map_err(Failure::failed)?, &text)?;
+    Ok(Code::Done)
+}
+
+/// Parameters of a fit as the options state them.
+pub fn fit_parameters(args: &Fit) -> Result<Value, Failure> {
     let mut params = json!({});
     parameters::assign(&mut params, &args.set)?;
     let mut put = |key: &str, value: Option<Value>| {
@@ -108,34 +146,14 @@ pub fn fit(args: &Fit, common: &Common) -> Verdict {
     put("bootstrap", args.bootstrap.map(|v| json!(v)));
     put("noise_sigma_m", args.noise_sigma.map(|v| json!(v)));
     put("inner_scale_m", args.inner_scale.map(|v| json!(v)));
+    Ok(params)
+}
+
+/// What of a DEM is fitted, and how it is read.
+pub fn fit_reading(args: &Fit) -> Result<Reading, Failure> {
     let window = args.window.as_deref().map(|w| numbers::<4>("--window", w)).transpose()?;
     let noise_reference = args.noise_reference.clone();
-    let reading = Reading { window, masks: args.masks.all(), noise_reference, ..reading(&args.reading)? };
-    let request = verbs::fit::Request {
-        dem: &args.dem,
-        output: &args.output,
-        parameters: params,
-        seed: args.seed,
-        reading,
-        minus: args.minus.as_deref(),
-        difference: args.difference.as_deref(),
-        map: args.map.as_deref(),
-        background: args.background.as_deref(),
-    };
-    let verbs::fit::Done { fit, source, notes: read_notes } = verbs::fit::fit(&request)?;
-    let fit = match fit {
-        Ok(fit) => fit,
-        Err(error) => return no_fit(&source, error, common),
-    };
-    let mut text = format!("{}: {} ({})", args.output.display(), fit.model, fit.mode);
-    if !fit.verdict.is_empty() {
-        text.push_str(&format!("\n  {}", fit.verdict));
-    }
-    text.push_str(&format!("\n  {}", fitted_parameters(&fit)));
-    read_notes.iter().for_each(|note| text.push_str(&format!("\n  note: {note}")));
-    fit.warnings.iter().for_each(|warning| text.push_str(&format!("\n  warning: {warning}")));
-    print(common.json, &serde_json::to_value(&fit).map_err(Failure::failed)?, &text)?;
-    Ok(Code::Done)
+    Ok(Reading { window, masks: args.masks.all(), noise_reference, ..reading(&args.reading)? })
 }
 
 /// A co-registration stays where its difference could not be fitted: as JSON it stands where a fit file has it.

@@ -4,8 +4,10 @@ mod analyze;
 mod compare;
 mod coregister;
 mod files;
+mod fits;
 mod generate;
 mod lists;
+mod shown;
 mod study;
 
 use crate::Verdict;

@@ -251,7 +251,8 @@ pub fn to_json(fit: &FitFile) -> Result<String, JobError> {
     serde_json::to_string_pretty(fit).map(|text| text + "\n").map_err(JobError::new)
 }
 
-fn fit_row(id: &str, dem_id: &str, fit: &FitFile) -> FitRow {
+/// A fit as a row of the table `fits`.
+pub fn fit_row(id: &str, dem_id: &str, fit: &FitFile) -> FitRow {
     let parameter = |name: &str| fit.parameters.get(name).copied().unwrap_or(f64::NAN);
     let window = fit.window_m.unwrap_or([f64::NAN; 2]);
     // A sum of terms has no one sigma and b.
@@ -328,7 +329,7 @@ fn misfit(fit: &FitFile) -> f64 {
 }
 
 /// Rings, then sectors.
-fn covariance_rows(id: &str, fit: &FitFile, band: &[[f64; 2]]) -> Vec<CovarianceRow> {
+pub fn covariance_rows(id: &str, fit: &FitFile, band: &[[f64; 2]]) -> Vec<CovarianceRow> {
     let at = |values: &[f64], bin: usize| values.get(bin).copied().unwrap_or(f64::NAN);
     let rings = fit.lags_m.len();
     let ring = |bin: usize| {

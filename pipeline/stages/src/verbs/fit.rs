@@ -5,14 +5,15 @@ use super::{Read, Reading, parameters, read, transects};
 use crate::error::Error;
 use crate::jobs::coregistration::{self, coregistered};
 use crate::jobs::dem::{input_error, metres_note};
-use crate::jobs::fit::{STAGE, check_noise_reference, noise_reference, to_json, with_source};
+use crate::jobs::fit::{STAGE, check_noise_reference, covariance_rows, noise_reference, to_json, with_source};
 use sastrugi_numeric::resample::in_metres;
 use sastrugi_numeric::{Geometry, Grid, Streams};
+use sastrugi_schemas::Cell;
 use sastrugi_schemas::coregistration::Minus;
 use sastrugi_schemas::fit::{FitFile, MaskSource, Source};
 use sastrugi_schemas::kind::{read_parameters, schema_of};
 use sastrugi_store::dem::{self, BlockReader, Crs, Format, ReadOptions};
-use sastrugi_store::{atomic, digest};
+use sastrugi_store::{atomic, csv, digest};
 use sastrugi_texture::coregister::Coregistered;
 use sastrugi_texture::noise::Noise;
 use sastrugi_texture::{FitError, FitOutcome, FitParameters, FitSettings, Heights, Profiles};
@@ -25,8 +26,8 @@ use std::sync::Mutex;
 pub struct Request<'a> {
     /// Measured DEM.
     pub dem: &'a Path,
-    /// Fit file to write.
-    pub output: &'a Path,
+    /// Fit file to write, where one is wanted.
+    pub output: Option<&'a Path>,
     /// Parameters of the fit.
     pub parameters: Value,
     /// Seed of the replicates' random streams.
@@ -41,6 +42,8 @@ pub struct Request<'a> {
     pub map: Option<&'a Path>,
     /// DEM to write with the background that the fit took off.
     pub background: Option<&'a Path>,
+    /// Other files that the caller writes about the fit: none may replace another file of this call.
+    pub beside: Vec<&'a Path>,
 }
 
 /// What came of a DEM. A co-registration in the source stands whatever the fit says.
@@ -58,9 +61,7 @@ pub struct Done {
 /// # Errors
 /// Unknown parameters, a DEM that cannot be read or co-registered, a file that cannot be written.
 pub fn fit(request: &Request<'_>) -> Result<Done, Error> {
-    parameters::check_schema(&request.parameters, &schema_of::<FitParameters>(), "fit")?;
-    let raw: FitParameters = read_parameters(&request.parameters)?;
-    let settings = FitSettings::try_from(raw)?;
+    let settings = settings(&request.parameters)?;
     check_noise_reference(request.reading.noise_reference.is_some(), request.minus.is_some())?;
     check_outputs(request)?;
     let Fitted { outcome, notes, masked_share, noise, minus } = fitted(request, &settings)?;
@@ -72,6 +73,16 @@ pub fn fit(request: &Request<'_>) -> Result<Done, Error> {
     Ok(Done { fit, source, notes })
 }
 
+/// Checked parameters of a fit.
+///
+/// # Errors
+/// Unknown parameters, and those out of range.
+pub fn settings(parameters: &Value) -> Result<FitSettings, Error> {
+    parameters::check_schema(parameters, &schema_of::<FitParameters>(), "fit")?;
+    let raw: FitParameters = read_parameters(parameters)?;
+    Ok(FitSettings::try_from(raw)?)
+}
+
 /// Writes what was fitted.
 fn written(request: &Request<'_>, outcome: FitOutcome, source: Source) -> Result<FitFile, Error> {
     if let Some(path) = request.map {
@@ -79,18 +90,53 @@ fn written(request: &Request<'_>, outcome: FitOutcome, source: Source) -> Result
             .map_err(super::write_error)?;
     }
     let fit = with_source(outcome.fit, source);
-    atomic::write(request.output, to_json(&fit)?.as_bytes())
-        .map_err(|e| Error::failed(format!("{}: {e}", request.output.display())))?;
+    if let Some(path) = request.output {
+        atomic::write(path, to_json(&fit)?.as_bytes())
+            .map_err(|e| Error::failed(format!("{}: {e}", path.display())))?;
+    }
     Ok(fit)
+}
+
+/// Writes the bins of a fit as flat CSV: rings, then directions.
+///
+/// # Errors
+/// The file system refused.
+pub fn write_bins(path: &Path, fit: &FitFile) -> Result<(), Error> {
+    csv::write_rows(path, &BIN_COLUMNS, bins(fit)).map_err(|e| Error::failed(format!("{}: {e}", path.display())))
+}
+
+/// Columns of the bins.
+const BIN_COLUMNS: [&str; 7] =
+    ["kind", "lag_m", "azimuth_deg", "covariance_m2", "pairs", "model_m2", "surface_model_m2"];
+
+fn bins(fit: &FitFile) -> impl Iterator<Item = Vec<Cell>> {
+    covariance_rows("", fit, &[]).into_iter().map(|row| {
+        vec![
+            Cell::Text(if row.azimuth_deg.is_none() { "ring" } else { "direction" }.to_owned()),
+            Cell::F64(row.lag_m),
+            row.azimuth_deg.map_or(Cell::Null, Cell::F64),
+            Cell::F64(row.covariance_m2),
+            Cell::I64(row.pairs),
+            Cell::F64(row.model_m2),
+            Cell::F64(row.surface_model_m2),
+        ]
+    })
 }
 
 /// Refuses rasters that no DEM format has, and outputs that would replace another file of this fit.
 fn check_outputs(request: &Request<'_>) -> Result<(), Error> {
     let rasters = [request.map, request.difference, request.background];
     rasters.into_iter().flatten().try_for_each(super::check_output)?;
-    let outputs: Vec<&Path> = [request.output].into_iter().chain(rasters.into_iter().flatten()).collect();
-    let inputs: Vec<&Path> = [request.dem].into_iter().chain(request.minus).collect();
+    let beside = request.beside.iter().copied();
+    let outputs: Vec<&Path> = request.output.into_iter().chain(rasters.into_iter().flatten()).chain(beside).collect();
+    let inputs: Vec<&Path> = inputs(request).collect();
     super::check_distinct(&outputs, &inputs)
+}
+
+/// Every file that a fit reads.
+fn inputs<'a>(request: &'a Request<'_>) -> impl Iterator<Item = &'a Path> {
+    let masks = request.reading.masks.iter().map(|(path, _)| path.as_path());
+    [request.dem].into_iter().chain(request.minus).chain(masks).chain(request.reading.noise_reference.as_deref())
 }
 
 /// Writes the background that a fit took off, where it is asked for.

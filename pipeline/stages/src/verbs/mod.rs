@@ -4,6 +4,7 @@ pub mod analyze;
 pub mod compare;
 pub mod coregister;
 pub mod fit;
+pub mod fits;
 pub mod hillshade;
 pub mod parameters;
 mod reading;

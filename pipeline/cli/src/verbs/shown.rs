@@ -1,0 +1,57 @@
+//! Files that show a fit beside its fit file.
+
+use crate::args::FitShown;
+use crate::failure::Failure;
+use sastrugi_report::fit_svg;
+use sastrugi_schemas::fit::FitFile;
+use sastrugi_stages::verbs::fit::write_bins;
+use sastrugi_store::atomic;
+use std::path::Path;
+
+/// The files asked for, with endings that are known.
+pub struct ShownFiles<'a> {
+    plot: Option<&'a Path>,
+    csv: Option<&'a Path>,
+}
+
+impl<'a> ShownFiles<'a> {
+    /// Refuses endings that nothing is written as.
+    pub fn of(args: &'a FitShown) -> Result<Self, Failure> {
+        let plot = args.plot.as_deref();
+        let why = "plots are written as .svg, which browsers and drawing programs open and export to PNG or PDF";
+        plot.into_iter().try_for_each(|path| check_ending(path, &["svg"], why))?;
+        let csv = args.csv.as_deref();
+        csv.into_iter().try_for_each(|path| check_ending(path, &["csv"], "`--csv` writes a file that ends in .csv"))?;
+        Ok(Self { plot, csv })
+    }
+
+    /// All of them.
+    pub fn files(&self) -> Vec<&'a Path> {
+        self.plot.into_iter().chain(self.csv).collect()
+    }
+
+    /// Writes them.
+    pub fn write(&self, fit: &FitFile) -> Result<(), Failure> {
+        if let Some(path) = self.plot {
+            let name = fit.source.as_ref().map_or("fit", |source| source.file.as_str());
+            write(path, &fit_svg(fit, name))?;
+        }
+        if let Some(path) = self.csv {
+            write_bins(path, fit)?;
+        }
+        Ok(())
+    }
+}
+
+/// Refuses a file whose ending is not among those given.
+pub fn check_ending(path: &Path, endings: &[&str], why: &str) -> Result<(), Failure> {
+    let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase());
+    match ending {
+        Some(ending) if endings.contains(&ending.as_str()) => Ok(()),
+        _ => Err(Failure::usage(format!("{}: {why}", path.display()))),
+    }
+}
+
+fn write(path: &Path, text: &str) -> Result<(), Failure> {
+    atomic::write(path, text.as_bytes()).map_err(|e| Failure::failed(format!("{}: {e}", path.display())))
+}

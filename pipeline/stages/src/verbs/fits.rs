@@ -1,0 +1,126 @@
+//! `fit` of several DEMs with the same settings: a table with one row for each, and a fit file for each where asked for.
+//! A DEM that cannot be fitted has a row that says why.
+
+use super::fit::{self, Done};
+use super::{Reading, check_distinct};
+use crate::error::Error;
+use crate::jobs::fit::fit_row;
+use sastrugi_schemas::fit::FitFile;
+use sastrugi_schemas::tables::{DemFitRow, FitRow};
+use sastrugi_store::parquet::{TableMetadata, TableWriter};
+use sastrugi_store::{PROGRAM, csv};
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// What to fit.
+pub struct Request<'a> {
+    /// Measured DEMs.
+    pub dems: &'a [PathBuf],
+    /// Fit file of a single DEM; of several a folder for their fit files, `<name of the DEM>.json`. None are written without it.
+    pub output: Option<&'a Path>,
+    /// Table to write, .csv or .parquet.
+    pub table: Option<&'a Path>,
+    /// Parameters of every fit.
+    pub parameters: Value,
+    /// Seed of the replicates' random streams, the same for every DEM.
+    pub seed: u64,
+    /// What of each DEM to take, and how.
+    pub reading: Reading,
+    /// DEM that is co-registered to each and subtracted.
+    pub minus: Option<&'a Path>,
+}
+
+/// Fits every DEM; `hear` is told of each as it is done. The rows are sorted by file.
+///
+/// # Errors
+/// Unknown parameters; outputs that would replace another file; a table that cannot be written. What is wrong with one DEM
+/// stands in its row.
+pub fn fits(request: &Request<'_>, hear: &mut dyn FnMut(&Path, &Result<Done, Error>)) -> Result<Vec<DemFitRow>, Error> {
+    fit::settings(&request.parameters)?;
+    let outputs = fit_files(request)?;
+    let mut rows = Vec::new();
+    for (dem, output) in request.dems.iter().zip(&outputs) {
+        let one = fit::Request {
+            dem,
+            output: output.as_deref(),
+            parameters: request.parameters.clone(),
+            seed: request.seed,
+            reading: request.reading.clone(),
+            minus: request.minus,
+            difference: None,
+            map: None,
+            background: None,
+            beside: request.table.into_iter().collect(),
+        };
+        let done = fit::fit(&one);
+        hear(dem, &done);
+        rows.push(row(dem, done));
+    }
+    rows.sort_by(|a, b| a.file.cmp(&b.file));
+    request.table.map(|path| write(path, &rows)).transpose()?;
+    Ok(rows)
+}
+
+/// The fit file of each DEM, none of which replaces another or an input.
+fn fit_files(request: &Request<'_>) -> Result<Vec<Option<PathBuf>>, Error> {
+    let mut owners: BTreeMap<PathBuf, &Path> = BTreeMap::new();
+    let single = request.dems.len() == 1;
+    let of = |dem: &PathBuf| {
+        request.output.map(|path| if single { path.to_owned() } else { path.join(format!("{}.json", stem(dem))) })
+    };
+    let files: Vec<Option<PathBuf>> = request.dems.iter().map(of).collect();
+    for (dem, file) in request.dems.iter().zip(&files) {
+        let Some(file) = file else { continue };
+        if let Some(other) = owners.insert(file.clone(), dem) {
+            let message = format!(
+                "{} and {} would both be fitted to {}; rename one, or leave `-o` out",
+                other.display(),
+                dem.display(),
+                file.display()
+            );
+            return Err(Error::Usage(message));
+        }
+    }
+    let outputs: Vec<&Path> = files.iter().flatten().map(PathBuf::as_path).chain(request.table).collect();
+    let dems: Vec<&Path> = request.dems.iter().map(PathBuf::as_path).collect();
+    let masks = request.reading.masks.iter().map(|(path, _)| path.as_path());
+    let others = masks.chain(request.minus).chain(request.reading.noise_reference.as_deref());
+    let inputs: Vec<&Path> = dems.iter().copied().chain(others).collect();
+    check_distinct(&outputs, &inputs)?;
+    check_distinct(&dems, &[]).map_err(|_| {
+        let message = "a DEM is named twice; a table has one row for each";
+        Error::Usage(message.to_owned())
+    })?;
+    Ok(files)
+}
+
+fn stem(path: &Path) -> String {
+    path.file_stem().map_or_else(String::new, |name| name.to_string_lossy().into_owned())
+}
+
+fn row(dem: &Path, done: Result<Done, Error>) -> DemFitRow {
+    let (id, file) = (stem(dem), dem.display().to_string());
+    match done.and_then(|done| done.fit) {
+        Ok(fit) => DemFitRow { file, fit: fit_row(&id, &id, &fit), error: None },
+        Err(error) => {
+            let nothing = fit_row(&id, &id, &FitFile::default());
+            // What a fit file may leave out has a default there; here it is not known.
+            let unknown = FitRow { nugget_m2: f64::NAN, ratio: f64::NAN, trim_level: f64::NAN, ..nothing };
+            DemFitRow { file, fit: unknown, error: Some(error.to_string()) }
+        }
+    }
+}
+
+/// Writes the table `dem_fits`: as CSV where the name ends so, else as Parquet.
+fn write(path: &Path, rows: &[DemFitRow]) -> Result<(), Error> {
+    if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("csv")) {
+        return csv::write_records(path, rows).map_err(|e| Error::failed(format!("{}: {e}", path.display())));
+    }
+    let metadata =
+        TableMetadata { study_sha256: String::new(), seed: 0, version: PROGRAM.to_owned(), license: String::new() };
+    let mut writer = TableWriter::create(path, &metadata).map_err(Error::failed)?;
+    rows.iter().try_for_each(|row| writer.push(row)).map_err(Error::failed)?;
+    writer.finish().map_err(Error::failed)?;
+    Ok(())
+}

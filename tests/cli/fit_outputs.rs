@@ -1,0 +1,175 @@
+//! What `fit` writes beside its fit file.
+
+use sastrugi_tests::{area, sastrugi_in, write};
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::path::Path;
+use tempfile::TempDir;
+
+const FIT: &str = r#"{"model": "exponential", "parameters": {"sigma_m": 0.02, "range_m": 0.3}}"#;
+const QUICK: [&str; 4] = ["--outer-scale", "1.5", "--bootstrap", "0"];
+
+/// A folder with a snow-like DEM, `snow.tif`.
+fn site() -> TempDir {
+    let folder = area();
+    snow(folder.path(), "snow.tif", "1");
+    folder
+}
+
+fn snow(folder: &Path, name: &str, seed: &str) {
+    write(folder, "truth.json", FIT);
+    let call = ["texture", "truth.json", "--size", "12x12", "--cell", "0.1", "--phase", "gaussian", "--seed", seed];
+    assert_eq!(sastrugi_in(folder, &[&call[..], &["-o", name]].concat()).code, 0);
+}
+
+fn fit(folder: &Path, arguments: &[&str]) -> sastrugi_tests::Called {
+    sastrugi_in(folder, &[&["fit"], arguments, &QUICK].concat())
+}
+
+fn text(folder: &Path, name: &str) -> String {
+    std::fs::read_to_string(folder.join(name)).unwrap()
+}
+
+/// The call is refused as bad usage with the words, and writes no fit file.
+fn refused(folder: &Path, arguments: &[&str], words: &str) {
+    let call = fit(folder, arguments);
+    assert_eq!(call.code, 2, "{arguments:?}: {}", call.stderr);
+    assert!(call.stderr.contains(words), "{arguments:?}: {}", call.stderr);
+    assert!(!folder.join("refused.json").exists(), "{arguments:?}");
+}
+
+#[test]
+fn val_a_plot_shows_measured_and_model() {
+    let folder = site();
+    let path = folder.path();
+    let call = fit(path, &["snow.tif", "--plot", "plot.svg", "-o", "fit.json"]);
+    assert_eq!(call.code, 0, "{}", call.stderr);
+    let svg = text(path, "plot.svg");
+    for words in ["snow.tif", "covariance, m²", "structure function, m²", "model of the surface", "90°", "σ = 0.0"]
+    {
+        assert!(svg.contains(words), "{words}");
+    }
+    // The picture changes nothing of the fit, and the same call makes the same picture.
+    assert_eq!(fit(path, &["snow.tif", "--plot", "again.svg", "-o", "other.json"]).code, 0);
+    assert_eq!(svg, text(path, "again.svg"));
+    assert_eq!(text(path, "fit.json"), text(path, "other.json"));
+
+    refused(path, &["snow.tif", "--plot", "plot.png", "-o", "refused.json"], ".svg");
+    refused(path, &["snow.tif", "--plot", "plot", "-o", "refused.json"], ".svg");
+    write(path, "mask.svg", "");
+    for same in ["refused.svg", "mask.svg"] {
+        let arguments = ["snow.tif", "--exclude", "mask.svg", "--plot", same, "-o", "refused.svg"];
+        refused(path, &arguments, "another file of this call");
+    }
+}
+
+#[test]
+fn val_bins_are_flat_and_those_of_the_fit_file() {
+    let folder = site();
+    let path = folder.path();
+    assert_eq!(fit(path, &["snow.tif", "--csv", "bins.csv", "-o", "fit.json"]).code, 0);
+    let fit_file: Value = serde_json::from_str(&text(path, "fit.json")).unwrap();
+    let bins = text(path, "bins.csv");
+    let mut lines = bins.lines();
+    let header = "kind,lag_m,azimuth_deg,covariance_m2,pairs,model_m2,surface_model_m2";
+    assert_eq!(lines.next(), Some(header));
+    let rows: Vec<Vec<&str>> = lines.map(|line| line.split(',').collect()).collect();
+    assert!(rows.iter().all(|row| row.len() == 7));
+    let number = |text: &str| text.parse::<f64>().unwrap();
+    let (rings, directions): (Vec<_>, Vec<_>) = rows.iter().partition(|row| row[0] == "ring");
+    for (name, column) in [("lags_m", 1), ("covariance_m2", 3), ("pairs", 4), ("model_m2", 5), ("surface_model_m2", 6)]
+    {
+        let stated: Vec<f64> = fit_file[name].as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect();
+        assert_eq!(rings.iter().map(|row| number(row[column])).collect::<Vec<_>>(), stated, "{name}");
+    }
+    let stated = fit_file["directions"].as_array().unwrap();
+    assert_eq!(directions.len(), stated.len());
+    for (row, bin) in directions.iter().zip(stated) {
+        assert_eq!([number(row[1]), number(row[2])], ["lag_m", "azimuth_deg"].map(|k| bin[k].as_f64().unwrap()));
+        assert!(row[0] == "direction" && row[6].is_empty());
+    }
+    refused(path, &["snow.tif", "--csv", "bins.txt", "-o", "refused.json"], ".csv");
+    refused(path, &["snow.tif", "--csv", "refused.csv", "-o", "refused.csv"], "another file of this call");
+}
+
+/// Rows of a table as CSV, by the names of the columns.
+fn table(folder: &Path, name: &str) -> Vec<BTreeMap<String, String>> {
+    let text = text(folder, name);
+    let mut lines = text.lines().map(|line| line.split(',').map(str::to_owned).collect::<Vec<_>>());
+    let header = lines.next().unwrap();
+    lines.map(|row| header.iter().cloned().zip(row).collect()).collect()
+}
+
+#[test]
+fn val_several_dems_make_one_table() {
+    let folder = site();
+    let path = folder.path();
+    snow(path, "april.tif", "2");
+    let arguments = ["snow.tif", "april.tif", "--table", "season.csv", "-o", "fits"];
+    let call = fit(path, &arguments);
+    assert_eq!(call.code, 0, "{}", call.stderr);
+    let rows = table(path, "season.csv");
+    assert_eq!(rows.iter().map(|row| row["file"].as_str()).collect::<Vec<_>>(), ["april.tif", "snow.tif"]);
+    for (row, name) in rows.iter().zip(["april", "snow"]) {
+        let fit_file: Value = serde_json::from_str(&text(path, &format!("fits/{name}.json"))).unwrap();
+        assert_eq!(row["fit_id"], name);
+        assert_eq!(row["sigma_m"].parse::<f64>().ok(), fit_file["parameters"]["sigma_m"].as_f64());
+        assert!(row["error"].is_empty() && row.contains_key("sigma2_over_range_high_m"));
+    }
+    // The fit of each is the one it has alone.
+    assert_eq!(fit(path, &["snow.tif", "-o", "alone.json"]).code, 0);
+    assert_eq!(text(path, "alone.json"), text(path, "fits/snow.json"));
+
+    // The same as Parquet, read by another path of the program; without -o there are no fit files.
+    assert_eq!(fit(path, &["snow.tif", "april.tif", "--table", "season.parquet"]).code, 0);
+    let info = sastrugi_in(path, &["info", "season.parquet"]);
+    assert!(info.code == 0 && info.stdout.contains("dem_fits"), "{}{}", info.stdout, info.stderr);
+    assert!(!path.join("snow.json").exists());
+}
+
+#[test]
+fn val_one_failing_dem_does_not_lose_the_others() {
+    let folder = site();
+    let path = folder.path();
+    write(path, "broken.tif", "no raster");
+    let call = fit(path, &["broken.tif", "snow.tif", "--table", "some.csv"]);
+    assert_eq!(call.code, 3, "{}", call.stderr);
+    assert!(call.stderr.contains("broken.tif"), "{}", call.stderr);
+    let rows = table(path, "some.csv");
+    assert!(rows[0]["error"].contains("broken.tif") && rows[0]["sigma_m"].is_empty() && rows[0]["ratio"].is_empty());
+    assert!(rows[1]["error"].is_empty() && rows[1]["sigma_m"].parse::<f64>().is_ok());
+
+    let call = fit(path, &["broken.tif", "absent.tif", "--table", "none.csv"]);
+    assert_eq!(call.code, 1, "{}", call.stderr);
+    assert!(table(path, "none.csv").iter().all(|row| !row["error"].is_empty()));
+}
+
+#[test]
+fn val_tables_that_would_replace_a_file_are_refused() {
+    let folder = site();
+    let path = folder.path();
+    let dem = std::fs::read(path.join("snow.tif")).unwrap();
+    snow(path, "april.tif", "2");
+    std::fs::create_dir(path.join("other")).unwrap();
+    std::fs::write(path.join("other/snow.tif"), &dem).unwrap();
+    for (arguments, words) in [
+        (&["snow.tif", "april.tif", "--table", "t.txt"][..], ".parquet or .csv"),
+        (&["snow.tif", "april.tif", "--table", "t.csv", "--map", "m.tif"], "`--map` shows one DEM"),
+        (&["snow.tif", "april.tif", "--table", "t.csv", "--plot", "p.svg"], "`--plot` shows one DEM"),
+        (&["snow.tif", "snow.tif", "--table", "t.csv"], "named twice"),
+        (&["snow.tif", "other/snow.tif", "--table", "t.csv", "-o", "fits"], "would both be fitted to"),
+        (&["snow.tif", "april.tif", "--table", "t.csv", "--outer-scale", "-1"], "outer_scale_m"),
+        (&["snow.tif", "april.tif"], "--output"),
+    ] {
+        let call = match arguments.contains(&"-1") {
+            true => sastrugi_in(path, &[&["fit"], arguments].concat()),
+            false => fit(path, arguments),
+        };
+        assert!(call.code == 2 && call.stderr.contains(words), "{arguments:?}: {} {}", call.code, call.stderr);
+        assert!(!path.join("t.csv").exists() && !path.join("fits").exists());
+    }
+    // A mask's name is an input as well.
+    write(path, "plot.csv", "");
+    let call = fit(path, &["snow.tif", "april.tif", "--exclude", "plot.csv", "--table", "plot.csv"]);
+    assert!(call.code != 0 && text(path, "plot.csv").is_empty(), "{}", call.stderr);
+}
