@@ -7,7 +7,7 @@
 //!   transform. The reference: it keeps what it says and nothing else.
 //! * [`Detrender::MovingAverage`]: heights less their mean over `lambda_max` x `lambda_max` (the odd number of cells nearest
 //!   to it), where more than half of it holds data. The plain mean, as published, also at borders and holes: on a slope it
-//!   is off by slope times the distance of a partial window's centroid.
+//!   is off by slope times the distance of a partial window's centroid. [`crate::band_rms`] takes a plane there.
 //! * [`Detrender::Exponential`]: profiles less their mean with weights `exp(-|d| / lambda_max)`.
 //!
 //! The latter two keep part of the longer waves. Of a profile with density `c f^-2` the moving average leaves `pi^2 / 6`
