@@ -11,8 +11,8 @@ use divan::counter::ItemsCount;
 use sastrugi_benches::floor;
 use sastrugi_numeric::fft::RealFft2;
 use sastrugi_numeric::{Geometry, Grid, Streams};
+use sastrugi_roughness::background::{AtPartial, BoxWindow, background};
 use sastrugi_texture::covariance::masked_covariance;
-use sastrugi_texture::detrend::{AtPartial, BoxWindow, background};
 use sastrugi_texture::{FitParameters, FitSettings};
 
 const SIZES: [usize; 2] = [2048, 4096];

@@ -1,12 +1,12 @@
 //! Independent readers on our files: rasterio, pyarrow, duckdb, laspy, GSTools, MuJoCo, OpenUSD, trimesh and the Python mcap reader see
-//! what we say.
+//! what we say. Independent data for our fits: fields made by numpy, backgrounds taken by scipy.
 //!
 //! The readers live in `.cache/readers`, which `./test` sets up. Without them these tests are skipped with a message; with
 //! CI set that is a failure.
 
 #![allow(clippy::unwrap_used, reason = "a test may end where it stands")]
 
-use sastrugi_tests::{Called, area, called, sastrugi_in, small_study, write};
+use sastrugi_tests::{Called, area, called, program, sastrugi_in, small_study, write};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -340,6 +340,40 @@ fn val_gstools_blocks_are_the_fitted_models() {
     }
     let paths: Vec<&Path> = files.iter().map(PathBuf::as_path).collect();
     let call = check(&python, "check_gstools.py", &paths);
+    assert_eq!(call.code, 0, "{}{}", call.stdout, call.stderr);
+}
+
+/// The table of `check_fits.py`, of so much as `extent` says.
+fn fits_of_numpy_fields(extent: &str) {
+    let Some(python) = python() else { return };
+    let folder = area();
+    let call = check(&python, "check_fits.py", &[&program(), folder.path(), Path::new(extent)]);
+    println!("{}", call.stdout);
+    assert_eq!(call.code, 0, "{}{}", call.stdout, call.stderr);
+}
+
+/// Fits of fields on slopes that numpy made by its own circulant embedding: 20 fields, and each without its slope. Null hypothesis,
+/// limits and false alarms: the script's header.
+#[test]
+fn stat_fits_of_numpy_fields_on_slopes() {
+    fits_of_numpy_fields("quick");
+}
+
+/// The same of 600 fields, 128 without their slope, 100 with intervals.
+#[test]
+#[ignore = "slow: ./test --full"]
+fn stat_many_fits_of_numpy_fields_on_slopes() {
+    fits_of_numpy_fields("full");
+}
+
+/// Backgrounds of a sloping DEM with holes and of a measured one are scipy's local planes; background and texture of the measured
+/// covariance, detrended by scipy, have the residual's RMS.
+#[test]
+fn val_backgrounds_are_local_planes_and_textures_complete_them() {
+    let Some(python) = python() else { return };
+    let folder = area();
+    let dem = sastrugi_fixtures::workspace_root().join("fixtures/dem/jacksboro.tif");
+    let call = check(&python, "check_background.py", &[&program(), folder.path(), &dem]);
     assert_eq!(call.code, 0, "{}{}", call.stdout, call.stderr);
 }
 

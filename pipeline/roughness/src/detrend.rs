@@ -6,7 +6,8 @@
 //! * [`Detrender::Band`]: wavelengths `lambda_min` to `lambda_max` of every profile along x and along y, by Fourier
 //!   transform. The reference: it keeps what it says and nothing else.
 //! * [`Detrender::MovingAverage`]: heights less their mean over `lambda_max` x `lambda_max` (the odd number of cells nearest
-//!   to it), [`crate::moving_average`].
+//!   to it), where more than half of it holds data. The plain mean, as published, also at borders and holes: on a slope it
+//!   is off by slope times the distance of a partial window's centroid. [`crate::band_rms`] takes a plane there.
 //! * [`Detrender::Exponential`]: profiles less their mean with weights `exp(-|d| / lambda_max)`.
 //!
 //! The latter two keep part of the longer waves. Of a profile with density `c f^-2` the moving average leaves `pi^2 / 6`
@@ -28,7 +29,8 @@
 //! Vehicle band and local mean: *Terrain Roughness in MAVS* (documentation, Mississippi State University), which cites Durst et
 //! al. (2011), J. Terramechanics, PII S0022489810000522.
 
-use crate::band::{average, moving_average, odd_cells, transposed};
+use crate::background::{AtPartial, BoxWindow, background_of, odd_cells};
+use crate::band::{FILLED_SHARE_MIN, transposed};
 use rayon::prelude::*;
 use sastrugi_numeric::fft::{Complex64, Transform, smooth_length};
 use sastrugi_numeric::{Grid, sums};
@@ -154,7 +156,7 @@ impl WaveBand {
 pub enum Detrender {
     /// The band of wavelengths alone, profile by profile.
     Band,
-    /// Less a mean over a square of the longest wavelength.
+    /// Less the plain mean over a square of the longest wavelength, by definition at borders and holes as well.
     MovingAverage,
     /// Less a mean of the profile with exponential weights.
     Exponential,
@@ -208,10 +210,11 @@ impl Detrended {
             squares => squares[0].clone(),
         };
         let g = &mean.geometry;
-        let window = [(g.cell[0], g.cols), (g.cell[1], g.rows)]
-            .map(|(cell, count)| odd_cells(WINDOW_LENGTHS * self.max_m, cell).min(largest_odd(count)));
+        let half = [(g.cell[1], g.rows), (g.cell[0], g.cols)]
+            .map(|(cell, count)| odd_cells(WINDOW_LENGTHS * self.max_m, cell).min(largest_odd(count)) / 2);
         // Running sums may leave a rounding error below zero.
-        average(&mean, window, WINDOW_SHARE_MIN).map(|square| if square < 0.0 { 0.0 } else { square.sqrt() })
+        background_of(&mean, BoxWindow { half }, AtPartial::Mean, WINDOW_SHARE_MIN)
+            .map(|square| if square < 0.0 { 0.0 } else { square.sqrt() })
     }
 }
 
@@ -234,7 +237,8 @@ fn mean_of_defined(a: f64, b: f64) -> f64 {
 }
 
 fn above_average(dem: &Grid, window_m: f64) -> Grid {
-    let average = moving_average(dem, dem.geometry.cell.map(|c| odd_cells(window_m, c)));
+    let window = BoxWindow::nearest(window_m, dem.geometry.cell);
+    let average = background_of(dem, window, AtPartial::Mean, FILLED_SHARE_MIN);
     sastrugi_numeric::ops::combine(dem, &average, |z, mean| z - mean)
 }
 

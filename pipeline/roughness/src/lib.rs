@@ -8,6 +8,7 @@
 mod aerodynamic;
 mod agreement;
 mod areal;
+pub mod background;
 mod band;
 mod classes;
 mod closing;
@@ -33,7 +34,8 @@ pub use aerodynamic::{
 };
 pub use agreement::{Statistic, unfitted_statistics};
 pub use areal::{ArealFigures, areal_figures};
-pub use band::{band_rms, moving_average, odd_cells};
+pub use background::odd_cells;
+pub use band::band_rms;
 pub use classes::{ClassThresholds, HIGH, LOW, NO_CLASS, SEMI, Shares, ThresholdError, classify, shares};
 pub use closing::close_disk;
 pub use detrend::{BandError, Detrended, Detrender, WaveBand};

@@ -15,7 +15,6 @@ mod bitmap;
 pub mod compare;
 pub mod coregister;
 pub mod covariance;
-pub mod detrend;
 pub mod fit;
 pub mod noise;
 pub mod objects;

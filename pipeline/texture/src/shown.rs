@@ -2,13 +2,13 @@
 //! texture treated as the measured surface was. None of it decides a parameter.
 
 use crate::covariance::masked_covariance;
-use crate::detrend::BoxWindow;
 use crate::fit::residual::residual;
 use crate::fit::survey::Trim;
 use crate::fit::{FitOutcome, FitParameters, FitSettings};
 use crate::sizes::Sizes;
 use rayon::prelude::*;
 use sastrugi_numeric::{Grid, sums};
+use sastrugi_roughness::background::BoxWindow;
 use sastrugi_schemas::fit::FitFile;
 use sastrugi_statistics::normal;
 

@@ -69,7 +69,8 @@ mod tests;
 
 pub use formulas::{lettau_z0_m, macdonald_displacement, macdonald_z0_m, munro_z0_m};
 
-use crate::band::{moving_average, odd_cells};
+use crate::background::{AtPartial, BoxWindow, background_of};
+use crate::band::FILLED_SHARE_MIN;
 use crate::plane::level;
 use block::Sums;
 use rayon::prelude::*;
@@ -295,17 +296,18 @@ fn detrended(dem: &Grid, outer_scale_m: Option<f64>) -> Result<(Grid, Option<[f6
         return Err(WindError::OuterScale { outer_scale_m });
     }
     let cell = dem.geometry.cell;
-    let window = cell.map(|cell_m| odd_cells(outer_scale_m, cell_m));
-    if window.iter().any(|&cells| cells < OUTER_CELLS_MIN) {
+    let window = BoxWindow::nearest(outer_scale_m, cell);
+    if window.cells().iter().any(|&cells| cells < OUTER_CELLS_MIN) {
         let needed_m = OUTER_CELLS_MIN as f64 * cell[0].max(cell[1]);
         return Err(WindError::Narrow { outer_scale_m, needed_m });
     }
-    let left = ops::combine(&levelled, &moving_average(&levelled, window), |z, mean| z - mean);
+    let average = background_of(&levelled, window, AtPartial::Mean, FILLED_SHARE_MIN);
+    let left = ops::combine(&levelled, &average, |z, mean| z - mean);
     if left.finite_count() == 0 && levelled.finite_count() > 0 {
         let [x_m, y_m] = dem.geometry.size();
         return Err(WindError::Wide { outer_scale_m, x_m, y_m });
     }
-    Ok((centred(&left), Some([0, 1].map(|axis| window[axis] as f64 * cell[axis]))))
+    Ok((centred(&left), Some(window.size_m(cell))))
 }
 
 fn centred(surface: &Grid) -> Grid {

@@ -104,7 +104,8 @@ fn stat_a_moving_average_leaves_more_than_the_band() {
         };
         let profile = Grid::new(Geometry::square(1, n, cell), (0..n).map(|_| step()).collect());
         // One row has no neighbours to average with: the window of its mean is one cell high.
-        let average = crate::band::average(&profile, [odd_cells(3.7, cell), 1], 0.9);
+        let window = BoxWindow { half: [0, odd_cells(3.7, cell) / 2] };
+        let average = background_of(&profile, window, AtPartial::Mean, 0.9);
         let left = sastrugi_numeric::ops::combine(&profile, &average, |z, m| (z - m) * (z - m));
         of_average.push(sums::mean(&sums::finite(&left.values)));
         let band = Detrended::of(&profile, &WaveBand::new(0.2, 3.7).unwrap(), Detrender::Band).rms_m();

@@ -15,8 +15,8 @@
 use super::masked::MaskedCovariance;
 use super::trimmed::TrimmedNormal;
 use super::{Covariance, density};
-use crate::detrend::BoxWindow;
 use sastrugi_numeric::fft::{HalfSpectrum, RealFft2, smooth_length};
+use sastrugi_roughness::background::BoxWindow;
 use sastrugi_schemas::ParameterError;
 use sastrugi_schemas::fit::CovarianceMap;
 use std::f64::consts::PI;

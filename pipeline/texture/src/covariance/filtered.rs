@@ -1,7 +1,7 @@
 //! What the moving average leaves of a covariance.
 //!
 //! The residual of cell i is `z(i) - sum of D_i(j) z(j)` over the offsets j of its window, with `D_i(j) = m(i + j) / n(i)`
-//! (module [`crate::detrend`]). For a stationary field with covariance C the residuals of the cells i and i + h have
+//! ([`sastrugi_roughness::background`]). For a stationary field with covariance C the residuals of the cells i and i + h have
 //!
 //! `C(h) - sum of D_i(j) C(h - j) - sum of D_(i+h)(k) C(h + k) + sum of D_i(j) D_(i+h)(k) C(h + k - j)`.
 //!
@@ -15,8 +15,8 @@
 
 use super::Covariance;
 use super::bins::lag_m;
-use crate::detrend::BoxWindow;
 use sastrugi_numeric::fft::{Complex64, HalfSpectrum, RealFft2, smooth_length};
+use sastrugi_roughness::background::BoxWindow;
 use std::f64::consts::PI;
 
 /// How a surface was measured.

@@ -10,8 +10,8 @@
 use super::bins::{LagBins, Member, length_m};
 use super::filtered::LagField;
 use crate::bitmap::Bitmap;
-use crate::detrend::{BoxWindow, Moments};
 use rayon::prelude::*;
+use sastrugi_roughness::background::{BoxWindow, Moments};
 use std::ops::Range;
 
 /// Pairs with a partial window that are averaged over in each bin (about): the correction is good to 2e-4 of the variance.

@@ -2,6 +2,7 @@ use super::filtered::Measurement;
 use super::masked::masked_covariance;
 use super::trimmed::TrimmedNormal;
 use super::*;
+use sastrugi_roughness::background::{AtPartial, BoxWindow, background};
 
 const N: f64 = f64::NAN;
 /// A grid with holes.
@@ -189,7 +190,7 @@ fn val_trimming_bends_the_shape() {
 #[test]
 fn val_box_filtered_exponential() {
     for (range_m, cell_m, width, expected) in BOX_FILTERED {
-        let window = crate::detrend::BoxWindow { half: [width / 2; 2] };
+        let window = BoxWindow { half: [width / 2; 2] };
         let filter = filtered::DetrendFilter::new(window, [cell_m; 2], [16; 2], Measurement::default());
         let model = Covariance::new(model("exponential").unwrap(), 1.0, range_m).unwrap();
         let residual = filter.residual_covariance(&filter.measured_covariance(&model));
@@ -218,9 +219,9 @@ fn val_a_fit_file_needs_a_known_model_and_its_parameters() {
 /// residual in every lag bin by the definition: a sum over all cells of both windows of every pair.
 fn partial_windows_case(missing: impl Fn(usize, usize) -> bool, range_m: f64) -> (Vec<f64>, Vec<f64>) {
     const SIDE: usize = 40;
-    let window = crate::detrend::BoxWindow { half: [4; 2] };
+    let window = BoxWindow { half: [4; 2] };
     let values: Vec<f64> = (0..SIDE * SIDE).map(|k| if missing(k / SIDE, k % SIDE) { f64::NAN } else { 0.0 }).collect();
-    let count = crate::detrend::background(&values, SIDE, window, crate::detrend::AtPartial::Plane).count;
+    let count = background(&values, SIDE, window, AtPartial::Plane).count;
     let used = |k: usize| !values[k].is_nan() && count[k] > 40;
     let residual: Vec<f64> = (0..values.len()).map(|k| if used(k) { 0.0 } else { f64::NAN }).collect();
     let model = Covariance::new(model("exponential").unwrap(), 1.0, range_m).unwrap();

@@ -7,8 +7,8 @@ use super::{FitError, FitSettings};
 use crate::covariance::bins::Layout;
 use crate::covariance::empirical::REACH_WINDOWS;
 use crate::covariance::{Form, LagBins};
-use crate::detrend::BoxWindow;
 use sastrugi_numeric::Geometry;
+use sastrugi_roughness::background::BoxWindow;
 use sastrugi_schemas::ParameterError;
 use std::ops::Range;
 

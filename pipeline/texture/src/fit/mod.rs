@@ -1,7 +1,7 @@
 //! Covariance of the texture of a measured DEM.
 //!
 //! 1. Cells that are no texture are found and left out ([`crate::objects`]; not in `paper` mode).
-//! 2. Background: the moving average over the outer scale ([`crate::detrend`]); residual: height less background, on
+//! 2. Background over the outer scale ([`sastrugi_roughness::background`]); residual: height less background, on
 //!    cells whose window has data enough.
 //! 3. Residuals beyond a symmetric threshold are trimmed at the significance level.
 //! 4. Covariance of all pairs of what is left, in rings, and by direction ([`crate::covariance::masked`]).

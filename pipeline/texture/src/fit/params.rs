@@ -2,9 +2,9 @@
 
 use crate::covariance::Form;
 use crate::covariance::filtered::Measurement;
-use crate::detrend::{AtPartial, BoxWindow};
 use crate::synth::EMPIRICAL;
 use sastrugi_numeric::Geometry;
+use sastrugi_roughness::background::{AtPartial, BoxWindow};
 use sastrugi_schemas::ParameterError;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

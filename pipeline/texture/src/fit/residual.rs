@@ -1,8 +1,8 @@
 //! Height less background.
 
 use super::FitSettings;
-use crate::detrend::{BoxWindow, RunningBackground, band_rows};
 use rayon::prelude::*;
+use sastrugi_roughness::background::{BoxWindow, RunningBackground, band_rows};
 
 /// A part of a raster of heights without objects.
 pub struct Part<'a> {

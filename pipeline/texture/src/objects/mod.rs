@@ -18,8 +18,8 @@
 //! Cost: a moving average and a count per round, and medians about what stands out; rounds end when nothing changes, at most
 //! `ROUNDS`.
 
-use crate::detrend::{BoxWindow, deviations};
 use crate::sizes::{NORMAL_CONSISTENCY, Sizes};
+use sastrugi_roughness::background::{BoxWindow, deviations};
 use std::cell::OnceCell;
 use std::ops::Range;
 

@@ -298,7 +298,7 @@ fn prop_strips_change_nothing_that_matters() {
 /// The residual of a DEM without objects by the background of all of it.
 fn masked_residual(dem: &Grid, settings: &FitSettings, threshold_m: f64) -> Vec<f64> {
     let window = settings.window(&dem.geometry, false).unwrap();
-    let found = crate::detrend::background(&dem.values, dem.cols(), window, settings.at_partial());
+    let found = sastrugi_roughness::background::background(&dem.values, dem.cols(), window, settings.at_partial());
     let one = |k: usize| {
         let residual = dem.values[k] - found.height_m[k];
         let used = residual.abs() <= threshold_m && 2 * found.count[k] as usize > window.area();

@@ -1,7 +1,7 @@
 //! Fits on slopes: acceptance 11 of the specification.
 
 use super::*;
-use crate::detrend::BoxWindow;
+use sastrugi_roughness::background::BoxWindow;
 use std::f64::consts::TAU;
 
 /// Standard deviation and range of the texture, m.

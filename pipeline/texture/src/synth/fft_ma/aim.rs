@@ -3,9 +3,9 @@
 use super::spectrum::Spectrum;
 use crate::covariance::Covariance;
 use crate::covariance::empirical::{self, Composition, Purpose};
-use crate::detrend::BoxWindow;
 use crate::synth::Wanted;
 use sastrugi_numeric::fft::HalfSpectrum;
+use sastrugi_roughness::background::BoxWindow;
 use sastrugi_schemas::ParameterError;
 use sastrugi_schemas::fit::CovarianceMap;
 

@@ -22,10 +22,11 @@
 mod moments;
 mod running;
 
-pub(crate) use moments::Moments;
-pub(crate) use running::RunningBackground;
+pub use moments::{Moments, Weights};
+pub use running::RunningBackground;
 
 use rayon::prelude::*;
+use sastrugi_numeric::Grid;
 use std::borrow::Cow;
 
 /// Bands are at least this many rows, and four times the window.
@@ -53,8 +54,8 @@ impl BoxWindow {
     /// The box whose width is the odd number of cells nearest to `size_m`, at least one cell, for cells of
     /// `cell_m = [east-west, north-south]`.
     pub fn nearest(size_m: f64, cell_m: [f64; 2]) -> Self {
-        let half = |cell: f64| (0.5 * (size_m / cell - 1.0)).max(0.0).round() as usize;
-        Self { half: [half(cell_m[1]), half(cell_m[0])] }
+        let [east_west, north_south] = cell_m.map(|cell_m| odd_cells(size_m, cell_m) / 2);
+        Self { half: [north_south, east_west] }
     }
 
     /// Width in cells, north-south and east-west.
@@ -72,6 +73,13 @@ impl BoxWindow {
         let [rows, cols] = self.cells();
         [cols as f64 * cell_m[0], rows as f64 * cell_m[1]]
     }
+}
+
+/// Odd number of cells nearest to `size_m / cell_m`, at least 1; beyond the whole numbers that a float can count, that
+/// many.
+pub fn odd_cells(size_m: f64, cell_m: f64) -> usize {
+    let half = ((size_m / cell_m - 1.0) / 2.0).round().clamp(0.0, 1e9);
+    2 * half as usize + 1
 }
 
 /// Background of a raster.
@@ -96,9 +104,23 @@ pub fn background(values: &[f64], cols: usize, window: BoxWindow, at_partial: At
     Background { height_m, count }
 }
 
+/// Background of the cells with data whose window is more than `filled_share_min` full; NaN elsewhere. Infinite values are
+/// no data.
+pub(crate) fn background_of(dem: &Grid, window: BoxWindow, at_partial: AtPartial, filled_share_min: f64) -> Grid {
+    let finite = dem.map(|z| if z.is_finite() { z } else { f64::NAN });
+    let Background { mut height_m, count } = background(&finite.values, dem.cols(), window, at_partial);
+    let filled_min = filled_share_min * window.area() as f64;
+    for ((m, &n), z) in height_m.iter_mut().zip(&count).zip(&finite.values) {
+        if z.is_nan() || f64::from(n) <= filled_min {
+            *m = f64::NAN;
+        }
+    }
+    Grid { geometry: dem.geometry, values: height_m }
+}
+
 /// Absolute differences of row-major `values` in rows of `cols` from the background of those not marked in `left_out`; NaN
 /// where there is no data, or no background.
-pub(crate) fn deviations(values: &[f64], left_out: &[bool], cols: usize, window: BoxWindow) -> Vec<f64> {
+pub fn deviations(values: &[f64], left_out: &[bool], cols: usize, window: BoxWindow) -> Vec<f64> {
     let averaged = match left_out.contains(&true) {
         true => Cow::from_iter(values.iter().zip(left_out).map(|(&v, &out)| if out { f64::NAN } else { v })),
         false => Cow::from(values),
@@ -117,7 +139,7 @@ pub(crate) fn deviations(values: &[f64], left_out: &[bool], cols: usize, window:
 }
 
 /// Rows after which sums are started afresh.
-pub(crate) fn band_rows(window: BoxWindow) -> usize {
+pub fn band_rows(window: BoxWindow) -> usize {
     BAND_ROWS.max(4 * window.cells()[0])
 }
 

@@ -183,3 +183,24 @@ fn prop_threads_change_no_bit() {
     let bits = |v: Vec<f64>| v.into_iter().map(f64::to_bits).collect::<Vec<_>>();
     assert_eq!(bits(run(1)), bits(run(4)));
 }
+
+#[test]
+fn val_odd_windows() {
+    assert_eq!([0.0, 0.1, 0.29, 0.3, 0.41, 0.5, -1.0, f64::NAN].map(|w| odd_cells(w, 0.1)), [1, 1, 3, 3, 5, 5, 1, 1]);
+    assert!(odd_cells(f64::INFINITY, 0.1) > 1);
+}
+
+/// Cells without data, and those whose window is at most half full, have no background.
+#[test]
+fn val_backgrounds_of_sparse_windows_are_left_out() {
+    let window = BoxWindow { half: [2, 1] };
+    let values = field(20, 30, 0.4);
+    let dem = Grid::new(sastrugi_numeric::Geometry::square(20, 30, 1.0), values.clone());
+    let whole = brute_force(&values, 30, window, AtPartial::Mean);
+    let found = background_of(&dem, window, AtPartial::Mean, 0.5);
+    for (k, m) in found.values.iter().enumerate() {
+        let defined = !values[k].is_nan() && 2 * whole.count[k] > 15;
+        assert_eq!(m.is_nan(), !defined, "{k}");
+        assert!(!defined || (m - whole.height_m[k]).abs() < 1e-12, "{k}");
+    }
+}

@@ -5,7 +5,7 @@ use super::{AtPartial, BoxWindow};
 use std::ops::Range;
 
 /// Background row by row, from the north to the south.
-pub(crate) struct RunningBackground<'a> {
+pub struct RunningBackground<'a> {
     values: &'a [f64],
     window: BoxWindow,
     at_partial: AtPartial,
@@ -54,7 +54,7 @@ impl<'a> RunningBackground<'a> {
 
     /// Puts planes in the place of the means of partial windows.
     fn planes(&mut self, height_m: &mut [f64], count: &[u32]) {
-        let area = self.window.area() as u32;
+        let area = self.window.area();
         let full = self.window.cells()[0] as u32;
         // Where whole columns are missing only (the western and eastern border), moments down the columns vanish or do not count.
         if self.columns.count.iter().any(|&n| n < full) {
@@ -63,8 +63,8 @@ impl<'a> RunningBackground<'a> {
             self.slopes.balance(self.window.half[0]);
         }
         let mut next = 0;
-        while let Some(start) = (next..count.len()).find(|&c| count[c] < area) {
-            let end = (start..count.len()).find(|&c| count[c] == area).unwrap_or(count.len());
+        while let Some(start) = (next..count.len()).find(|&c| (count[c] as usize) < area) {
+            let end = (start..count.len()).find(|&c| count[c] as usize == area).unwrap_or(count.len());
             // Sums along the row are started afresh after a window.
             let width = self.window.cells()[1];
             (start..end).step_by(width).for_each(|c| self.planes_of(c..(c + width).min(end), height_m));

@@ -5,15 +5,21 @@ use super::LEVERAGE_MAX;
 /// Share of `sxx syy` below which the cells of a window lie on one line.
 const ON_A_LINE: f64 = 1e-9;
 
-/// Sums over the cells with data of a window of 1, dx, dy, dx^2, dx dy and dy^2: offsets from its centre in cells, east and
-/// south. Exact: they stay below 2^53.
+/// Sums over the cells with data of a window, of powers of their offsets dx and dy from its centre, in cells east and south.
+/// Exact: they stay below 2^53.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Moments {
+    /// Number of the cells.
     pub n: f64,
+    /// Sum of dx.
     pub x: f64,
+    /// Sum of dy.
     pub y: f64,
+    /// Sum of dx^2.
     pub xx: f64,
+    /// Sum of dx dy.
     pub xy: f64,
+    /// Sum of dy^2.
     pub yy: f64,
 }
 
