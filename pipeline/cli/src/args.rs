@@ -382,6 +382,13 @@ pub struct FitShown {
     /// covariance_m2, pairs, model_m2 (as the estimator sees it), surface_model_m2 (rings only).
     #[arg(long, value_name = "FILE.csv")]
     pub csv: Option<PathBuf>,
+    /// Maps of local roughness as GeoTIFFs, one cell for each block of the DEM, m: PREFIX.band-rms.tif, and, with the range
+    /// held at the fit's, PREFIX.sigma.tif and PREFIX.sigma2-over-b.tif. Blocks with too few cells have no data.
+    #[arg(long, value_name = "PREFIX")]
+    pub local: Option<PathBuf>,
+    /// Width of these blocks, m: at least two windows; four when absent.
+    #[arg(long, value_name = "M", allow_negative_numbers = true, requires = "local")]
+    pub local_block: Option<f64>,
 }
 
 /// `coregister`.
