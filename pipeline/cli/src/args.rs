@@ -66,7 +66,7 @@ pub enum Verb {
         sastrugi fit scan.laz --cell 0.05 --statistic median --outer-scale 2 -o fit.json\n  \
         sastrugi fit march.tif april.tif may.tif --outer-scale 2 --table season.csv\n  \
         sastrugi fit snow_on.tif --minus snow_off.tif --outer-scale 2 --difference depth.tif -o depth.json")]
-    Fit(Fit),
+    Fit(Box<Fit>),
     /// Co-register DEM B to DEM A: shift, raise, tilt and their standard errors, NMAD before and after, and the difference.
     #[command(
         after_help = "The method is that of Nuth and Kääb (2011), with raise and tilt in the same equations. With --mask or --exclude\n\
