@@ -173,3 +173,50 @@ fn val_tables_that_would_replace_a_file_are_refused() {
     let call = fit(path, &["snow.tif", "april.tif", "--exclude", "plot.csv", "--table", "plot.csv"]);
     assert!(call.code != 0 && text(path, "plot.csv").is_empty(), "{}", call.stderr);
 }
+
+/// A site whose eastern half is twice as rough: the maps lie where the DEM lies and show it. Sigma of a block has a standard error of about
+/// 1.5 % here, which leaves the bounds to the halves themselves.
+#[test]
+fn val_local_maps_show_where_a_site_is_rougher() {
+    let folder = site();
+    let path = folder.path();
+    assert_eq!(sastrugi_in(path, &["convert", "snow.tif", "snow.asc"]).code, 0);
+    let doubled = |line: &str| -> String {
+        let cells: Vec<&str> = line.split_whitespace().collect();
+        let height = |(k, z): (usize, &&str)| match k < cells.len() / 2 {
+            true => (*z).to_owned(),
+            false => (2.0 * z.parse::<f64>().unwrap()).to_string(),
+        };
+        cells.iter().enumerate().map(height).collect::<Vec<_>>().join(" ")
+    };
+    let heights = text(path, "snow.asc");
+    let lines =
+        heights.lines().map(|line| if line.split_whitespace().count() > 2 { doubled(line) } else { line.to_owned() });
+    write(path, "site.asc", &lines.collect::<Vec<_>>().join("\n"));
+    let call = fit(path, &["site.asc", "--local", "maps/site", "--local-block", "4", "-o", "fit.json"]);
+    assert_eq!(call.code, 0, "{}", call.stderr);
+    assert!(call.stdout.contains("3 x 3 blocks of 4 x 4 m, 9 with data"), "{}", call.stdout);
+    for (name, factor) in [("band-rms", 2.0), ("sigma", 2.0), ("sigma2-over-b", 4.0)] {
+        let file = format!("maps/site.{name}.tif");
+        assert_eq!(sastrugi_in(path, &["convert", &file, "map.asc"]).code, 0, "{name}");
+        let map = text(path, "map.asc");
+        let rows: Vec<Vec<f64>> = map
+            .lines()
+            .filter(|line| line.split_whitespace().count() == 3)
+            .map(|line| line.split_whitespace().map(|v| v.parse().unwrap()).collect())
+            .collect();
+        assert_eq!(rows.len(), 3, "{map}");
+        let mean = |column: usize| rows.iter().map(|row| row[column]).sum::<f64>() / 3.0;
+        let ratio = mean(2) / mean(0);
+        assert!((ratio / factor - 1.0).abs() < 0.1 * factor, "{name}: {ratio}");
+    }
+    for (arguments, words) in [
+        (&["site.asc", "--local", "refused", "--local-block", "1", "-o", "refused.json"][..], "at least two windows"),
+        (&["site.asc", "--local-block", "4", "-o", "refused.json"], "--local"),
+        (&["site.asc", "--local", "refused", "--mode", "paper", "-o", "refused.json"], "corrected"),
+        (&["site.asc", "--local", "x", "--map", "x.sigma.tif", "-o", "refused.json"], "another file of this call"),
+        (&["site.asc", "snow.tif", "--local", "x", "--table", "t.csv"], "`--local` shows one DEM"),
+    ] {
+        refused(path, arguments, words);
+    }
+}

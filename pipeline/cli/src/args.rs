@@ -66,7 +66,7 @@ pub enum Verb {
         sastrugi fit scan.laz --cell 0.05 --statistic median --outer-scale 2 -o fit.json\n  \
         sastrugi fit march.tif april.tif may.tif --outer-scale 2 --table season.csv\n  \
         sastrugi fit snow_on.tif --minus snow_off.tif --outer-scale 2 --difference depth.tif -o depth.json")]
-    Fit(Fit),
+    Fit(Box<Fit>),
     /// Co-register DEM B to DEM A: shift, raise, tilt and their standard errors, NMAD before and after, and the difference.
     #[command(
         after_help = "The method is that of Nuth and Kääb (2011), with raise and tilt in the same equations. With --mask or --exclude\n\
@@ -382,6 +382,13 @@ pub struct FitShown {
     /// covariance_m2, pairs, model_m2 (as the estimator sees it), surface_model_m2 (rings only).
     #[arg(long, value_name = "FILE.csv")]
     pub csv: Option<PathBuf>,
+    /// Maps of local roughness as GeoTIFFs, one cell for each block of the DEM, m: PREFIX.band-rms.tif, and, with the range
+    /// held at the fit's, PREFIX.sigma.tif and PREFIX.sigma2-over-b.tif. Blocks with too few cells have no data.
+    #[arg(long, value_name = "PREFIX")]
+    pub local: Option<PathBuf>,
+    /// Width of these blocks, m: at least two windows; four when absent.
+    #[arg(long, value_name = "M", allow_negative_numbers = true, requires = "local")]
+    pub local_block: Option<f64>,
 }
 
 /// `coregister`.

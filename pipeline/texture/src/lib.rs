@@ -27,7 +27,7 @@ pub mod synth;
 #[cfg(test)]
 mod gstools_tests;
 
-pub use fit::{FitError, FitOutcome, FitParameters, FitSettings, Heights, Profiles, fit};
+pub use fit::{FitError, FitOutcome, FitParameters, FitSettings, Heights, LocalMaps, Profiles, fit};
 pub use onto::{OntoError, SlopeFactors, amplitude, modulated_onto, onto};
 pub use registry::{kinds, prepare};
 pub use synth::{Synthesis, SynthesisError, TextureOutcome, fit_notes};

@@ -46,12 +46,13 @@ fn failure(dem: &Path, error: &str) -> String {
 
 /// Refuses what is written once, or shown of one DEM.
 fn check_single(args: &Fit) -> Result<(), Failure> {
-    let single: [(&str, Option<&Path>); 5] = [
+    let single: [(&str, Option<&Path>); 6] = [
         ("--difference", args.difference.as_deref()),
         ("--map", args.map.as_deref()),
         ("--background", args.background.as_deref()),
         ("--plot", args.shown.plot.as_deref()),
         ("--csv", args.shown.csv.as_deref()),
+        ("--local", args.shown.local.as_deref()),
     ];
     match single.iter().find(|(_, path)| path.is_some()) {
         Some((option, _)) => {

@@ -10,6 +10,7 @@ use crate::failure::{Code, Failure};
 use crate::output::{columns, print};
 use sastrugi_schemas::fit::{FitFile, Source};
 use sastrugi_stages::Error;
+use sastrugi_stages::verbs::local::Local;
 use sastrugi_stages::verbs::roughness::{
     AerodynamicRoughness, ArealFigures, Bumps, Detrender, ObstacleHeight, Ride, RideRequest, WindEstimate, WindSettings,
 };
@@ -111,6 +112,7 @@ pub fn fit(args: &Fit, common: &Common) -> Verdict {
         difference: args.difference.as_deref(),
         map: args.map.as_deref(),
         background: args.background.as_deref(),
+        local: args.shown.local.as_deref().map(|prefix| Local { prefix, block_m: args.shown.local_block }),
         beside: shown.files(),
     };
     let verbs::fit::Done { fit, source, notes: read_notes } = verbs::fit::fit(&request)?;

@@ -1,6 +1,7 @@
 //! `fit`: covariance of a measured DEM to a fit file.
 
 use super::coregister::pair;
+use super::local::Local;
 use super::{Read, Reading, parameters, read, transects};
 use crate::error::Error;
 use crate::jobs::coregistration::{self, coregistered};
@@ -42,6 +43,8 @@ pub struct Request<'a> {
     pub map: Option<&'a Path>,
     /// DEM to write with the background that the fit took off.
     pub background: Option<&'a Path>,
+    /// Maps of roughness by blocks to write.
+    pub local: Option<Local<'a>>,
     /// Other files that the caller writes about the fit: none may replace another file of this call.
     pub beside: Vec<&'a Path>,
 }
@@ -127,7 +130,8 @@ fn bins(fit: &FitFile) -> impl Iterator<Item = Vec<Cell>> {
 fn check_outputs(request: &Request<'_>) -> Result<(), Error> {
     let rasters = [request.map, request.difference, request.background];
     rasters.into_iter().flatten().try_for_each(super::check_output)?;
-    let beside = request.beside.iter().copied();
+    let local = request.local.as_ref().map(Local::files).unwrap_or_default();
+    let beside = request.beside.iter().copied().chain(local.iter().map(PathBuf::as_path));
     let outputs: Vec<&Path> = request.output.into_iter().chain(rasters.into_iter().flatten()).chain(beside).collect();
     let inputs: Vec<&Path> = inputs(request).collect();
     super::check_distinct(&outputs, &inputs)
@@ -163,8 +167,14 @@ struct Fitted {
 /// The fit of transects, of a raster that is read in parts, or of a DEM in memory.
 fn fitted(request: &Request<'_>, settings: &FitSettings) -> Result<Fitted, Error> {
     let streams = Streams::for_seed(request.seed, STAGE);
-    let whole = |heights: &dyn Heights, settings: &FitSettings, crs: &Crs, notes: Vec<String>| {
+    let whole = |heights: &dyn Heights, settings: &FitSettings, crs: &Crs, mut notes: Vec<String>| {
         let outcome = sastrugi_texture::fit(heights, settings, &streams).map_err(refused);
+        let mapped = |outcome: FitOutcome| {
+            let said = request.local.as_ref().map(|local| local.write(&outcome, heights, crs)).transpose()?;
+            notes.extend(said);
+            Ok(outcome)
+        };
+        let outcome = outcome.and_then(mapped);
         let outcome = outcome.and_then(|outcome| write_background(request, &outcome, heights, crs).map(|()| outcome));
         Fitted { outcome, notes, masked_share: None, noise: None, minus: None }
     };
@@ -277,7 +287,7 @@ fn named(path: &Path) -> Result<(String, String), Error> {
 }
 
 /// A parameter out of range is the caller's; anything else lies in the DEM.
-fn refused(error: FitError) -> Error {
+pub(super) fn refused(error: FitError) -> Error {
     match error {
         FitError::Parameter(parameter) => parameter.into(),
         other => Error::Input(other.to_string()),

@@ -51,6 +51,7 @@ pub fn fits(request: &Request<'_>, hear: &mut dyn FnMut(&Path, &Result<Done, Err
             difference: None,
             map: None,
             background: None,
+            local: None,
             beside: request.table.into_iter().collect(),
         };
         let done = fit::fit(&one);

@@ -27,6 +27,7 @@ pub(crate) mod estimator;
 mod expectation;
 mod heights;
 pub(crate) mod least_squares;
+mod local;
 mod memory;
 mod params;
 mod profile;
@@ -41,6 +42,7 @@ mod verdicts;
 
 pub use error::FitError;
 pub use heights::{Heights, Profiles};
+pub use local::LocalMaps;
 pub use params::{FitParameters, FitSettings, Mode};
 
 use crate::covariance::bins::Layout;
