@@ -47,7 +47,7 @@ class Program:
 
     def fit(self, dem, outer_scale_m, *options):
         """Fit and background of a DEM, from which no objects are removed."""
-        words = ["--outer-scale", outer_scale_m, "--bootstrap", 0, "--set", "find_outliers=false", *options]
+        words = ["--outer-scale", outer_scale_m, "--bootstrap", 0, "--set", "find_objects=false", *options]
         self.run("fit", dem, *words, "--background", "background.tif", "--output", "fit.json")
         return json.loads((self.folder / "fit.json").read_text()), read(self.folder / "background.tif")
 
