@@ -18,7 +18,7 @@
 //! noise does not bias the shift, because that of a symmetric difference does not correlate with the height at its centre.
 //!
 //! # Uncertainty
-//! Standard errors are those of a delete-one-block jackknife ([`uncertainty`]): residuals of neighbouring cells are correlated, and
+//! Standard errors are those of a delete-one-block jackknife (`uncertainty.rs`): residuals of neighbouring cells are correlated, and
 //! errors that took them for independent would be far too small. [`gained`](Coregistration::gained) says whether the shift is more
 //! than they explain; from a cell on NMAD must fall as well, which a shift that is wrong by more than the relief's range would not
 //! bring about. Within a cell NMAD proves nothing: B read between its cells has its noise averaged, so that NMAD falls without reason

@@ -167,7 +167,7 @@ impl FftMa {
     /// The method for one tile of a covariance, of a fit.
     ///
     /// # Errors
-    /// Eq. 10 of a covariance that is no isotropic exponential; a residual of a fit without a window; see [`Aim::of`].
+    /// Eq. 10 of a covariance that is no isotropic exponential; a residual of a fit without a window; cells that are no multiples of the measured ones.
     pub fn new(
         parameters: FftMaParameters,
         tile: &Tile,
