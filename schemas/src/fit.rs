@@ -175,15 +175,25 @@ pub struct MaskSource {
     pub excludes: bool,
 }
 
-/// A smooth part of a DEM, and the white noise found there.
+/// A smooth part of a DEM, and the noise found there.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct NoiseReference {
     /// File name without its folder.
     pub file: String,
     /// SHA-256 of the file.
     pub sha256: String,
-    /// Standard deviation of the noise of a cell, m.
+    /// Standard deviation of the white noise of a cell, m.
     pub sigma_m: f64,
+    /// Standard deviation of noise that neighbouring cells share, m; 0 where none was found.
+    #[serde(default)]
+    pub correlated_sigma_m: f64,
+    /// Lag at which that noise has a correlation of 1/e, m; 0 where none was found.
+    #[serde(default)]
+    pub correlated_range_m: f64,
+    /// Longest separation looked at, m, where the reference has relief, or noise correlated further than it is wide, so that only white
+    /// noise was taken.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unresolved_to_m: Option<f64>,
     /// Second differences it was found from.
     pub differences: u64,
 }

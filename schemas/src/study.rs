@@ -216,8 +216,8 @@ pub struct FitItem {
     /// As `mask`, for cells that take no part.
     #[serde(default)]
     pub exclude: Files,
-    /// File, as `mask`, of a part of the DEM that is smooth in reality: the DEM's white noise is found there (and
-    /// `noise_sigma_m` not stated).
+    /// File, as `mask`, of a part of the DEM that is smooth in reality: the DEM's noise, white and correlated, is found there. Not
+    /// with `noise_sigma_m` or `correlated_noise_sigma_m`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub noise_reference: Option<String>,
     /// Id of a DEM that is co-registered to the first and subtracted (snow depth), both in one metric coordinate system.

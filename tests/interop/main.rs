@@ -366,6 +366,16 @@ fn stat_many_fits_of_numpy_fields_on_slopes() {
     fits_of_numpy_fields("full");
 }
 
+/// Fits of numpy fields with the noise of dense image matching, found in a smooth part: the script's header says what is expected.
+#[test]
+fn stat_matching_noise_is_found_and_removed() {
+    let Some(python) = python() else { return };
+    let folder = area();
+    let call = check(&python, "check_noise.py", &[&program(), folder.path()]);
+    println!("{}", call.stdout);
+    assert_eq!(call.code, 0, "{}{}", call.stdout, call.stderr);
+}
+
 /// Backgrounds of a sloping DEM with holes and of a measured one are scipy's local planes; background and texture of the measured
 /// covariance, detrended by scipy, have the residual's RMS.
 #[test]

@@ -333,8 +333,14 @@ pub struct Fit {
     /// Standard deviation of the DEM's white noise, m.
     #[arg(long, value_name = "M", allow_negative_numbers = true)]
     pub noise_sigma: Option<f64>,
-    /// Part of the DEM that is smooth in reality (GeoJSON polygons or raster): its white noise is found there.
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["noise_sigma", "minus"])]
+    /// Standard deviation of noise that neighbouring cells share (dense image matching), m.
+    #[arg(long, value_name = "M", allow_negative_numbers = true, requires = "correlated_noise_range")]
+    pub correlated_noise_sigma: Option<f64>,
+    /// Lag at which that noise has a correlation of 1/e, m.
+    #[arg(long, value_name = "M", allow_negative_numbers = true, requires = "correlated_noise_sigma")]
+    pub correlated_noise_range: Option<f64>,
+    /// Part of the DEM that is smooth in reality (GeoJSON polygons or raster): its noise, white and correlated, is found there.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["noise_sigma", "correlated_noise_sigma", "minus"])]
     pub noise_reference: Option<PathBuf>,
     /// Standard deviation of the point spread that blurred the DEM, m.
     #[arg(long, value_name = "M", allow_negative_numbers = true)]

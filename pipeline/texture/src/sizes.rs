@@ -45,6 +45,18 @@ impl Sizes {
         }
     }
 
+    /// How many were counted.
+    pub fn count(&self) -> u64 {
+        self.total
+    }
+
+    /// These and others.
+    pub fn with(mut self, others: &Self) -> Self {
+        self.counts.iter_mut().zip(&others.counts).for_each(|(own, other)| *own += other);
+        self.total += others.total;
+        self
+    }
+
     /// Root mean square of the values; NaN without any. Good to 1e-4 of itself.
     pub fn root_mean_square(&self) -> f64 {
         let counted = self.counts.iter().enumerate().filter(|(_, count)| **count > 0);

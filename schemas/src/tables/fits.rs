@@ -98,6 +98,10 @@ super::table! {
         hurst: f64 ["1"],
         /// Standard deviation of the DEM's white noise that the fit reckons with.
         noise_sigma_m: f64 ["m"],
+        /// Standard deviation of noise that neighbouring cells share.
+        correlated_noise_sigma_m: f64 ["m"],
+        /// Lag at which that noise has a correlation of 1/e.
+        correlated_noise_range_m: f64 ["m"],
         /// Shortest lag at which the texture's increments exceed those of the noise; no shorter than the cell and the point
         /// spread.
         effective_resolution_m: f64 ["m"],

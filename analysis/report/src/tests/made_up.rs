@@ -479,6 +479,8 @@ fn measured(data: &mut Data, shelf: &mut Shelf) {
             increment_1m_m: f64::NAN,
             hurst: f64::NAN,
             noise_sigma_m: 0.0,
+            correlated_noise_sigma_m: 0.0,
+            correlated_noise_range_m: 0.0,
             effective_resolution_m: 90.0,
             warnings: String::new(),
         });

@@ -147,6 +147,8 @@ pub fn fit_parameters(args: &Fit) -> Result<Value, Failure> {
     put("model", args.model.as_ref().map(|v| json!(v)));
     put("bootstrap", args.bootstrap.map(|v| json!(v)));
     put("noise_sigma_m", args.noise_sigma.map(|v| json!(v)));
+    put("correlated_noise_sigma_m", args.correlated_noise_sigma.map(|v| json!(v)));
+    put("correlated_noise_range_m", args.correlated_noise_range.map(|v| json!(v)));
     put("inner_scale_m", args.inner_scale.map(|v| json!(v)));
     Ok(params)
 }

@@ -18,7 +18,7 @@ use sastrugi_schemas::{Kind, ParameterError};
 use sastrugi_store::dem::{Crs, Dem};
 use sastrugi_store::{atomic, dem, digest};
 use sastrugi_texture::coregister::Coregistered;
-use sastrugi_texture::noise::Noise;
+use sastrugi_texture::noise::{Noise, ReferenceNoise};
 use sastrugi_texture::{FitError, FitParameters, FitSettings, shown};
 use serde_json::{Value, json};
 
@@ -114,7 +114,9 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
             let settings = FitSettings::try_from(raw).map_err(|e| entry.refuse(e))?;
             if noise_reference.is_some() {
                 // What the reference holds is known when it is read; whether the fit takes it, now.
-                settings.with_noise(f64::MIN_POSITIVE).map_err(|e| entry.refuse(e))?;
+                settings
+                    .with_noise(&Noise { white_sigma_m: f64::MIN_POSITIVE, ..Noise::default() })
+                    .map_err(|e| entry.refuse(e))?;
             }
             let job = FitJob {
                 id: one.id.clone(),
@@ -180,7 +182,7 @@ impl Job for FitJob {
         let mut source = self.source.clone();
         if let Some(reference) = &self.noise_reference {
             let noise = mask::noise_of_item(&read.grid, &self.dem, reference, work)?;
-            settings = settings.with_noise(noise.sigma_m).map_err(JobError::input)?;
+            settings = settings.with_noise(&noise.noise).map_err(JobError::input)?;
             notes.push(mask::noise_note(&noise));
             let MaskSource { file, sha256, .. } = &reference.source;
             source.noise_reference = Some(noise_reference(file, sha256, &noise));
@@ -229,9 +231,16 @@ impl Job for FitJob {
 }
 
 /// A noise reference as the fit file names it.
-pub fn noise_reference(file: &str, sha256: &str, noise: &Noise) -> NoiseReference {
-    let differences = noise.differences as u64;
-    NoiseReference { file: file.to_owned(), sha256: sha256.to_owned(), sigma_m: noise.sigma_m, differences }
+pub fn noise_reference(file: &str, sha256: &str, found: &ReferenceNoise) -> NoiseReference {
+    NoiseReference {
+        file: file.to_owned(),
+        sha256: sha256.to_owned(),
+        sigma_m: found.noise.white_sigma_m,
+        correlated_sigma_m: found.noise.correlated_sigma_m,
+        correlated_range_m: found.noise.correlated_range_m,
+        unresolved_to_m: found.unresolved_to_m,
+        differences: found.differences,
+    }
 }
 
 /// A noise reference cannot be combined with `minus`: it holds the noise of one DEM, not that of a difference.
@@ -261,6 +270,7 @@ pub fn fit_row(id: &str, dem_id: &str, fit: &FitFile) -> FitRow {
     let (sigma, range) = (of_one("sigma_m"), of_one("range_m"));
     let or = |name: &str, otherwise: f64| fit.parameters.get(name).copied().unwrap_or(otherwise);
     let finding = |name: &str| fit.diagnostics.get(name).and_then(Value::as_f64).unwrap_or(f64::NAN);
+    let setting = |name: &str| fit.settings[name].as_f64().unwrap_or(f64::NAN);
     let ends = |intervals: &Option<Intervals>, name: &str| {
         let [low, high] = intervals.as_ref().and_then(|i| i.values.get(name).copied())?;
         // All these parameters are positive.
@@ -315,7 +325,9 @@ pub fn fit_row(id: &str, dem_id: &str, fit: &FitFile) -> FitRow {
         band_rms_m: finding("band_rms_m"),
         increment_1m_m: finding("increment_1m_m"),
         hurst: finding("hurst"),
-        noise_sigma_m: fit.settings["noise_sigma_m"].as_f64().unwrap_or(f64::NAN),
+        noise_sigma_m: setting("noise_sigma_m"),
+        correlated_noise_sigma_m: setting("correlated_noise_sigma_m"),
+        correlated_noise_range_m: setting("correlated_noise_range_m"),
         effective_resolution_m: finding("effective_resolution_m"),
         warnings: fit.warnings.join("; "),
     }

@@ -9,7 +9,7 @@ use sastrugi_numeric::Grid;
 use sastrugi_schemas::fit::MaskSource;
 use sastrugi_schemas::study::{Files, FitItem};
 use sastrugi_store::mask::{self, MaskError, MaskOptions};
-use sastrugi_texture::noise::{self, Noise};
+use sastrugi_texture::noise::{self, ReferenceNoise};
 use std::path::{Path, PathBuf};
 
 /// Name of the stage.
@@ -92,7 +92,12 @@ impl Mask {
 ///
 /// # Errors
 /// A reference that cannot be used for the DEM, or that tells no noise.
-pub fn noise_of_item(heights: &Grid, dem: &ItemRef, reference: &Mask, work: &Work<'_>) -> Result<Noise, JobError> {
+pub fn noise_of_item(
+    heights: &Grid,
+    dem: &ItemRef,
+    reference: &Mask,
+    work: &Work<'_>,
+) -> Result<ReferenceNoise, JobError> {
     let place = Place::read(&work.parent(dem, PLACE)?, &heights.geometry)?;
     let mut part = heights.clone();
     reference.apply(&mut part, &place, work)?;
@@ -103,7 +108,7 @@ pub fn noise_of_item(heights: &Grid, dem: &ItemRef, reference: &Mask, work: &Wor
 ///
 /// # Errors
 /// As [`noise_of_item`].
-pub fn noise_of_file(heights: &Grid, place: &Place, path: &Path) -> Result<Noise, JobError> {
+pub fn noise_of_file(heights: &Grid, place: &Place, path: &Path) -> Result<ReferenceNoise, JobError> {
     let mut part = heights.clone();
     apply(&mut part, place, path, false)?;
     noise::of_reference(&part).map_err(|e| JobError::input(format!("{}: {e}", path.display())))
@@ -115,10 +120,21 @@ pub fn share_note(share: f64) -> String {
 }
 
 /// What was found in a noise reference, for people.
-pub fn noise_note(noise: &Noise) -> String {
+pub fn noise_note(found: &ReferenceNoise) -> String {
+    let noise = &found.noise;
+    let correlated = match (noise.correlated_sigma_m > 0.0, found.unresolved_to_m) {
+        (true, _) => format!(
+            " and noise of {:.2e} m that is correlated over {:.2e} m",
+            noise.correlated_sigma_m, noise.correlated_range_m
+        ),
+        (false, Some(separation_m)) => format!(
+            " (only white noise is taken: up to {separation_m:.2e} m the reference has relief, or noise correlated further)"
+        ),
+        (false, None) => String::new(),
+    };
     format!(
-        "white noise of {:.2e} m per cell, from {} second differences of the reference",
-        noise.sigma_m, noise.differences
+        "noise reference: white noise of {:.2e} m per cell{correlated}, from {} second differences",
+        noise.white_sigma_m, found.differences
     )
 }
 

@@ -16,7 +16,7 @@ use sastrugi_schemas::kind::{read_parameters, schema_of};
 use sastrugi_store::dem::{self, BlockReader, Crs, Format, ReadOptions};
 use sastrugi_store::{atomic, csv, digest};
 use sastrugi_texture::coregister::Coregistered;
-use sastrugi_texture::noise::Noise;
+use sastrugi_texture::noise::ReferenceNoise;
 use sastrugi_texture::{FitError, FitOutcome, FitParameters, FitSettings, Heights, Profiles};
 use serde_json::Value;
 use std::ops::Range;
@@ -160,7 +160,7 @@ struct Fitted {
     outcome: Result<FitOutcome, Error>,
     notes: Vec<String>,
     masked_share: Option<f64>,
-    noise: Option<Noise>,
+    noise: Option<ReferenceNoise>,
     minus: Option<Minus>,
 }
 
@@ -196,7 +196,7 @@ fn fitted(request: &Request<'_>, settings: &FitSettings) -> Result<Fitted, Error
     }
     let Read { dem, notes, masked_share, noise } = read(request.dem, &request.reading)?;
     let settings = match &noise {
-        Some(noise) => settings.with_noise(noise.sigma_m)?,
+        Some(noise) => settings.with_noise(&noise.noise)?,
         None => settings.clone(),
     };
     Ok(Fitted { masked_share, noise, ..whole(&dem.grid, &settings, &dem.info.crs, notes) })
@@ -254,7 +254,7 @@ impl Heights for Parts {
 }
 
 /// What the fit file says of the files it was made from.
-fn source_of(request: &Request<'_>, noise: Option<&Noise>) -> Result<Source, Error> {
+fn source_of(request: &Request<'_>, noise: Option<&ReferenceNoise>) -> Result<Source, Error> {
     let mask = |(path, excludes): &(PathBuf, bool)| {
         named(path).map(|(file, sha256)| MaskSource { file, sha256, excludes: *excludes })
     };

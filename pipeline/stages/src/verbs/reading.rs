@@ -6,7 +6,7 @@ use crate::jobs::mask;
 use sastrugi_store::dem::{self, Dem, DemError, ReadOptions};
 use sastrugi_store::points::GridSettings;
 use sastrugi_store::transect::{self, TransectOptions, Transects};
-use sastrugi_texture::noise::Noise;
+use sastrugi_texture::noise::ReferenceNoise;
 use std::path::{Path, PathBuf};
 
 /// What of a DEM is taken, and how it is read.
@@ -32,8 +32,8 @@ pub struct Read {
     pub notes: Vec<String>,
     /// Share of the window's cells with data that masks dropped, where there are masks.
     pub masked_share: Option<f64>,
-    /// White noise found in the reference, where there is one.
-    pub noise: Option<Noise>,
+    /// Noise found in the reference, where there is one.
+    pub noise: Option<ReferenceNoise>,
 }
 
 /// A DEM as the kernels want it: window cut, masks applied, metres.

@@ -2,6 +2,7 @@ use super::*;
 use crate::covariance::Covariance;
 use crate::covariance::filtered::Measurement;
 use crate::fit::simulate::{Shape, Simulator};
+use crate::noise::Noise;
 use sastrugi_numeric::{Geometry, Grid, Streams};
 use sastrugi_schemas::fit::{FitFile, Intervals};
 
@@ -13,7 +14,7 @@ fn exponential(sigma_m: f64, range_m: f64) -> Covariance {
 
 /// A normal surface cut from a torus twice as wide.
 fn surface(covariance: &Covariance, cells: usize, name: &str) -> Grid {
-    let quiet = Measurement { inner_scale_m: 0.0, noise_sigma_m: 0.0 };
+    let quiet = Measurement { inner_scale_m: 0.0, noise: Noise::default() };
     let simulator =
         Simulator::new(covariance, quiet, Shape { rows: cells, cols: cells, profiles: false }, [CELL_M; 2], 16.0);
     let values = simulator.surface(&Streams::for_seed(1, "compare-test").child(name));
@@ -62,7 +63,7 @@ fn val_a_surface_is_like_itself() {
 #[ignore = "slow: ./test --full"]
 fn val_grids_may_differ() {
     let covariance = exponential(0.1, 0.12);
-    let quiet = Measurement { inner_scale_m: 0.0, noise_sigma_m: 0.0 };
+    let quiet = Measurement { inner_scale_m: 0.0, noise: Noise::default() };
     let simulator =
         Simulator::new(&covariance, quiet, Shape { rows: 120, cols: 90, profiles: false }, [0.1, 0.08], 16.0);
     let values = simulator.surface(&Streams::for_seed(1, "compare-test").child("oblong"));
@@ -157,7 +158,7 @@ fn val_settings_are_checked() {
 }
 
 fn oblong(covariance: &Covariance, name: &str) -> Grid {
-    let quiet = Measurement { inner_scale_m: 0.0, noise_sigma_m: 0.0 };
+    let quiet = Measurement { inner_scale_m: 0.0, noise: Noise::default() };
     let values = Simulator::new(covariance, quiet, Shape { rows: 100, cols: 200, profiles: false }, [CELL_M; 2], 16.0)
         .surface(&Streams::for_seed(1, "compare-test").child(name));
     Grid::new(Geometry::square(100, 200, CELL_M), values)

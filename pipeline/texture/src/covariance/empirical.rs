@@ -12,6 +12,7 @@
 //! Where `(1 - D)^2` is below [`FLOOR`] the background has taken nearly all, and what is left tells little: there the spectrum has the shape
 //! of the fitted model's, at the level of the measured waves next to it.
 
+use super::filtered::LagField;
 use super::masked::MaskedCovariance;
 use super::trimmed::TrimmedNormal;
 use super::{Covariance, density};
@@ -51,13 +52,12 @@ pub struct Composition {
     pub continued_share: f64,
 }
 
-/// The covariance map of trimmed residuals; `normal` trims a unit normal as they were trimmed, `noise_m` is the standard deviation of
-/// white noise that is no texture.
-pub fn covariance_map(sums: &MaskedCovariance, normal: &TrimmedNormal, noise_m: f64, model: &str) -> CovarianceMap {
+/// The covariance map of trimmed residuals; `normal` trims a unit normal as they were trimmed, `noise` is the covariance that the
+/// measurement's noise has in the residual: it is no texture.
+pub fn covariance_map(sums: &MaskedCovariance, normal: &TrimmedNormal, noise: &LagField, model: &str) -> CovarianceMap {
     let [rows, cols] = sums.max_lag.map(|l| l as isize);
     let untrimmed = Untrimmed::new(normal, sums.covariance(0, 0).unwrap_or(0.0));
-    let noise_m2 = |lag: (isize, isize)| if lag == (0, 0) { noise_m * noise_m } else { 0.0 };
-    let value = |(r, c)| untrimmed.of(sums.covariance(r, c).unwrap_or(0.0)) - noise_m2((r, c));
+    let value = |(r, c)| untrimmed.of(sums.covariance(r, c).unwrap_or(0.0)) - noise.at([r, c]);
     let lags = (0..=rows).flat_map(|r| (-cols..=cols).map(move |c| (r, c)));
     let (base, model) = ("residual".to_owned(), model.to_owned());
     CovarianceMap { base, model, max_lag: sums.max_lag, covariance_m2: lags.map(value).collect() }

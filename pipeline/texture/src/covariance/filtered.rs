@@ -15,6 +15,7 @@
 
 use super::Covariance;
 use super::bins::lag_m;
+use crate::noise::Noise;
 use sastrugi_numeric::fft::{Complex64, HalfSpectrum, RealFft2, smooth_length};
 use sastrugi_roughness::background::BoxWindow;
 use std::f64::consts::PI;
@@ -24,8 +25,8 @@ use std::f64::consts::PI;
 pub struct Measurement {
     /// Standard deviation of the Gaussian point spread that blurs the surface, m; 0 for a sharp one.
     pub inner_scale_m: f64,
-    /// Standard deviation of white noise on each cell, m.
-    pub noise_sigma_m: f64,
+    /// Noise that the measurement adds.
+    pub noise: Noise,
 }
 
 /// A torus on which covariances are brought through measurement and detrender.
@@ -33,6 +34,8 @@ pub struct DetrendFilter {
     shape: [usize; 2],
     cell_m: [f64; 2],
     measurement: Measurement,
+    /// Covariance of the measurement's noise.
+    noise: LagField,
     fft: RealFft2,
     /// `(1 - D)^2` of complete windows, in the order of a half spectrum.
     response: Vec<f64>,
@@ -66,7 +69,8 @@ impl DetrendFilter {
         let shape = [0, 1].map(|k| if width[k] == 1 && max_lag[k] == 0 { 1 } else { side(k) });
         let fft = RealFft2::new(shape[0], shape[1]);
         let response = fft.forward(&complete_window(window, shape)).values.iter().map(|s| s.norm_sqr()).collect();
-        Self { shape, cell_m, measurement, fft, response }
+        let noise = LagField { shape, values: torus_covariance(shape, cell_m, &measurement.noise.covariance()) };
+        Self { shape, cell_m, measurement, noise, fft, response }
     }
 
     /// How the surface was measured.
@@ -82,8 +86,13 @@ impl DetrendFilter {
             blur(&mut spectrum, self.cell_m, self.measurement.inner_scale_m);
             values = self.fft.inverse(spectrum);
         }
-        values[0] += self.measurement.noise_sigma_m * self.measurement.noise_sigma_m;
+        values.iter_mut().zip(&self.noise.values).for_each(|(own, noise)| *own += noise);
         LagField { shape: self.shape, values }
+    }
+
+    /// Covariance that the measurement's noise has in the residual, windows complete.
+    pub fn residual_noise(&self) -> LagField {
+        self.residual_covariance(&self.noise)
     }
 
     /// Covariance of the residual of a field with the covariance `measured`, windows complete.

@@ -9,6 +9,7 @@
 use super::case::Case;
 use super::estimator::{Estimate, Estimator};
 use crate::covariance::empirical;
+use crate::covariance::filtered::DetrendFilter;
 use crate::covariance::trimmed::TrimmedNormal;
 use sastrugi_schemas::fit::{Carried, CarriedOctave, CovarianceMap};
 use sastrugi_statistics::normal;
@@ -24,8 +25,9 @@ pub fn by_model(estimator: &Estimator, estimate: &Estimate) -> Carried {
 /// The measured covariance, continued by a model, and what a texture from it has.
 pub fn by_map(case: &Case, estimate: &Estimate) -> (CovarianceMap, Carried) {
     let trimmed = TrimmedNormal::new(threshold(case));
-    let noise_m = case.settings.measurement().noise_sigma_m;
-    let map = empirical::covariance_map(&case.survey.covariance, &trimmed, noise_m, estimate.form.name());
+    let sums = &case.survey.covariance;
+    let filter = DetrendFilter::new(case.window, case.geometry.cell, sums.max_lag, case.settings.measurement());
+    let map = empirical::covariance_map(sums, &trimmed, &filter.residual_noise(), estimate.form.name());
     let residual = empirical::Residual::of(&map, case.geometry.cell);
     let variance_m2 = residual.at([0, 0]);
     let binned = case.bins.average(|lag| variance_m2 * trimmed.covariance(residual.at(lag) / variance_m2));

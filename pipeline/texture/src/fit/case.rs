@@ -6,6 +6,7 @@ use super::survey::Survey;
 use super::{FitError, FitSettings};
 use crate::covariance::bins::Layout;
 use crate::covariance::empirical::REACH_WINDOWS;
+use crate::covariance::filtered::DetrendFilter;
 use crate::covariance::{Form, LagBins};
 use sastrugi_numeric::Geometry;
 use sastrugi_roughness::background::BoxWindow;
@@ -63,9 +64,12 @@ impl<'a> Case<'a> {
         if bins.len() < BINS_MIN {
             return Err(FitError::TooFewLags { found: bins.len(), needed: BINS_MIN });
         }
-        let (noise_m, residual_m) = (settings.measurement().noise_sigma_m, bins.covariance_m2[0].sqrt());
+        let noise = DetrendFilter::new(window, geometry.cell, [0, 0], settings.measurement()).residual_noise();
+        let (noise_m, residual_m) = (noise.at([0, 0]).sqrt(), bins.covariance_m2[0].sqrt());
         if noise_m >= residual_m {
-            let message = format!("is {noise_m} m; the whole residual has a standard deviation of {residual_m:.3e} m");
+            let message = format!(
+                "leaves {noise_m:.3e} m of noise in the residual, which has a standard deviation of {residual_m:.3e} m itself"
+            );
             return Err(ParameterError::new("noise_sigma_m", message).into());
         }
         Ok(Self { heights, settings, geometry, window, max_lag, max_lag_m, survey, bins })

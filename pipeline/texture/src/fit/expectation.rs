@@ -63,14 +63,12 @@ impl Expectation<'_> {
 
     /// What partial windows add in each bin, m2.
     fn correction(&self, model: &Covariance, measured: &LagField) -> Vec<f64> {
-        let Measurement { inner_scale_m, noise_sigma_m } = self.filter.measurement();
+        let Measurement { inner_scale_m, noise } = self.filter.measurement();
         if inner_scale_m > 0.0 || !model.is_isotropic() {
             return self.partial.correction(measured);
         }
-        self.partial_by_distance.correction(|distance_m| {
-            let noise_m2 = if distance_m == 0.0 { noise_sigma_m * noise_sigma_m } else { 0.0 };
-            model.at_distance(distance_m) + noise_m2
-        })
+        let noise = noise.covariance();
+        self.partial_by_distance.correction(|distance_m| model.at_distance(distance_m) + noise.at_distance(distance_m))
     }
 
     /// Covariance of the bins' estimates, row-major, m4.

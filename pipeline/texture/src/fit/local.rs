@@ -62,7 +62,9 @@ pub struct LocalMaps {
 struct Reference {
     /// The bins that are compared.
     bins: Range<usize>,
-    /// The fitted model in them, whitened.
+    /// What correlated noise adds in them, m2.
+    noise_m2: Vec<f64>,
+    /// The fitted model in them without that noise, whitened.
     model: Vec<f64>,
     /// Factor of their covariance for all residuals of the DEM.
     weights: Cholesky,
@@ -178,16 +180,22 @@ fn row_of_blocks(
 impl Reference {
     fn of(estimator: &Estimator, covariance: &Covariance) -> Result<Self, FitError> {
         let case = estimator.case;
-        let noisy = covariance.nugget_m2 > 0.0 || case.settings.measurement().noise_sigma_m > 0.0;
+        let noise = case.settings.measurement().noise;
+        let noisy = covariance.nugget_m2 > 0.0 || noise.white_sigma_m > 0.0;
         let n = estimator.bins.len();
         let bins = usize::from(noisy)..n;
         let model = estimator.mean(covariance);
+        let left = estimator.expectation.filter.residual_noise();
+        // Trimming takes about the same share of texture and noise.
+        let kept = model[0] / estimator.expectation.variance_m2(covariance);
+        let noise_m2: Vec<f64> = estimator.bins.average(|lag| kept * left.at(lag))[bins.clone()].to_vec();
+        let texture: Vec<f64> = model[bins.clone()].iter().zip(&noise_m2).map(|(all, noise)| all - noise).collect();
         let matrix = estimator.expectation.covariance(covariance, case.survey.trim.threshold_m);
         let part: Vec<f64> =
             bins.clone().flat_map(|i| bins.clone().map(move |j| i * n + j)).map(|k| matrix[k]).collect();
         let no_fit = || FitError::NoFit { model: "local".to_owned() };
         let weights = Cholesky::new(&part, bins.len()).ok_or_else(no_fit)?;
-        Ok(Self { model: weights.whiten(&model[bins.clone()]), bins, weights })
+        Ok(Self { model: weights.whiten(&texture), noise_m2, bins, weights })
     }
 
     /// `m' W m`, for all residuals of the DEM.
@@ -208,7 +216,9 @@ impl Reference {
         let Some(measured) = binned.filter(|c| c.len() >= self.bins.end) else {
             return Found { band_rms_m, ..NOTHING };
         };
-        let measured = self.weights.whiten(&measured[self.bins.clone()]);
+        let texture: Vec<f64> =
+            measured[self.bins.clone()].iter().zip(&self.noise_m2).map(|(all, noise)| all - noise).collect();
+        let measured = self.weights.whiten(&texture);
         let product: f64 = self.model.iter().zip(&measured).map(|(m, c)| m * c).sum();
         let amplitude2 = product / self.information();
         Found { band_rms_m, amplitude2: if amplitude2 > 0.0 { amplitude2 } else { f64::NAN } }

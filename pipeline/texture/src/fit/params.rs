@@ -2,6 +2,7 @@
 
 use crate::covariance::Form;
 use crate::covariance::filtered::Measurement;
+use crate::noise::Noise;
 use crate::synth::EMPIRICAL;
 use sastrugi_numeric::Geometry;
 use sastrugi_roughness::background::{AtPartial, BoxWindow};
@@ -61,9 +62,15 @@ pub struct FitParameters {
     pub bootstrap: u32,
     /// Standard deviation of the Gaussian point spread that blurred the DEM (photogrammetry's smoothing), m. Default 0.
     pub inner_scale_m: f64,
-    /// Standard deviation of the DEM's white noise per cell, m. Default 0: where it is not known, a smooth part of the DEM tells
-    /// it (`noise_reference` of a study's fit, `--noise-reference`), or a `+nugget` model finds it.
+    /// Standard deviation of the DEM's white noise per cell, m. Default 0. Where it is not known, take it from a smooth part of the DEM
+    /// (`noise_reference` of a study's fit, `--noise-reference`), or fit it as a nugget (`+nugget`).
     pub noise_sigma_m: f64,
+    /// Standard deviation of noise that neighbouring cells share, as dense image matching leaves it, m: covariance
+    /// sigma^2 exp(-(lag / range)^2) (Hugonnet et al. 2022). Default 0. A noise reference gives it as well.
+    pub correlated_noise_sigma_m: f64,
+    /// Range of that noise, m: 0.6 of the width of the patches that were matched, where each cell has its own. Below the outer scale; 0
+    /// without correlated noise.
+    pub correlated_noise_range_m: f64,
 }
 
 /// What `auto` tries.
@@ -106,6 +113,8 @@ impl Default for FitParameters {
             bootstrap: 99,
             inner_scale_m: 0.0,
             noise_sigma_m: 0.0,
+            correlated_noise_sigma_m: 0.0,
+            correlated_noise_range_m: 0.0,
         }
     }
 }
@@ -119,6 +128,7 @@ pub struct FitSettings {
     pub(super) empirical: bool,
     /// Whether the forms are the usual ones.
     auto: bool,
+    noise: Noise,
     pub(super) min_valid_share: f64,
 }
 
@@ -142,7 +152,12 @@ impl TryFrom<FitParameters> for FitSettings {
             return Err(ParameterError::new("min_valid_share", format!("is {share}; it must lie in [0, 1)")));
         }
         ParameterError::not_negative("inner_scale_m", parameters.inner_scale_m)?;
-        ParameterError::not_negative("noise_sigma_m", parameters.noise_sigma_m)?;
+        let noise = parameters.noise()?;
+        if noise.correlated_range_m >= parameters.outer_scale_m {
+            let (range, outer) = (noise.correlated_range_m, parameters.outer_scale_m);
+            let message = format!("is {range} m, not below the outer scale of {outer} m");
+            return Err(ParameterError::new("correlated_noise_range_m", message));
+        }
         if parameters.bootstrap > 0 && !(BOOTSTRAP_MIN..=BOOTSTRAP_MAX).contains(&parameters.bootstrap) {
             let message = format!(
                 "is {}; it is 0 (no intervals) or {BOOTSTRAP_MIN} to {BOOTSTRAP_MAX}: fewer say nothing at 95 %",
@@ -159,12 +174,18 @@ impl TryFrom<FitParameters> for FitSettings {
             let message = format!("is `{}`, which has no variance; the published procedure fits one", parameters.model);
             return Err(ParameterError::new("model", message));
         }
-        if parameters.mode == Mode::Paper && (parameters.inner_scale_m > 0.0 || parameters.noise_sigma_m > 0.0) {
+        if parameters.mode == Mode::Paper && (parameters.inner_scale_m > 0.0 || !noise.is_none()) {
             let message = "is `paper`, which knows neither an inner scale nor noise; leave them out or fit `corrected`";
             return Err(ParameterError::new("mode", message));
         }
         let auto = parameters.model.split(',').any(|name| name.trim() == "auto");
-        Ok(Self { parameters, forms, empirical, auto, min_valid_share: share })
+        Ok(Self { parameters, forms, empirical, auto, noise, min_valid_share: share })
+    }
+}
+
+impl FitParameters {
+    fn noise(&self) -> Result<Noise, ParameterError> {
+        Noise::new(self.noise_sigma_m, self.correlated_noise_sigma_m, self.correlated_noise_range_m)
     }
 }
 
@@ -200,21 +221,26 @@ impl FitSettings {
     }
 
     pub(crate) fn measurement(&self) -> Measurement {
-        let FitParameters { inner_scale_m, noise_sigma_m, .. } = self.parameters;
-        Measurement { inner_scale_m, noise_sigma_m }
+        Measurement { inner_scale_m: self.parameters.inner_scale_m, noise: self.noise }
     }
 
-    /// The same fit of a DEM whose noise was found to be `sigma_m`, m.
+    /// The same fit of a DEM whose noise was found in a reference.
     ///
     /// # Errors
-    /// A fit whose parameters state a noise already, or whose mode knows none.
-    pub fn with_noise(&self, sigma_m: f64) -> Result<Self, ParameterError> {
-        if self.parameters.noise_sigma_m > 0.0 {
-            let stated_m = self.parameters.noise_sigma_m;
-            let message = format!("is {stated_m} m, and a noise reference is given as well: one of the two");
+    /// A fit whose parameters state a noise already, or whose mode knows none; correlated noise that reaches to the outer scale.
+    pub fn with_noise(&self, noise: &Noise) -> Result<Self, ParameterError> {
+        if !self.noise.is_none() {
+            let message =
+                "or correlated_noise_sigma_m is stated, and a noise reference is given as well; give one of the two";
             return Err(ParameterError::new("noise_sigma_m", message));
         }
-        FitParameters { noise_sigma_m: sigma_m, ..self.parameters.clone() }.try_into()
+        let found = FitParameters {
+            noise_sigma_m: noise.white_sigma_m,
+            correlated_noise_sigma_m: noise.correlated_sigma_m,
+            correlated_noise_range_m: noise.correlated_range_m,
+            ..self.parameters.clone()
+        };
+        found.try_into()
     }
 
     /// The same fit of transects: what `auto` tries has no direction.

@@ -407,27 +407,38 @@ fn separation_warning(findings: &Findings) -> Option<String> {
     Some(format!("no scale separation: fits at half and twice the outer scale disagree by {z:.1} standard errors"))
 }
 
-/// Shortest lag at which the DEM tells more of the texture than of itself, m: increments of the texture (along its long axis)
-/// exceed those of the noise (stated, or fitted as a nugget), and the lag is no shorter than the cell and the full width of
-/// the point spread at half its height. `None` where the noise is larger up to the largest lag of the fit.
+/// Shortest lag from which on the texture's increments (along its long axis) exceed those of the noise (stated, or fitted as a
+/// nugget), m; no shorter than the cell and the full width of the point spread at half its height. `None` where the noise is larger up
+/// to the largest lag of the fit.
 fn resolution_m(case: &Case, covariance: &Covariance) -> Option<f64> {
     /// Full width at half maximum over standard deviation of a Gaussian.
     const FULL_WIDTH: f64 = 2.354_820_045_030_949;
+    /// Lags that are looked at before the search between two of them.
+    const STEPS: usize = 100;
     let measurement = case.settings.measurement();
     let [x, y] = case.geometry.cell;
     let least_m = x.max(y).max(FULL_WIDTH * measurement.inner_scale_m);
-    let noise_m2 = measurement.noise_sigma_m * measurement.noise_sigma_m + covariance.nugget_m2;
-    let origin_m2 = covariance.at_distance(0.0) - covariance.nugget_m2;
-    let told = |lag_m: f64| origin_m2 - covariance.at_distance(lag_m) >= noise_m2;
-    if told(least_m) || least_m >= case.max_lag_m {
+    let noise = measurement.noise.covariance();
+    let increment = |of: &Covariance, lag_m: f64| of.at_distance(0.0) - of.at_distance(lag_m);
+    // A nugget is in the increments of the model, and counts as noise.
+    let told = |lag_m: f64| {
+        increment(covariance, lag_m) - covariance.nugget_m2 >= increment(&noise, lag_m) + covariance.nugget_m2
+    };
+    if least_m >= case.max_lag_m {
         return Some(least_m);
     }
-    let (mut low, mut high) = (least_m, case.max_lag_m);
+    // Over a short lag correlated noise may differ less than over a longer one.
+    let lag_m = |k: usize| least_m + (case.max_lag_m - least_m) * k as f64 / STEPS as f64;
+    let Some(last) = (0..=STEPS).rev().find(|k| !told(lag_m(*k))) else { return Some(least_m) };
+    if last == STEPS {
+        return None;
+    }
+    let (mut low, mut high) = (lag_m(last), lag_m(last + 1));
     for _ in 0..40 {
         let middle = 0.5 * (low + high);
         if told(middle) { high = middle } else { low = middle }
     }
-    told(high).then_some(high)
+    Some(high)
 }
 
 fn resolution_warning(case: &Case, estimate: &Estimate) -> Option<String> {

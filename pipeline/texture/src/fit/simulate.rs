@@ -54,9 +54,10 @@ impl Simulator {
         if measurement.inner_scale_m > 0.0 {
             blur(&mut spectrum, cell_m, measurement.inner_scale_m);
         }
-        let noise_m2 = measurement.noise_sigma_m * measurement.noise_sigma_m;
+        let noise = fft.forward(&torus_covariance(torus, cell_m, &measurement.noise.covariance()));
         let cells = (torus[0] * torus[1]) as f64;
-        let amplitude = spectrum.values.iter().map(|s| ((s.re + noise_m2).max(0.0) * cells).sqrt()).collect();
+        let power = spectrum.values.iter().zip(&noise.values).map(|(surface, noise)| (surface.re + noise.re).max(0.0));
+        let amplitude = power.map(|p| (p * cells).sqrt()).collect();
         Self { shape, fft, torus, amplitude }
     }
 

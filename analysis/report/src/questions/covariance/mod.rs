@@ -198,7 +198,7 @@ fn figure(id: String, fit: &FitRow, bins: &[&CovarianceRow], plot: Plot, banded:
 /// A parameter of every fit: name, unit, figure.
 type Parameter = (&'static str, &'static str, fn(&FitRow) -> f64);
 
-const PARAMETERS: [Parameter; 14] = [
+const PARAMETERS: [Parameter; 16] = [
     ("standard deviation σ", "m", |f| f.sigma_m),
     ("range b", "m", |f| f.range_m),
     ("nugget", "m2", |f| f.nugget_m2),
@@ -211,7 +211,9 @@ const PARAMETERS: [Parameter; 14] = [
     ("share of cells used", "1", |f| f.used_share),
     ("rms misfit of the bins", "m2", |f| f.misfit_m2),
     ("rms height below the window", "m", |f| f.band_rms_m),
-    ("noise of a cell", "m", |f| f.noise_sigma_m),
+    ("white noise of a cell", "m", |f| f.noise_sigma_m),
+    ("correlated noise", "m", |f| f.correlated_noise_sigma_m),
+    ("range of correlated noise", "m", |f| f.correlated_noise_range_m),
     ("effective resolution", "m", |f| f.effective_resolution_m),
 ];
 

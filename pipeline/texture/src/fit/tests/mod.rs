@@ -1,7 +1,9 @@
+mod noise;
 mod slopes;
 
 use super::*;
 use crate::covariance::Covariance;
+use crate::noise::Noise;
 use crate::synth::Synthesis;
 use crate::synth::fft_ma::{self, FftMaParameters, Phase};
 use crate::synth::tile::{Cell, TileParameters};
@@ -527,11 +529,12 @@ fn val_effective_resolution() {
     let dem = field_of(&covariance("exponential", &[("sigma_m", 0.1), ("range_m", 0.28)]), 400, 5);
     let mut noisy = dem.clone();
     noisy.values.iter_mut().for_each(|z| *z += noise_m * s.normal());
-    let settings = with_bootstrap("exponential", 0).with_noise(noise_m).unwrap();
+    let white = Noise { white_sigma_m: noise_m, ..Noise::default() };
+    let settings = with_bootstrap("exponential", 0).with_noise(&white).unwrap();
     assert_eq!(settings.parameters().noise_sigma_m, noise_m);
-    assert_eq!(settings.with_noise(0.01).err().unwrap().key, "noise_sigma_m");
+    assert_eq!(settings.with_noise(&white).err().unwrap().key, "noise_sigma_m");
     let paper = FitParameters { mode: Mode::Paper, bootstrap: 0, ..FitParameters::default() };
-    assert_eq!(FitSettings::try_from(paper).unwrap().with_noise(0.01).err().unwrap().key, "mode");
+    assert_eq!(FitSettings::try_from(paper).unwrap().with_noise(&white).err().unwrap().key, "mode");
     let found = fit(&noisy, &settings, &streams()).unwrap().fit;
     let (sigma, b) = (found.parameters["sigma_m"], found.parameters["range_m"]);
     assert!((sigma / 0.1 - 1.0).abs() < 0.04 && (b / 0.28 - 1.0).abs() < 0.09, "{sigma} {b}");
