@@ -5,7 +5,10 @@
 //! border: each point has that of its place in the plane through all points ([`Moments::plane`]; a block's share of the cells alone would
 //! err by 1 to 7 % of the variance there). So the border, holes of a window's size and scattered cells are accounted for.
 //! Pairs and cells follow a low-discrepancy sequence (Kronecker with powers of the generalised golden ratio: Roberts, 2018):
-//! nothing is random.
+//! nothing is random. All bins have the same first cells and the same points, and a first cell counts in a bin by the share of the
+//! bin's lags that lead to a used cell: what the sampling errs by then changes smoothly from bin to bin, as covariances do. Errors of
+//! the same size that differ from bin to bin would be taken for structure by generalised least squares: 1e-4 of the variance moves
+//! sigma and b of a Gaussian surface by a quarter.
 
 use super::bins::{LagBins, Member, length_m};
 use super::filtered::LagField;
@@ -14,10 +17,13 @@ use rayon::prelude::*;
 use sastrugi_roughness::background::{BoxWindow, Moments};
 use std::ops::Range;
 
-/// Pairs with a partial window that are averaged over in each bin (about): the correction is good to 2e-4 of the variance.
-pub const PAIRS_FINE: f64 = 4096.0;
+/// Pairs with a partial window that are averaged over in each bin (about): the correction is good to 2e-4 of the variance, and from bin
+/// to bin to some 1e-5.
+pub const PAIRS_FINE: f64 = 8192.0;
 /// The same where half that precision is enough.
 pub const PAIRS_ROUGH: f64 = 1024.0;
+/// Most lags of a bin, evenly spread in direction, that are tried from a first cell.
+const LAGS_TRIED: usize = 32;
 /// Most pairs looked at in each bin.
 const PAIRS_MAX: f64 = 65_536.0;
 /// Blocks along a window for its covariance with a cell.
@@ -65,8 +71,8 @@ impl PartialWindows {
         if centres.is_empty() {
             return Self { reach, weights: vec![Vec::new(); bins.len()] };
         }
-        let members: Vec<&[Member]> = bins.members.chunk_by(|a, b| a.bin == b.bin).collect();
-        let mut sums: Vec<LagWeights> = members.iter().map(|_| LagWeights::new(reach)).collect();
+        let bin_lags: Vec<Vec<[isize; 2]>> = bins.members.chunk_by(|a, b| a.bin == b.bin).map(by_direction).collect();
+        let mut sums: Vec<LagWeights> = bin_lags.iter().map(|_| LagWeights::new(reach)).collect();
         let step = (STRIP_CELLS / cells.cols).max(4 * reach[0] as usize).max(1);
         for top in (0..cells.rows).step_by(step) {
             let strip = |row: usize| centres.partition_point(|&cell| cell < row * cells.cols);
@@ -76,14 +82,24 @@ impl PartialWindows {
             }
             let around = top.saturating_sub(reach[0] as usize)..(top + step + reach[0] as usize).min(cells.rows);
             let data = DataCount::new(cells, around);
-            let sampler =
-                Sampler { cells, window, stride: stride(reach), complete: CompleteTiles::new(&data, window), data };
+            let sampler = Sampler {
+                cells,
+                window,
+                reach,
+                stride: stride(reach),
+                complete: CompleteTiles::new(&data, window),
+                data,
+            };
             for first in samples.clone().step_by(SAMPLES_AT_ONCE) {
                 let some = first..(first + SAMPLES_AT_ONCE).min(samples.end);
-                let near: Vec<Near> = some.clone().into_par_iter().map(|s| sampler.near(centres[s], s)).collect();
-                sums.par_iter_mut().zip(&members).enumerate().for_each(|(bin, (line, members))| {
+                let near: Vec<Option<Near>> =
+                    some.clone().into_par_iter().map(|s| sampler.near(centres[s], s)).collect();
+                sums.par_iter_mut().zip(&bin_lags).for_each(|(line, lags)| {
                     for (s, near) in some.clone().zip(&near) {
-                        sampler.add_pair(near, members, &Draw { index: s * bins.len() + bin }, line);
+                        match near {
+                            Some(near) => sampler.add_pair(near, lags, &Draw { index: s }, line),
+                            None => line.pairs += 1.0,
+                        }
                     }
                 });
             }
@@ -121,7 +137,8 @@ impl PartialWindows {
         ByDistance { step_m, weights: self.weights.iter().map(spread).collect() }
     }
 
-    fn is_empty(&self) -> bool {
+    /// True when all windows are complete.
+    pub fn is_empty(&self) -> bool {
         self.weights.iter().all(Vec::is_empty)
     }
 }
@@ -145,6 +162,14 @@ impl ByDistance {
     }
 }
 
+/// The lags of a bin and their opposites, by direction.
+fn by_direction(members: &[Member]) -> Vec<[isize; 2]> {
+    let mut lags: Vec<[isize; 2]> = members.iter().flat_map(|m| [m.lag, m.lag.map(|l| -l)]).collect();
+    let direction = |[row, col]: [isize; 2]| libm::atan2(row as f64, col as f64);
+    lags.sort_by(|a, b| direction(*a).total_cmp(&direction(*b)));
+    lags
+}
+
 /// First cells of the pairs, spread evenly over the cells used: the more, the fewer windows are partial; none when all
 /// are complete.
 fn centres(cells: &DetrendedCells, pairs: f64) -> Vec<usize> {
@@ -166,13 +191,13 @@ fn stride(reach: [isize; 2]) -> isize {
 struct LagWeights {
     reach: [isize; 2],
     weights: Vec<f64>,
-    /// Pairs added.
-    pairs: usize,
+    /// Pairs added, by the shares of lags that lead to used cells.
+    pairs: f64,
 }
 
 impl LagWeights {
     fn new(reach: [isize; 2]) -> Self {
-        Self { reach, weights: vec![0.0; ((2 * reach[0] + 1) * stride(reach)) as usize], pairs: 0 }
+        Self { reach, weights: vec![0.0; ((2 * reach[0] + 1) * stride(reach)) as usize], pairs: 0.0 }
     }
 
     /// Adds so many times the weights of points at their offsets from a place.
@@ -182,10 +207,10 @@ impl LagWeights {
         }
     }
 
-    /// Adds the products of two windows' weights, less those of complete ones.
-    fn add_product(&mut self, from: isize, near: &Window, far: &Window) {
-        near.points.iter().for_each(|n| self.add(from - n.at, 1, &far.points, n.weight));
-        near.complete.iter().for_each(|n| self.add(from - n.at, 1, &far.complete, -n.weight));
+    /// Adds so many times the products of two windows' weights, less those of complete ones.
+    fn add_product(&mut self, from: isize, near: &Window, far: &Window, times: f64) {
+        near.points.iter().for_each(|n| self.add(from - n.at, 1, &far.points, times * n.weight));
+        near.complete.iter().for_each(|n| self.add(from - n.at, 1, &far.complete, -times * n.weight));
     }
 
     /// Place of a lag.
@@ -200,7 +225,7 @@ impl LagWeights {
         let mut mean = south.to_vec();
         let opposite = north.iter().rev();
         mean[stride(self.reach) as usize..].iter_mut().zip(opposite).for_each(|(w, other)| *w += other);
-        mean.iter_mut().for_each(|w| *w /= self.pairs.max(1) as f64);
+        mean.iter_mut().for_each(|w| *w /= self.pairs.max(f64::MIN_POSITIVE));
         mean
     }
 }
@@ -232,6 +257,8 @@ struct Near {
 struct Sampler<'a> {
     cells: &'a DetrendedCells<'a>,
     window: BoxWindow,
+    /// Largest lag with a weight, in cells.
+    reach: [isize; 2],
     /// [`stride`] of the lags.
     stride: isize,
     data: DataCount,
@@ -239,37 +266,43 @@ struct Sampler<'a> {
 }
 
 impl Sampler<'_> {
-    /// The first cell of the pairs of a sample.
-    fn near(&self, cell: usize, sample: usize) -> Near {
+    /// The first cell of the pairs of a sample; `None` where all its pairs have complete windows.
+    fn near(&self, cell: usize, sample: usize) -> Option<Near> {
         let cell = [cell / self.cells.cols, cell % self.cells.cols].map(|k| k as isize);
+        let reach = [0, 1].map(|k| self.reach[k] - self.window.half[k] as isize);
+        let around = [0, 1].map(|k| [cell[k] - reach[k], cell[k] + reach[k] + 1]);
+        if f64::from(self.data.within(around)) == cells(around) {
+            return None;
+        }
         let draw = Draw { index: sample };
         let shift = [draw.unit(1), draw.unit(2)];
         let windows = || [FINE_BLOCKS, COARSE_BLOCKS].map(|blocks| self.window(cell, blocks, shift));
-        Near { cell, shift, partial: self.is_partial(cell).then(windows) }
+        Some(Near { cell, shift, partial: self.is_partial(cell).then(windows) })
     }
 
-    /// Adds a pair of `near` and a cell at one of the lags of a bin or its opposite; none when that one is not used.
-    fn add_pair(&self, near: &Near, members: &[Member], draw: &Draw, line: &mut LagWeights) {
-        let place = draw.below(0, 2 * members.len());
-        let lag = members[place / 2].lag;
-        let lag = if place.is_multiple_of(2) { lag } else { lag.map(|l| -l) };
-        let partner = [near.cell[0] + lag[0], near.cell[1] + lag[1]];
-        if !self.index(partner).is_some_and(|k| self.cells.used.get(k)) {
-            return;
-        }
-        line.pairs += 1;
+    /// Adds a pair of `near` and a used cell at one of the lags of a bin; none where no such cell is used.
+    fn add_pair(&self, near: &Near, lags: &[[isize; 2]], draw: &Draw, line: &mut LagWeights) {
+        let tried = lags.len().min(LAGS_TRIED);
+        let lag_at = |k: usize| lags[((k as f64 + draw.unit(0)) * lags.len() as f64 / tried as f64) as usize];
+        let partner_at = |lag: [isize; 2]| [near.cell[0] + lag[0], near.cell[1] + lag[1]];
+        let is_used = |lag: &[isize; 2]| self.index(partner_at(*lag)).is_some_and(|k| self.cells.used.get(k));
+        let used = (0..tried).fold(0u64, |bits, k| bits | u64::from(is_used(&lag_at(k))) << k);
+        let found = used.count_ones() as usize;
+        let Some(lag) = (0..tried).filter(|k| used >> k & 1 == 1).nth(draw.below(6, found)).map(lag_at) else { return };
+        let (partner, share) = (partner_at(lag), found as f64 / tried as f64);
+        line.pairs += share;
         let from = line.place(lag);
         // - D_i(j) C(h - j); on average as much as - D_(i+h)(k) C(h + k), whose pairs are those of the opposite lag.
         if let Some([fine, _]) = &near.partial {
-            line.add(from, -1, &fine.points, -2.0);
-            line.add(from, -1, &fine.complete, 2.0);
+            line.add(from, -1, &fine.points, -2.0 * share);
+            line.add(from, -1, &fine.complete, 2.0 * share);
         }
         // D_i(j) D_(i+h)(k) C(h + k - j).
         let far = || self.window(partner, COARSE_BLOCKS, [draw.unit(3), draw.unit(4)]);
         match &near.partial {
-            Some([_, coarse]) => line.add_product(from, coarse, &far()),
+            Some([_, coarse]) => line.add_product(from, coarse, &far(), share),
             None if self.is_partial(partner) => {
-                line.add_product(from, &self.window(near.cell, COARSE_BLOCKS, near.shift), &far());
+                line.add_product(from, &self.window(near.cell, COARSE_BLOCKS, near.shift), &far(), share);
             }
             None => {}
         }
@@ -486,7 +519,7 @@ fn bisect(mut from: isize, mut last: isize, holds: impl Fn(isize) -> bool) -> is
     from
 }
 
-/// Point of a Kronecker sequence in six dimensions.
+/// Point of a Kronecker sequence in seven dimensions.
 struct Draw {
     index: usize,
 }
@@ -494,14 +527,15 @@ struct Draw {
 impl Draw {
     /// Coordinate in [0, 1).
     fn unit(&self, dimension: usize) -> f64 {
-        /// Powers 1 to 6 of 1 / g, g^7 = g + 1.
-        const STEPS: [f64; 6] = [
-            0.898_653_712_628_699_2,
-            0.807_578_495_221_344_7,
-            0.725_733_412_969_759_7,
-            0.652_183_025_943_971_5,
-            0.586_086_697_577_967_9,
-            0.526_688_986_700_735_7,
+        /// Powers 1 to 7 of 1 / g, g^8 = g + 1.
+        const STEPS: [f64; 7] = [
+            0.911_592_353_482_054_9,
+            0.831_000_618_926_951_9,
+            0.757_533_809_952_664_3,
+            0.690_562_028_656_977,
+            0.629_511_064_928_756,
+            0.573_857_473_221_399_4,
+            0.523_124_084_577_160_8,
         ];
         fraction(0.5 + self.index as f64 * STEPS[dimension])
     }

@@ -25,6 +25,9 @@ const BIN_LAGS: usize = 16;
 const DIFFERENCE: f64 = 1e-4;
 /// Share of the variance added on the diagonal, so that rounding cannot make the matrix indefinite.
 const RIDGE: f64 = 1e-9;
+/// Standard error of the mean in each bin where windows are partial, over the variance: what is known of a smooth surface, whose bins
+/// hardly scatter about each other, is no more than that.
+const MEAN_ERROR: f64 = 3e-4;
 
 /// The estimator as a function of the model.
 pub struct Expectation<'a> {
@@ -96,7 +99,8 @@ impl Expectation<'_> {
                 matrix[i * n + j] = second_order + higher;
             }
         }
-        (0..n).for_each(|k| matrix[k * n + k] *= 1.0 + RIDGE);
+        let mean_error = if self.partial.is_empty() { 0.0 } else { MEAN_ERROR * variance };
+        (0..n).for_each(|k| matrix[k * n + k] = matrix[k * n + k] * (1.0 + RIDGE) + mean_error * mean_error);
         matrix
     }
 

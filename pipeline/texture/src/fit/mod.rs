@@ -24,7 +24,7 @@ mod carried;
 pub(crate) mod case;
 mod error;
 pub(crate) mod estimator;
-mod expectation;
+pub(crate) mod expectation;
 mod heights;
 pub(crate) mod least_squares;
 mod local;
