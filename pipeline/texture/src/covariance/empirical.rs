@@ -172,7 +172,8 @@ pub fn spectrum(
         shares[usize::from(!is_measured)] += times(torus, k) * value;
         values.push(value);
     }
-    Composition { values, clip_share, continued_share: shares[1] / (shares[0] + shares[1]) }
+    let continued_share = if shares[1] > 0.0 { shares[1] / (shares[0] + shares[1]) } else { 0.0 };
+    Composition { values, clip_share, continued_share }
 }
 
 /// The spectrum of what a background over a window lacks of a model, on a torus.
@@ -224,12 +225,12 @@ fn clip(spectrum: &mut HalfSpectrum, variance_m2: f64, cell_m: [f64; 2]) -> f64 
     }
     let kept = |ring: usize| if positive[ring] > 0.0 { (1.0 - negative[ring] / positive[ring]).max(0.0) } else { 0.0 };
     let power: f64 = (0..count).map(|ring| kept(ring) * positive[ring]).sum();
-    let scale = variance_m2 * (torus[0] * torus[1]) as f64 / power;
+    let scale = if power > 0.0 { variance_m2 * (torus[0] * torus[1]) as f64 / power } else { 0.0 };
     for (v, &ring) in spectrum.values.iter_mut().zip(&rings) {
         v.re = v.re.max(0.0) * kept(ring) * scale;
     }
     let [positive, negative] = [positive, negative].map(|all| all.iter().sum::<f64>());
-    negative / (positive + negative)
+    if negative > 0.0 { negative / (positive + negative) } else { 0.0 }
 }
 
 /// Ring of a mode: its wavenumber in waves across the torus' shorter side.

@@ -60,6 +60,8 @@ pub struct PartialWindows {
     reach: [isize; 2],
     /// Weights of each bin; empty when all windows are complete.
     weights: Vec<Vec<f64>>,
+    /// Share of each bin's pairs with a partial window.
+    shares: Vec<f64>,
 }
 
 impl PartialWindows {
@@ -69,7 +71,7 @@ impl PartialWindows {
         let largest = |axis: usize| bins.members.iter().map(|m| m.lag[axis].abs()).max().unwrap_or(0);
         let reach = [0, 1].map(|axis| largest(axis) + 2 * window.half[axis] as isize);
         if centres.is_empty() {
-            return Self { reach, weights: vec![Vec::new(); bins.len()] };
+            return Self { reach, weights: vec![Vec::new(); bins.len()], shares: vec![0.0; bins.len()] };
         }
         let bin_lags: Vec<Vec<[isize; 2]>> = bins.members.chunk_by(|a, b| a.bin == b.bin).map(by_direction).collect();
         let mut sums: Vec<LagWeights> = bin_lags.iter().map(|_| LagWeights::new(reach)).collect();
@@ -104,7 +106,8 @@ impl PartialWindows {
                 });
             }
         }
-        Self { reach, weights: sums.into_iter().map(LagWeights::mean).collect() }
+        let shares = sums.iter().map(|line| line.partial / line.pairs.max(f64::MIN_POSITIVE)).collect();
+        Self { reach, shares, weights: sums.into_iter().map(LagWeights::mean).collect() }
     }
 
     /// What is added in each bin for a surface with the covariance `measured`, m2.
@@ -135,6 +138,11 @@ impl PartialWindows {
             weights
         };
         ByDistance { step_m, weights: self.weights.iter().map(spread).collect() }
+    }
+
+    /// Share of each bin's pairs of which one or both windows are partial.
+    pub fn shares(&self) -> &[f64] {
+        &self.shares
     }
 
     /// True when all windows are complete.
@@ -193,11 +201,13 @@ struct LagWeights {
     weights: Vec<f64>,
     /// Pairs added, by the shares of lags that lead to used cells.
     pairs: f64,
+    /// Those of them with a partial window.
+    partial: f64,
 }
 
 impl LagWeights {
     fn new(reach: [isize; 2]) -> Self {
-        Self { reach, weights: vec![0.0; ((2 * reach[0] + 1) * stride(reach)) as usize], pairs: 0.0 }
+        Self { reach, weights: vec![0.0; ((2 * reach[0] + 1) * stride(reach)) as usize], pairs: 0.0, partial: 0.0 }
     }
 
     /// Adds so many times the weights of points at their offsets from a place.
@@ -300,8 +310,12 @@ impl Sampler<'_> {
         // D_i(j) D_(i+h)(k) C(h + k - j).
         let far = || self.window(partner, COARSE_BLOCKS, [draw.unit(3), draw.unit(4)]);
         match &near.partial {
-            Some([_, coarse]) => line.add_product(from, coarse, &far(), share),
+            Some([_, coarse]) => {
+                line.partial += share;
+                line.add_product(from, coarse, &far(), share);
+            }
             None if self.is_partial(partner) => {
+                line.partial += share;
                 line.add_product(from, &self.window(near.cell, COARSE_BLOCKS, near.shift), &far(), share);
             }
             None => {}

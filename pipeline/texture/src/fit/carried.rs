@@ -1,4 +1,4 @@
-//! What of the residual a texture from the fit has.
+//! How much of the residual a texture from the fit reproduces; the noise of the measurement, which no texture has, is taken off both.
 //!
 //! A texture is normal. Detrended as the DEM was and trimmed at the same level, it has on average the covariance `v T(C / v; z)`:
 //! C the model through the detrender, v its variance, z the normal threshold of the level, T what trimming does
@@ -9,7 +9,7 @@
 use super::case::Case;
 use super::estimator::{Estimate, Estimator};
 use crate::covariance::empirical;
-use crate::covariance::filtered::DetrendFilter;
+use crate::covariance::filtered::{DetrendFilter, LagField};
 use crate::covariance::trimmed::TrimmedNormal;
 use sastrugi_schemas::fit::{Carried, CarriedOctave, CovarianceMap};
 use sastrugi_statistics::normal;
@@ -18,8 +18,11 @@ use sastrugi_statistics::normal;
 pub fn by_model(estimator: &Estimator, estimate: &Estimate) -> Carried {
     let case = estimator.case;
     let variance_m2 = estimator.expectation.variance_m2(&estimate.covariance);
-    let binned = estimator.expectation.mean(&estimate.covariance, threshold(case) * variance_m2.sqrt());
-    carried(case, &binned, variance_m2)
+    let with_noise = estimator.expectation.mean(&estimate.covariance, threshold(case) * variance_m2.sqrt());
+    let noise = estimator.expectation.filter.residual_noise();
+    let noise_m2 = trimmed_noise(case, &noise, with_noise[0] / variance_m2);
+    let binned: Vec<f64> = with_noise.iter().zip(&noise_m2).map(|(all, noise)| all - noise).collect();
+    carried(case, &binned, variance_m2 - noise.at([0, 0]), &noise)
 }
 
 /// The measured covariance, continued by a model, and what a texture from it has.
@@ -27,12 +30,18 @@ pub fn by_map(case: &Case, estimate: &Estimate) -> (CovarianceMap, Carried) {
     let trimmed = TrimmedNormal::new(threshold(case));
     let sums = &case.survey.covariance;
     let filter = DetrendFilter::new(case.window, case.geometry.cell, sums.max_lag, case.settings.measurement());
-    let map = empirical::covariance_map(sums, &trimmed, &filter.residual_noise(), estimate.form.name());
+    let noise = filter.residual_noise();
+    let map = empirical::covariance_map(sums, &trimmed, &noise, estimate.form.name());
     let residual = empirical::Residual::of(&map, case.geometry.cell);
     let variance_m2 = residual.at([0, 0]);
     let binned = case.bins.average(|lag| variance_m2 * trimmed.covariance(residual.at(lag) / variance_m2));
-    let carried = carried(case, &binned, variance_m2);
+    let carried = carried(case, &binned, variance_m2, &noise);
     (map, carried)
+}
+
+/// The noise's covariance in the rings, of which trimming leaves a share: about the same of texture and noise.
+fn trimmed_noise(case: &Case, noise: &LagField, kept: f64) -> Vec<f64> {
+    case.bins.average(|lag| kept * noise.at(lag))
 }
 
 /// Where the level of trimming cuts a unit normal.
@@ -40,21 +49,22 @@ fn threshold(case: &Case) -> f64 {
     normal::quantile(1.0 - 0.5 * case.settings.trim())
 }
 
-/// Trimmed covariance in the rings beside the measured one.
-fn carried(case: &Case, binned: &[f64], variance_m2: f64) -> Carried {
-    let measured = &case.bins.covariance_m2;
+/// Trimmed covariance of a texture in the rings beside the measured one without its noise.
+fn carried(case: &Case, binned: &[f64], variance_m2: f64, noise: &LagField) -> Carried {
+    let noise_m2 = trimmed_noise(case, noise, binned[0] / variance_m2);
+    let measured: Vec<f64> = case.bins.covariance_m2.iter().zip(noise_m2).map(|(all, noise)| all - noise).collect();
     let variance_share = binned[0] / measured[0];
-    let rms_m = case.survey.trim.rms_m;
+    let rms_m2 = case.survey.trim.rms_m * case.survey.trim.rms_m;
     Carried {
         rms_share: variance_share.sqrt(),
         variance_share,
-        untrimmed_rms_share: variance_m2.sqrt() / rms_m,
-        increments: octaves(case, binned),
+        untrimmed_rms_share: (variance_m2 / (rms_m2 - noise.at([0, 0]))).sqrt(),
+        increments: octaves(case, binned, &measured),
     }
 }
 
-fn octaves(case: &Case, binned: &[f64]) -> Vec<CarriedOctave> {
-    let (lags, measured) = (&case.bins.lag_m, &case.bins.covariance_m2);
+fn octaves(case: &Case, binned: &[f64], measured: &[f64]) -> Vec<CarriedOctave> {
+    let lags = &case.bins.lag_m;
     let mut octaves = Vec::new();
     let mut first = 1;
     while first < lags.len() {

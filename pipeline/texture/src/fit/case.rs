@@ -75,9 +75,10 @@ impl<'a> Case<'a> {
         Ok(Self { heights, settings, geometry, window, max_lag, max_lag_m, survey, bins })
     }
 
-    /// True when neighbouring cells of the residual hardly know each other.
+    /// True when neighbouring cells of the residual are hardly correlated.
     pub fn is_white(&self) -> bool {
-        self.bins.covariance_m2[1] < WHITE_CORRELATION * self.bins.covariance_m2[0]
+        let neighbours = [(0, 1), (1, 0)].into_iter().filter_map(|(r, c)| self.survey.covariance.covariance(r, c));
+        neighbours.fold(f64::NEG_INFINITY, f64::max) < WHITE_CORRELATION * self.bins.covariance_m2[0]
     }
 
     /// The bins of another layout.

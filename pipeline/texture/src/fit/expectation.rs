@@ -1,7 +1,7 @@
 //! What the estimator sees of a model: mean and covariance of the binned covariance after detrending and trimming.
 //!
 //! Mean: the model's covariance through the moving average ([`crate::covariance::filtered`]), then, lag by lag, through
-//! trimming ([`crate::covariance::trimmed`]), then over the bins as the data was.
+//! trimming ([`crate::covariance::trimmed`]), pairs with partial windows apart from the others, then over the bins as the data was.
 //!
 //! Covariance of two estimates at lags h and h' for a normal field (Bartlett, 1946), for N cells used:
 //! `B[C](h, h') = 1 / N * [Q(h - h') + Q(h + h')]`, `Q = sum over u of C(u) C(u + .)`.
@@ -49,11 +49,27 @@ impl Expectation<'_> {
         let measured = self.filter.measured_covariance(model);
         let residual = self.filter.residual_covariance(&measured);
         let partial = self.correction(model, &measured);
-        let variance = residual.at([0, 0]) + partial[0];
-        let trimmed = trimmed(variance, threshold_m);
+        let complete = residual.at([0, 0]);
+        // Pairs with partial windows have a variance and a covariance of their own, and trimming takes another share of them.
+        let shares = self.partial.shares();
+        let added = |k: usize, bin: usize| if shares[bin] > 0.0 { partial[k] / shares[bin] } else { 0.0 };
+        let maps = [complete, complete + added(0, 0)].map(|variance| trimmed(variance, threshold_m));
         let mut mean = vec![0.0; self.bins.len()];
         for m in &self.bins.members {
-            mean[m.bin] += m.weight * variance * trimmed.covariance((residual.at(m.lag) + partial[m.bin]) / variance);
+            let (share, covariance) = (shares[m.bin], residual.at(m.lag));
+            let whole = maps[0].moments(covariance / complete);
+            let mut sums = [(1.0 - share) * complete * whole.0, (1.0 - share) * whole.1];
+            if share > 0.0 {
+                let variance = complete + added(0, m.bin);
+                let correlation = (covariance + added(m.bin, m.bin)) / variance;
+                let [low, high] = [0, 1].map(|k| maps[k].moments(correlation));
+                // The two maps are those of the ends between which the variance lies.
+                let place = shares[0] / share;
+                let between = |low: f64, high: f64| low + (high - low) * place;
+                sums[0] += share * variance * between(low.0, high.0);
+                sums[1] += share * between(low.1, high.1);
+            }
+            mean[m.bin] += m.weight * sums[0] / sums[1];
         }
         mean
     }

@@ -103,7 +103,9 @@ impl FitOutcome {
         let sill_over_range_m = sill_over_range(&covariance);
         Ok(LocalMaps {
             band_rms_m: map(&|f| f.band_rms_m),
-            sigma_m: covariance.is_stationary().then(|| map(&|f| sigma_m * f.amplitude2.sqrt())),
+            // Where the range is at the bound of its search, sigma is no estimate either.
+            sigma_m: (covariance.is_stationary() && !self.fit.range_at_bound())
+                .then(|| map(&|f| sigma_m * f.amplitude2.sqrt())),
             sigma2_over_range_m: sill_over_range_m.map(|own| map(&|f| own * f.amplitude2)),
             sigma_error: 0.5 * reference.amplitude2_error(case.survey.detrended, block[0] * block[1]),
         })

@@ -181,7 +181,7 @@ fn corrected(case: &Case, naive: &Estimate, streams: &Streams) -> Result<FitFile
     })
 }
 
-/// A texture whose leading range lies below the cell, and whose neighbouring cells hardly know each other, cannot be told from noise.
+/// A texture whose leading range lies below the cell, and whose neighbouring cells are hardly correlated, looks like noise.
 fn refuse_white(case: &Case, estimate: &Estimate) -> Result<(), FitError> {
     let cell = case.geometry.cell[0].max(case.geometry.cell[1]);
     let longest = estimate.covariance.range_m();

@@ -8,9 +8,7 @@ use super::resampling::{SILL_OVER_RANGE, sill_over_range};
 use super::verdicts::{Isotropy, ScaleExplicit, Stationarity, is_range_told};
 use crate::covariance::form::Role;
 use crate::covariance::{Covariance, Form, Structure};
-use sastrugi_schemas::fit::{
-    Candidate, Carried, CarriedOctave, DirectionBin, FitFile, GsTools, Intervals, Profile, Trim,
-};
+use sastrugi_schemas::fit::{Candidate, Carried, DirectionBin, FitFile, GsTools, Intervals, Profile, Trim};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_2;
@@ -23,8 +21,8 @@ const MISFIT_MAX: f64 = 0.05;
 const OBJECT_SHARE_MAX: f64 = 0.1;
 /// Spread of sigma^2 / b between windows that is worth a word.
 const SPREAD_WORTH_A_WARNING: f64 = 1.25;
-/// Share of the residual's RMS below which a texture is called too weak.
-const CARRIED_MIN: f64 = 0.95;
+/// How far a texture's RMS, and its increments in any octave, may be from the residual's.
+const CARRIED_TOLERANCES: [f64; 2] = [0.05, 0.15];
 /// Level of every warning that comes from a test.
 const TEST_LEVEL: f64 = 0.01;
 /// Least elongation that is worth a warning, as a ratio of ranges.
@@ -234,6 +232,7 @@ impl Figures {
         let doubts = Doubts {
             noise: resolution_warning(case, estimate),
             misfit: self.misfit_warning(case, estimate, findings),
+            models: comparison_warning(findings),
             scale: separation_warning(findings),
             range: self.range_warning(case, naive, estimate, findings),
             site: stationarity_warning(findings),
@@ -302,6 +301,7 @@ impl Figures {
 struct Doubts {
     noise: Option<String>,
     misfit: Option<String>,
+    models: Option<String>,
     scale: Option<String>,
     range: Option<String>,
     site: Option<String>,
@@ -313,47 +313,76 @@ struct Doubts {
 impl Doubts {
     /// The most consequential first.
     fn list(self) -> Vec<String> {
-        let Self { noise, misfit, scale, range, site, direction, heights, objects } = self;
-        [noise, misfit, scale, range, site, direction, heights, objects].into_iter().flatten().collect()
+        let Self { noise, misfit, models, scale, range, site, direction, heights, objects } = self;
+        [noise, misfit, models, scale, range, site, direction, heights, objects].into_iter().flatten().collect()
     }
 
-    /// What describes the surface at this scale, what may be published, and what a texture from the fit is good for.
+    /// What describes the surface at this scale, what may be published, and what a texture from the fit is good for: the figures that a
+    /// reader needs first. Details are in warnings and diagnostics.
     fn verdict(&self, case: &Case, estimate: &Estimate, findings: &Findings) -> String {
         let window_m = figure(case.window_m());
         let rms_m = figure(case.survey.trim.rms_m);
         let model = estimate.form.name();
         let described = if self.noise.is_some() {
-            format!("mostly noise below {window_m} m: publish no texture parameters")
-        } else if self.scale.is_some() || self.misfit.is_some() {
-            let growth = findings.scale_explicit.as_ref().and_then(ScaleExplicit::words).unwrap_or_default();
-            format!("no single scale below {window_m} m: publish band RMS {rms_m} m{growth}, not sigma and b")
-        } else if self.range.is_some() {
-            let told = sill_over_range(&estimate.covariance);
-            let told = told.map_or_else(String::new, |told| format!("sigma^2 / b = {} m and ", figure(told)));
+            format!("Mostly noise below {window_m} m: publish no texture parameters")
+        } else if self.scale.is_some() {
+            let growth = findings
+                .scale_explicit
+                .as_ref()
+                .and_then(ScaleExplicit::structure)
+                .map(|s| format!(" and the structure function ({} m at 1 m, H {})", figure(s.sigma_m), hurst(&s)));
+            let growth = growth.unwrap_or_default();
+            format!("No single scale below {window_m} m: publish band RMS {rms_m} m{growth}, not sigma and b")
+        } else if self.misfit.is_some() {
             format!(
-                "only the short-range slope of the covariance is known below {window_m} m: publish {told}band RMS {rms_m} m"
+                "The {model} model does not fit the covariance below {window_m} m: publish band RMS {rms_m} m, or try --model auto"
             )
+        } else if self.range.is_some() {
+            let slope = sill_over_range(&estimate.covariance);
+            let slope = slope.map_or_else(String::new, |slope| format!("sigma^2 / b = {} m and ", figure(slope)));
+            format!("b is not identified below {window_m} m: publish {slope}band RMS {rms_m} m")
         } else {
+            let interval =
+                if findings.intervals.is_some() { "with their intervals" } else { "once --bootstrap gives intervals" };
             format!(
-                "the {model} model describes the surface below {window_m} m: its parameters may be published with their intervals"
+                "The {model} model describes the surface below {window_m} m{}: publish its parameters {interval}",
+                self.caveat()
             )
         };
-        let carried = findings.carried.as_ref().map(carried_words).unwrap_or_default();
-        format!("{described}{carried}")
+        let carried = findings.carried.as_ref().map(|c| carried_words(c, case)).unwrap_or_default();
+        format!("{described}.{carried}")
+    }
+
+    /// What holds on average only.
+    fn caveat(&self) -> &'static str {
+        match (&self.site, &self.direction) {
+            (None, None) => "",
+            (Some(_), None) => " (averaged over a site that is not stationary)",
+            (None, Some(_)) => " (averaged over directions that differ)",
+            (Some(_), Some(_)) => " (averaged over a site that is not stationary and over directions that differ)",
+        }
     }
 }
 
 /// What a texture has, for the end of a verdict.
-fn carried_words(carried: &Carried) -> String {
-    let per_octave = |o: &CarriedOctave| format!("{:.0} % at {}-{} m", 100.0 * o.share, short(o.from_m), short(o.to_m));
-    let octaves: Vec<String> = carried.increments.iter().map(per_octave).collect();
-    let better = if carried.rms_share < CARRIED_MIN { "; model = \"empirical\" carries all of it" } else { "" };
-    format!(
-        ". A texture from it carries {:.0} % of the residual's RMS ({:.0} % of its variance; increments: {}){better}",
-        100.0 * carried.rms_share,
-        100.0 * carried.variance_share,
-        octaves.join(", ")
-    )
+fn carried_words(carried: &Carried, case: &Case) -> String {
+    let [of_rms, of_increments] = CARRIED_TOLERANCES;
+    let off = |share: f64, tolerance: f64| (share - 1.0).abs() > tolerance;
+    let worst = carried.increments.iter().max_by(|a, b| (a.share - 1.0).abs().total_cmp(&(b.share - 1.0).abs()));
+    let worst = worst.filter(|o| off(o.share, of_increments));
+    let octave = worst.map_or_else(String::new, |o| {
+        format!(", {:.0} % of its squared increments at {}-{} m", 100.0 * o.share, short(o.from_m), short(o.to_m))
+    });
+    let is_off = off(carried.rms_share, of_rms) || worst.is_some();
+    let can_be_better = !case.settings.empirical && !case.heights.are_profiles();
+    let better = if is_off && can_be_better { "; --model empirical reproduces both" } else { "" };
+    format!(" A texture reproduces {:.0} % of the residual's RMS{octave}{better}.", 100.0 * carried.rms_share)
+}
+
+/// Hurst exponent of a self-affine term; its search ends just below 1.
+fn hurst(structure: &Structure) -> String {
+    let at_bound = structure.model.shape().is_some_and(|shape| structure.shape > 0.999 * shape.bounds.1);
+    format!("{} {:.2}", if at_bound { ">=" } else { "=" }, structure.shape)
 }
 
 /// A positive figure to two digits.
@@ -366,7 +395,9 @@ fn short(value: f64) -> String {
 fn p_value(p: f64, replicates: usize) -> String {
     let least = 1.0 / (replicates + 1) as f64;
     match p {
-        p if replicates > 0 && p <= least => format!("p <= {least:.3}, the least of {replicates} replicates"),
+        p if replicates > 0 && p <= least => {
+            format!("p <= {least:.3}, the smallest that {replicates} replicates can give")
+        }
         p if p < 1e-3 => "p < 0.001".to_owned(),
         p => format!("p = {p:.3}"),
     }
@@ -384,27 +415,29 @@ impl ScaleExplicit {
         self.self_affine.as_ref()?.covariance.structures.first().copied()
     }
 
-    /// Root mean square heights and growth of increments, after that of the fit's own band.
-    fn words(&self) -> Option<String> {
+    /// Root mean square heights below each window, on the same cells.
+    fn bands_words(&self) -> String {
         let band = |[below_m, rms_m]: &[f64; 2]| format!("{} m below {} m", figure(*rms_m), short(*below_m));
-        let bands = self.bands.iter().filter(|b| b[1].is_finite()).map(band).collect::<Vec<_>>().join(", ");
-        let structure = self.structure()?;
-        // The search ends just below 1.
-        let at_least = structure.model.shape().is_some_and(|shape| structure.shape > 0.999 * shape.bounds.1);
-        let at_least = if at_least { "at least " } else { "" };
-        Some(format!(
-            " (on the same cells {bands}) and increments of {} m (lag / 1 m)^{:.2} (Hurst exponent {at_least}{:.2})",
-            figure(structure.sigma_m),
-            structure.shape,
-            structure.shape
-        ))
+        self.bands.iter().filter(|b| b[1].is_finite()).map(band).collect::<Vec<_>>().join(", ")
     }
+}
+
+/// A model without a likelihood is not chosen.
+fn comparison_warning(findings: &Findings) -> Option<String> {
+    let without: Vec<&str> =
+        findings.candidates.iter().filter(|c| c.aicc_above_best.is_none()).map(|c| c.model.as_str()).collect();
+    let all = findings.candidates.len();
+    (all > 1 && !without.is_empty())
+        .then(|| format!("{} of {all} models could not be compared: {}", without.len(), without.join(", ")))
 }
 
 /// Fits at other windows are other fits.
 fn separation_warning(findings: &Findings) -> Option<String> {
-    let (z, _) = (findings.disagreement?, findings.scale_explicit.as_ref()?);
-    Some(format!("no scale separation: fits at half and twice the outer scale disagree by {z:.1} standard errors"))
+    let (z, explicit) = (findings.disagreement?, findings.scale_explicit.as_ref()?);
+    Some(format!(
+        "no scale separation: fits at half and twice the outer scale disagree by {z:.1} standard errors; band RMS on the same cells: {}",
+        explicit.bands_words()
+    ))
 }
 
 /// Shortest lag from which on the texture's increments (along its long axis) exceed those of the noise (stated, or fitted as a
@@ -474,8 +507,8 @@ fn stationarity_warning(findings: &Findings) -> Option<String> {
 fn normality_warning(findings: &Findings) -> Option<String> {
     let p = findings.normality_p.filter(|p| *p <= 2.0 * TEST_LEVEL)?;
     Some(format!(
-        "heights are not normal (p = {p:.3}; {} replicates tell no less than {:.3}): the correction for trimming assumes they are",
-        findings.replicates,
-        2.0 / (findings.replicates + 1) as f64
+        "heights are not normal (p = {p:.3}; {:.3} is the smallest that {} replicates can give): the correction for trimming assumes they are",
+        2.0 / (findings.replicates + 1) as f64,
+        findings.replicates
     ))
 }

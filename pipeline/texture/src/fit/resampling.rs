@@ -293,10 +293,10 @@ fn at_bound(estimator: &Estimator, estimate: &Estimate, replicates: &[Vec<f64>],
     near(&estimate.at) || share > 0.5 * (1.0 - LEVEL)
 }
 
-/// `sigma^2 / b` of a covariance of one term with a range, m.
+/// `sigma^2 / b` of a covariance of one term that falls in a straight line from lag zero, m: of others it is the slope of nothing.
 pub fn sill_over_range(covariance: &Covariance) -> Option<f64> {
     let [term] = covariance.structures.as_slice() else { return None };
-    term.model.scale_names().1.map(|_| term.sigma_m * term.sigma_m / term.range_m)
+    term.model.is_linear_at_origin().then(|| term.sigma_m * term.sigma_m / term.range_m)
 }
 
 /// The interval of one parameter.

@@ -198,7 +198,7 @@ impl Wanted {
 
 /// What a reader of a texture must know of the fit that it is made from.
 pub fn fit_notes(fit: &FitFile) -> Vec<String> {
-    let range_m = fit.parameters.get("range_m").copied().filter(|_| fit.range_at_bound() && fit.map.is_none());
+    let range_m = fit.parameters.get("range_m").copied().filter(|_| fit.range_at_bound());
     let bound = range_m.map(|range_m| {
         format!(
             "the fit did not identify the range: its search ended at {range_m:.4} m; the texture has the fit's increments at lags below its \

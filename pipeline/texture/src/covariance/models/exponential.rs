@@ -34,6 +34,10 @@ impl Model for Exponential {
         }
     }
 
+    fn is_linear_at_origin(&self) -> bool {
+        true
+    }
+
     fn correlation(&self, ratio: f64, _shape: f64) -> f64 {
         libm::exp(-ratio)
     }

@@ -22,6 +22,11 @@ pub trait Model: Sync {
         None
     }
 
+    /// True when the correlation falls from 1 in a straight line: then sigma^2 / b is the short-range slope, up to a factor.
+    fn is_linear_at_origin(&self) -> bool {
+        false
+    }
+
     /// Names of sigma and b in fit files; no b for a model without a scale of its own.
     fn scale_names(&self) -> (&'static str, Option<&'static str>) {
         ("sigma_m", Some("range_m"))

@@ -21,6 +21,10 @@ impl Model for Spherical {
         }
     }
 
+    fn is_linear_at_origin(&self) -> bool {
+        true
+    }
+
     fn correlation(&self, ratio: f64, _shape: f64) -> f64 {
         if ratio < 1.0 { 1.0 - ratio * (1.5 - 0.5 * ratio * ratio) } else { 0.0 }
     }

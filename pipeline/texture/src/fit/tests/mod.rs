@@ -243,7 +243,7 @@ fn val_the_fit_file_is_complete() {
     let k = residual.values.iter().position(|r| !r.is_nan()).unwrap();
     assert_eq!(dem.values[k] - background.values[k], residual.values[k]);
     assert!(fit.warnings.is_empty(), "{:?}", fit.warnings);
-    assert!(fit.verdict.starts_with("the exponential model describes the surface below 1.980 m"), "{}", fit.verdict);
+    assert!(fit.verdict.starts_with("The exponential model describes the surface below 1.980 m"), "{}", fit.verdict);
     let carried = fit.carried.unwrap();
     assert!((carried.rms_share - 1.0).abs() < 0.03 && carried.increments.len() == 4, "{carried:?}");
     for key in ["sigma2_over_range_m", "naive_range_m", "iterations", "misfit_m2", "lag_max_m", "trimmed_share"] {
@@ -549,7 +549,7 @@ fn val_effective_resolution() {
 fn val_no_scale_leads_with_scale_explicit_figures() {
     let truth = covariance("self_affine", &[("increment_1m_m", 0.1), ("hurst", 0.8)]);
     let found = fit(&field_of(&truth, 400, 3), &with_bootstrap("exponential", 0), &streams()).unwrap().fit;
-    assert!(found.verdict.starts_with("no single scale below 1.980 m: publish band RMS"), "{}", found.verdict);
+    assert!(found.verdict.starts_with("No single scale below 1.980 m: publish band RMS"), "{}", found.verdict);
     assert!(found.warnings.iter().any(|w| w.starts_with("no scale separation")), "{:?}", found.warnings);
     let figure = |name: &str| found.diagnostics[name].as_f64().unwrap();
     assert!((figure("hurst") - 0.8).abs() < 0.04 && (figure("increment_1m_m") / 0.1 - 1.0).abs() < 0.1, "{found:?}");
@@ -569,4 +569,31 @@ fn val_windows_are_compared_in_one_place() {
     (0..n * n).filter(|k| rim(k / n) || rim(k % n)).for_each(|k| dem.values[k] *= 0.5);
     let found = fit(&dem, &with_bootstrap("exponential", 0), &streams()).unwrap().fit;
     assert!(found.diagnostics["window_disagreement_z"].as_f64().unwrap() < 2.58, "{:?}", found.warnings);
+}
+
+/// A surface whose model is another one has a scale all the same: the verdict blames the model.
+#[test]
+fn val_a_wrong_model_is_not_a_surface_without_scale() {
+    let dem = field_of(&covariance("gaussian", &[("sigma_m", 0.1), ("range_m", 0.28)]), 256, 8);
+    let wrong = fit(&dem, &with_bootstrap("exponential", 0), &streams()).unwrap().fit;
+    assert!(wrong.verdict.contains("--model"), "{}", wrong.verdict);
+    let right = fit(&dem, &with_bootstrap("gaussian", 0), &streams()).unwrap().fit;
+    assert!(right.verdict.starts_with("The gaussian model describes"), "{}", right.verdict);
+    // A Gaussian covariance has no slope at lag zero.
+    assert!(!right.diagnostics.contains_key("sigma2_over_range_m"));
+}
+
+/// What cannot change a fit does not change it: a nanometre of noise on a smooth surface with holes, whose bins hardly scatter about
+/// each other.
+#[test]
+fn prop_a_nanometre_does_not_move_a_fit() {
+    let mut dem = field_of(&covariance("gaussian", &[("sigma_m", 0.1), ("range_m", 0.8)]), 256, 4);
+    scattered(&mut dem, 4);
+    let found = |dem: &Grid| fit(dem, &with_bootstrap("exponential", 0), &streams()).unwrap().fit.parameters;
+    let before = found(&dem);
+    let mut s = Streams::for_seed(2, "nanometre").stream("cells");
+    dem.values.iter_mut().for_each(|z| *z += 1e-9 * s.normal());
+    for (name, value) in found(&dem) {
+        assert!((value / before[&name] - 1.0).abs() < 1e-4, "{name}: {value} {}", before[&name]);
+    }
 }

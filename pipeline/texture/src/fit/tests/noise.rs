@@ -99,3 +99,14 @@ fn val_impossible_noise_is_refused() {
     let refused = fit(&measured(TRUTH, 0.0, 1), &settings, &streams()).err().unwrap().to_string();
     assert!(refused.contains("m of noise in the residual"), "{refused}");
 }
+
+/// A texture of the truth reproduces the residual but for its noise: both kinds of fit say so.
+#[test]
+fn val_noise_is_no_part_of_what_a_texture_reproduces() {
+    let dem = measured(TRUTH, 0.0, 3);
+    for model in ["exponential", "empirical"] {
+        let carried = fit(&dem, &noisy(model), &streams()).unwrap().fit.carried.unwrap();
+        assert!((carried.rms_share - 1.0).abs() < 0.03, "{model}: {carried:?}");
+        assert!(carried.increments.iter().all(|o| (o.share - 1.0).abs() < 0.1), "{model}: {carried:?}");
+    }
+}

@@ -3,7 +3,8 @@
 use super::spectrum::Spectrum;
 use crate::covariance::Covariance;
 use crate::covariance::empirical::{self, Composition, Purpose};
-use crate::synth::Wanted;
+use crate::synth::{Wanted, tidy};
+use sastrugi_numeric::Geometry;
 use sastrugi_numeric::fft::HalfSpectrum;
 use sastrugi_roughness::background::BoxWindow;
 use sastrugi_schemas::ParameterError;
@@ -15,9 +16,9 @@ const MULTIPLE_TOLERANCE: f64 = 1e-6;
 /// A spectrum that is not that of a covariance model alone.
 #[derive(Clone)]
 pub enum Aim {
-    /// What a background over the window lacks of the model.
-    Residual { window: BoxWindow },
-    /// A measured covariance, on cells `times` finer (north-south and east-west) than the texture's.
+    /// What a background over the window lacks of the model, on cells `times` finer (north-south and east-west) than the texture's.
+    Residual { window: BoxWindow, times: [usize; 2] },
+    /// A measured covariance, on such cells: those it was measured on.
     Empirical { map: Box<CovarianceMap>, window: BoxWindow, purpose: Purpose, times: [usize; 2] },
 }
 
@@ -38,7 +39,13 @@ impl Aim {
         let Some(map) = &wanted.map else {
             return match purpose {
                 Purpose::Surface => Ok(None),
-                Purpose::Residual => Ok(Some(Self::Residual { window: window_at(cell_m)? })),
+                Purpose::Residual => {
+                    // A window of a few coarse cells is not the fit's: cells no larger than the fit's show it.
+                    let fitted_m = wanted.cell_m.unwrap_or(cell_m);
+                    let times = [1, 0].map(|k| (cell_m[k] / fitted_m[k] * (1.0 - MULTIPLE_TOLERANCE)).ceil().max(1.0));
+                    let window = window_at([cell_m[0] / times[1], cell_m[1] / times[0]])?;
+                    Ok(Some(Self::Residual { window, times: times.map(|t| t as usize) }))
+                }
             };
         };
         empirical::check(map)?;
@@ -52,7 +59,7 @@ impl Aim {
         let times = ratio.map(|r| r.round().max(1.0));
         if [0, 1].iter().any(|&k| (ratio[k] / times[k] - 1.0).abs() > MULTIPLE_TOLERANCE) {
             let message = format!(
-                "is {} x {} m; the covariance was measured on cells of {} x {} m and is known at whole multiples of these only",
+                "is {} x {} m; cells must be whole multiples of the measured covariance's, {} x {} m",
                 cell_m[0], cell_m[1], measured_m[0], measured_m[1]
             );
             return Err(ParameterError::new("cell_m", message));
@@ -66,39 +73,61 @@ impl Aim {
     /// Cells computed with for each cell of the texture.
     pub fn oversampling(&self) -> usize {
         match self {
-            Self::Residual { .. } => 1,
-            Self::Empirical { times, .. } => times[0] * times[1],
+            Self::Residual { times, .. } | Self::Empirical { times, .. } => times[0] * times[1],
         }
     }
 
     /// Sides, east-west and north-south, that a torus needs to hold the measured lags, m.
     pub fn torus_m(&self, cell_m: [f64; 2]) -> [f64; 2] {
         match self {
-            Self::Residual { window } => window.size_m(cell_m).map(|side| 2.0 * side),
+            Self::Residual { window, times } => window.size_m(finer(cell_m, *times)).map(|side| 2.0 * side),
             Self::Empirical { map, times, .. } => {
-                [0, 1].map(|k| (2 * map.max_lag[1 - k] + 2) as f64 * cell_m[k] / times[1 - k] as f64)
+                let fine_m = finer(cell_m, *times);
+                [0, 1].map(|k| (2 * map.max_lag[1 - k] + 2) as f64 * fine_m[k])
             }
         }
+    }
+
+    /// A periodic tile holds the measured lags.
+    ///
+    /// # Errors
+    /// One that is too small.
+    pub fn check_tile(&self, tile: &Geometry) -> Result<(), ParameterError> {
+        let ([needed_x_m, needed_y_m], [x_m, y_m]) = (self.torus_m(tile.cell).map(tidy), tile.size().map(tidy));
+        if matches!(self, Self::Residual { .. }) || (x_m >= needed_x_m && y_m >= needed_y_m) {
+            return Ok(());
+        }
+        let message = format!(
+            "is {x_m} x {y_m} m; a periodic tile of this measured covariance is at least {needed_x_m} x {needed_y_m} m: take a larger one, \
+             or periodic = false"
+        );
+        Err(ParameterError::new("size_m", message))
     }
 
     /// The spectrum on a torus of the texture's cells.
     pub fn spectrum(&self, model: &Covariance, torus: [usize; 2], cell_m: [f64; 2]) -> (Spectrum, Composition) {
         match self {
-            Self::Residual { window } => {
-                let values = empirical::residual_spectrum(model, *window, torus, cell_m);
+            Self::Residual { window, times } => {
+                let fine = [0, 1].map(|k| torus[k] * times[k]);
+                let values = empirical::residual_spectrum(model, *window, fine, finer(cell_m, *times));
+                let half = HalfSpectrum { rows: fine[0], cols: fine[1], values: Vec::new() };
                 let none = Composition { values: Vec::new(), clip_share: 0.0, continued_share: 0.0 };
-                (Spectrum::of_values(torus, values), none)
+                (Spectrum::of_values(torus, folded(&half, values, *times)), none)
             }
             Self::Empirical { map, window, purpose, times } => {
                 let fine = [0, 1].map(|k| torus[k] * times[k]);
-                let fine_m = [0, 1].map(|k| cell_m[k] / times[1 - k] as f64);
-                let mut made = empirical::spectrum(map, model, *window, *purpose, fine, fine_m);
+                let mut made = empirical::spectrum(map, model, *window, *purpose, fine, finer(cell_m, *times));
                 let half = HalfSpectrum { rows: fine[0], cols: fine[1], values: Vec::new() };
                 let values = folded(&half, std::mem::take(&mut made.values), *times);
                 (Spectrum::of_values(torus, values), made)
             }
         }
     }
+}
+
+/// Cells of which `times` (north-south and east-west) make one.
+fn finer(cell_m: [f64; 2], times: [usize; 2]) -> [f64; 2] {
+    [0, 1].map(|k| cell_m[k] / times[1 - k] as f64)
 }
 
 /// The spectrum of every `times[0]`-th row and `times[1]`-th column: the mean over the modes that look alike on them.

@@ -54,6 +54,8 @@ use spectrum::Spectrum;
 pub const CLIP_SHARE_MAX: f64 = 1e-6;
 /// A tile of fewer ranges is worth a note.
 const TILE_RANGES_NOTE: f64 = 4.0;
+/// Share of the variance continued by the model that is worth a note of its own.
+const CONTINUED_SHARE_NOTE: f64 = 0.5;
 /// Bytes per torus cell while a field is made.
 const BYTES_PER_CELL: u64 = 18;
 
@@ -191,6 +193,9 @@ impl FftMa {
             let message = "is `eq10`, which is an isotropic exponential without nugget; the fit is another model";
             return Err(ParameterError::new("spectrum", message));
         }
+        if let Some(aim) = aim.as_ref().filter(|_| parameters.periodic) {
+            aim.check_tile(&tile.geometry)?;
+        }
         let Geometry { rows, cols, cell: [dx, dy], .. } = tile.geometry;
         let [width_m, height_m] =
             aim.as_ref().map_or_else(|| reach::torus_m(wanted), |aim| aim.torus_m(tile.geometry.cell));
@@ -245,6 +250,13 @@ impl FftMa {
                 100.0 * made.clip_share,
                 100.0 * made.continued_share
             ));
+            if made.continued_share > CONTINUED_SHARE_NOTE {
+                notes.push(
+                    "most of the variance is the model's, at waves that the background took away, not measured: lay a texture with \
+                     covariance = \"residual\" on a measured background instead"
+                        .to_owned(),
+                );
+            }
         }
         notes
     }

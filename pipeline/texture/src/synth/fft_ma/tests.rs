@@ -442,6 +442,9 @@ fn val_empirical_refusals() {
     assert!(refused("fft_ma", with("cell_m", json!(0.05)), fit).contains("whole multiples"));
     assert!(refused("fft_ma", with("azimuth_deg", json!(10.0)), fit).contains("is empirical"));
     assert!(refused("fft_ma", with("spectrum", json!("eq10")), fit).contains("surface's exponential alone"));
+    assert!(
+        refused("fft_ma", with("size_px", json!([40, 64])), fit).contains("periodic tile of this measured covariance")
+    );
     let stated = FitFile { map: None, model: "exponential".into(), window_m: None, ..fit.clone() };
     assert!(refused("fft_ma", with("covariance", json!("residual")), &stated).contains("no `window_m`"));
     let mut broken = fit.clone();
@@ -450,4 +453,27 @@ fn val_empirical_refusals() {
         map.covariance_m2.pop();
     }
     assert!(refused("fft_ma", size.clone(), &broken).contains("map.covariance_m2"));
+}
+
+/// Cells that are a good part of the window, or larger, are points of the same residual: its variance is that on the fit's cells.
+#[test]
+fn val_a_residual_on_coarse_cells_keeps_its_variance() {
+    let fit = FitFile {
+        model: "exponential".into(),
+        parameters: [("sigma_m".to_owned(), 0.05), ("range_m".to_owned(), 0.28)].into(),
+        window_m: Some([1.98; 2]),
+        cell_m: Some([0.06; 2]),
+        ..FitFile::default()
+    };
+    let variance = |cell_m: f64, cells: usize| {
+        let raw = json!({ "size_px": [cells, cells], "cell_m": cell_m, "covariance": "residual", "phase": "unit" });
+        let grid =
+            crate::prepare("fft_ma", &raw, &fit).unwrap().generate(&Streams::for_seed(1, "coarse")).unwrap().grid;
+        sums::mean(&grid.values.iter().map(|z| z * z).collect::<Vec<_>>())
+    };
+    let fine = variance(0.06, 500);
+    for (cell_m, cells) in [(0.5, 60), (1.0, 30), (3.0, 10)] {
+        let coarse = variance(cell_m, cells);
+        assert!((coarse / fine - 1.0).abs() < 0.01, "{cell_m}: {coarse:e} {fine:e}");
+    }
 }
