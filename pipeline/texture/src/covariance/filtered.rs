@@ -20,6 +20,9 @@ use sastrugi_numeric::fft::{Complex64, HalfSpectrum, RealFft2, smooth_length};
 use sastrugi_roughness::background::BoxWindow;
 use std::f64::consts::PI;
 
+/// Largest lag at which a residual's covariance counts, windows.
+const REACH_WINDOWS: f64 = 1.5;
+
 /// How a surface was measured.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Measurement {
@@ -33,6 +36,8 @@ pub struct Measurement {
 pub struct DetrendFilter {
     shape: [usize; 2],
     cell_m: [f64; 2],
+    /// Largest lags, cells.
+    reach: [usize; 2],
     measurement: Measurement,
     /// Covariance of the measurement's noise.
     noise: LagField,
@@ -70,7 +75,17 @@ impl DetrendFilter {
         let fft = RealFft2::new(shape[0], shape[1]);
         let response = fft.forward(&complete_window(window, shape)).values.iter().map(|s| s.norm_sqr()).collect();
         let noise = LagField { shape, values: torus_covariance(shape, cell_m, &measurement.noise.covariance()) };
-        Self { shape, cell_m, measurement, noise, fft, response }
+        Self { shape, cell_m, reach: max_lag, measurement, noise, fft, response }
+    }
+
+    /// The filter for all lags at which residuals are correlated, and up to `max_lag` cells: beyond [`REACH_WINDOWS`] windows they
+    /// hardly are, whatever the surface.
+    pub fn wide(window: BoxWindow, cell_m: [f64; 2], max_lag: [usize; 2], measurement: Measurement) -> Self {
+        let width = window.cells();
+        // Profiles have one row.
+        let reach = |k: usize| if width[k] == 1 { 0 } else { (REACH_WINDOWS * width[k] as f64) as usize };
+        let reach = [0, 1].map(|k| max_lag[k].max(reach(k)));
+        Self { reach, ..Self::new(window, cell_m, reach, measurement) }
     }
 
     /// How the surface was measured.
@@ -88,6 +103,18 @@ impl DetrendFilter {
         }
         values.iter_mut().zip(&self.noise.values).for_each(|(own, noise)| *own += noise);
         LagField { shape: self.shape, values }
+    }
+
+    /// The same, 0 beyond the lags that the filter was made for: there the torus joins lags that differ.
+    pub fn residual_within_reach(&self, measured: &LagField) -> LagField {
+        let mut residual = self.residual_covariance(measured);
+        let beyond = |k: usize, place: usize| place.min(self.shape[k] - place) > self.reach[k];
+        for (k, value) in residual.values.iter_mut().enumerate() {
+            if beyond(0, k / self.shape[1]) || beyond(1, k % self.shape[1]) {
+                *value = 0.0;
+            }
+        }
+        residual
     }
 
     /// Covariance that the measurement's noise has in the residual, windows complete.

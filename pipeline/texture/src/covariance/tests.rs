@@ -361,6 +361,7 @@ impl LargeWindows {
         let windows = partial::PartialWindows::new(&cells, self.window, &self.bins, partial::PAIRS_FINE);
         Expectation {
             filter: filtered::DetrendFilter::new(self.window, [1.0; 2], self.window.half, Measurement::default()),
+            wide: filtered::DetrendFilter::wide(self.window, [1.0; 2], self.window.half, Measurement::default()),
             partial_by_distance: windows.by_distance([1.0; 2]),
             partial: windows,
             bins: &self.bins,

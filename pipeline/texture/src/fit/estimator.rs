@@ -11,6 +11,8 @@ use crate::covariance::{Covariance, Form, LagBins};
 
 /// Rounds of weighting by the covariance of the bins.
 const WEIGHTING_ROUNDS: usize = 4;
+/// Shares of the variances of the bins that are added to them, the first that makes their covariance definite.
+const RIDGES: [f64; 5] = [0.0, 1e-6, 1e-5, 1e-4, 1e-3];
 /// A search of more rounds than this moves less, in every coordinate.
 const CONVERGED: f64 = 1e-6;
 
@@ -99,6 +101,7 @@ impl<'a> Estimator<'a> {
         let partial = PartialWindows::new(&case.survey.cells(), case.window, bins, pairs);
         let expectation = Expectation {
             filter: DetrendFilter::new(case.window, case.geometry.cell, case.max_lag, measurement),
+            wide: DetrendFilter::wide(case.window, case.geometry.cell, case.max_lag, measurement),
             partial_by_distance: partial.by_distance(case.geometry.cell),
             partial,
             bins,
@@ -164,10 +167,16 @@ impl<'a> Estimator<'a> {
         Likelihood { weights, chi2: end.value, bins: self.bins.len(), scatter }
     }
 
-    /// Factor of the covariance of the bins for a surface.
+    /// Factor of the covariance of the bins for a surface. Of a smooth one that reaches beyond the window it is known approximately and may
+    /// be indefinite: as much is added to its diagonal as makes it definite.
     pub fn weights(&self, covariance: &Covariance) -> Option<Cholesky> {
         let matrix = self.expectation.covariance(covariance, self.case.survey.trim.threshold_m);
-        Cholesky::new(&matrix, self.bins.len())
+        let n = self.bins.len();
+        RIDGES.into_iter().find_map(|ridge| {
+            let mut raised = matrix.clone();
+            (0..n).for_each(|k| raised[k * n + k] *= 1.0 + ridge);
+            Cholesky::new(&raised, n)
+        })
     }
 
     fn search(&self, form: &Form, start: &[f64], weights: Option<&Cholesky>) -> Minimum {

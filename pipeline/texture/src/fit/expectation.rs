@@ -33,6 +33,8 @@ const MEAN_ERROR: f64 = 3e-4;
 pub struct Expectation<'a> {
     /// The detrender where windows are complete.
     pub filter: DetrendFilter,
+    /// The same for lags at which residuals are still correlated.
+    pub wide: DetrendFilter,
     /// What partial windows change.
     pub partial: PartialWindows,
     /// The same for models without a direction, of sharp surfaces.
@@ -92,13 +94,13 @@ impl Expectation<'_> {
 
     /// Covariance of the bins' estimates, row-major, m4.
     pub fn covariance(&self, model: &Covariance, threshold_m: f64) -> Vec<f64> {
-        let residual = self.filter.residual_covariance(&self.filter.measured_covariance(model));
+        let residual = self.wide.residual_within_reach(&self.wide.measured_covariance(model));
         let variance = residual.at([0, 0]);
         let trimmed = trimmed(variance, threshold_m);
         let products = residual.map(|c| variance * trimmed.moments(c / variance).0);
         let linear = residual.map(|c| trimmed.linear_share() * c);
         let [second, product_orders, linear_order] =
-            [&residual, &products, &linear].map(|field| self.bartlett(&self.filter.autocorrelation(field)));
+            [&residual, &products, &linear].map(|field| self.bartlett(&self.wide.autocorrelation(field)));
 
         let bin_covariance = self.bins.average(|lag| residual.at(lag));
         let answers: Vec<[f64; 2]> =
