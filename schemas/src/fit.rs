@@ -71,20 +71,35 @@ pub struct FitFile {
 }
 
 impl FitFile {
-    /// Level of the test of misfit from which on parametric intervals are not to be trusted.
-    const MISFIT_LEVEL: f64 = 0.01;
+    /// Level of the tests from which on parametric intervals are not to be trusted.
+    const TEST_LEVEL: f64 = 0.01;
+    /// Root mean square misfit of the bins, over the variance, from which on the model is wrong whatever the test says.
+    const MISFIT_MAX: f64 = 0.05;
 
-    /// The intervals to quote, and what they are: those by blocks where the model misfits and there are any.
+    /// The intervals to quote, and what they are: those by blocks where the model misfits or the site is not stationary, and there are any.
     pub fn quoted_intervals(&self) -> Option<(&Intervals, &'static str)> {
-        let p = self.diagnostics.get("misfit_p").and_then(Value::as_f64);
-        let misfits = p.is_some_and(|p| p <= Self::MISFIT_LEVEL);
-        match (misfits, &self.block_intervals, &self.intervals) {
-            (true, Some(blocks), _) => Some((blocks, "block bootstrap, as the model misfits")),
-            (_, _, Some(own)) if own.from_profile => Some((own, "profile likelihood")),
-            (_, _, Some(own)) => Some((own, "parametric bootstrap")),
-            (_, Some(blocks), None) => Some((blocks, "block bootstrap")),
-            (_, None, None) => None,
+        let blocks = self.block_intervals.as_ref();
+        match (&self.intervals, blocks) {
+            (Some(_), Some(blocks)) if self.misfits() => Some((blocks, "block bootstrap, as the model misfits")),
+            (Some(_), Some(blocks)) if self.rejects("stationarity_p") => {
+                Some((blocks, "block bootstrap, as the site is not stationary"))
+            }
+            (Some(own), _) if own.from_profile => Some((own, "profile likelihood")),
+            (Some(own), _) => Some((own, "parametric bootstrap")),
+            (None, Some(blocks)) => Some((blocks, "block bootstrap")),
+            (None, None) => None,
         }
+    }
+
+    /// Whether the model is not that of the data.
+    fn misfits(&self) -> bool {
+        let variance_m2 = self.covariance_m2.first().copied().unwrap_or(f64::NAN);
+        let misfit_m2 = self.diagnostics.get("misfit_m2").and_then(Value::as_f64).unwrap_or(f64::NAN);
+        self.rejects("misfit_p") || misfit_m2 > Self::MISFIT_MAX * variance_m2
+    }
+
+    fn rejects(&self, p: &str) -> bool {
+        self.diagnostics.get(p).and_then(Value::as_f64).is_some_and(|p| p <= Self::TEST_LEVEL)
     }
 
     /// Whether the search for the range ended at its bound: then range and sigma are no estimates, only their lower limits are known.
