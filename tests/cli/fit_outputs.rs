@@ -174,6 +174,30 @@ fn val_tables_that_would_replace_a_file_are_refused() {
     assert!(call.code != 0 && text(path, "plot.csv").is_empty(), "{}", call.stderr);
 }
 
+/// Maps that a fit cannot have are refused before it is made: a plane, which has no fit, is not looked at.
+#[test]
+fn val_maps_are_checked_before_the_fit() {
+    let folder = site();
+    let path = folder.path();
+    let row = |r: usize| (0..120).map(|c| (c + 2 * r).to_string()).collect::<Vec<_>>().join(" ");
+    let rows: Vec<String> = (0..120).map(row).collect();
+    let head = "ncols 120\nnrows 120\nxllcorner 0\nyllcorner 0\ncellsize 0.1\nnodata_value -9999\n";
+    write(path, "plane.asc", &format!("{head}{}\n", rows.join("\n")));
+    let call = fit(path, &["plane.asc", "--local", "m", "--local-block", "3", "-o", "refused.json"]);
+    let plane = "the DEM is flat or a plane: no residual above rounding error";
+    assert!(call.code == 65 && call.stderr.contains(plane), "{}", call.stderr);
+    for (more, words) in [
+        (&["--local-block", "2.9"][..], "`--local-block` is 2.9 m; blocks are at least two windows, 3 m"),
+        (&["--local-block", "nan"], "`--local-block`"),
+        (&["--mode", "paper"], "`--local` needs a `corrected` fit"),
+    ] {
+        refused(path, &[&["plane.asc", "--local", "m", "-o", "refused.json"], more].concat(), words);
+    }
+    let lines: String = (0..99).map(|k| format!("{k},{}\n", k % 2)).collect();
+    write(path, "lines.csv", &format!("x,a\n{lines}"));
+    refused(path, &["lines.csv", "--local", "m", "-o", "refused.json"], "`--local` needs a raster, not transects");
+}
+
 /// A site whose eastern half is twice as rough: the maps lie where the DEM lies and show it. Sigma of a block has a standard error of about
 /// 1.5 % here, which leaves the bounds to the halves themselves.
 #[test]
@@ -211,7 +235,8 @@ fn val_local_maps_show_where_a_site_is_rougher() {
         assert!((ratio / factor - 1.0).abs() < 0.1 * factor, "{name}: {ratio}");
     }
     for (arguments, words) in [
-        (&["site.asc", "--local", "refused", "--local-block", "1", "-o", "refused.json"][..], "at least two windows"),
+        (&["site.asc", "--local", "refused", "--local-block", "1", "-o", "refused.json"][..], "`--local-block` is 1 m"),
+        (&["site.asc", "--local", "refused", "--local-block", "20", "-o", "refused.json"], "at most the DEM, 12 m"),
         (&["site.asc", "--local-block", "4", "-o", "refused.json"], "--local"),
         (&["site.asc", "--local", "refused", "--mode", "paper", "-o", "refused.json"], "corrected"),
         (&["site.asc", "--local", "x", "--map", "x.sigma.tif", "-o", "refused.json"], "another file of this call"),
