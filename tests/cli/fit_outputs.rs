@@ -168,6 +168,11 @@ fn val_tables_that_would_replace_a_file_are_refused() {
         assert!(call.code == 2 && call.stderr.contains(words), "{arguments:?}: {} {}", call.code, call.stderr);
         assert!(!path.join("t.csv").exists() && !path.join("fits").exists());
     }
+    // Fit files of several DEMs go into a folder: a file of that name is refused before any fit.
+    write(path, "taken", "kept");
+    let call = fit(path, &["snow.tif", "april.tif", "--table", "t.csv", "-o", "taken"]);
+    assert!(call.code == 2 && call.stderr.contains("taken: is a file; `-o` names a folder"), "{}", call.stderr);
+    assert!(text(path, "taken") == "kept" && !path.join("t.csv").exists());
     // A mask's name is an input as well.
     write(path, "plot.csv", "");
     let call = fit(path, &["snow.tif", "april.tif", "--exclude", "plot.csv", "--table", "plot.csv"]);

@@ -67,6 +67,10 @@ pub fn fits(request: &Request<'_>, hear: &mut dyn FnMut(&Path, &Result<Done, Err
 fn fit_files(request: &Request<'_>) -> Result<Vec<Option<PathBuf>>, Error> {
     let mut owners: BTreeMap<PathBuf, &Path> = BTreeMap::new();
     let single = request.dems.len() == 1;
+    if let Some(path) = request.output.filter(|path| !single && path.exists() && !path.is_dir()) {
+        let message = format!("{}: is a file; `-o` names a folder for the fit files of several DEMs", path.display());
+        return Err(Error::Usage(message));
+    }
     let of = |dem: &PathBuf| {
         request.output.map(|path| if single { path.to_owned() } else { path.join(format!("{}.json", stem(dem))) })
     };
