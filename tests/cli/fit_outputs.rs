@@ -92,10 +92,18 @@ fn val_bins_are_flat_and_those_of_the_fit_file() {
     refused(path, &["snow.tif", "--csv", "refused.csv", "-o", "refused.csv"], "another file of this call");
 }
 
-/// Rows of a table as CSV, by the names of the columns.
-fn table(folder: &Path, name: &str) -> Vec<BTreeMap<String, String>> {
+/// Rows of a table as CSV, by the names of the columns. Commas within quotes stay.
+pub fn table(folder: &Path, name: &str) -> Vec<BTreeMap<String, String>> {
     let text = text(folder, name);
-    let mut lines = text.lines().map(|line| line.split(',').map(str::to_owned).collect::<Vec<_>>());
+    let cells = |line: &str| {
+        let mut quoted = false;
+        let comma = |c: char| {
+            quoted ^= c == '"';
+            c == ',' && !quoted
+        };
+        line.split(comma).map(str::to_owned).collect::<Vec<_>>()
+    };
+    let mut lines = text.lines().map(cells);
     let header = lines.next().unwrap();
     lines.map(|row| header.iter().cloned().zip(row).collect()).collect()
 }
