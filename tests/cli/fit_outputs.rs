@@ -135,6 +135,31 @@ fn val_several_dems_make_one_table() {
     assert!(!path.join("snow.json").exists());
 }
 
+/// A range at the bound of the search is no estimate: printed alone and in a table it is a lower limit of the profile, or, where the model
+/// misfits and blocks know no end, not identified; sigma^2 / b has its interval.
+#[test]
+fn val_a_range_at_the_bound_is_no_estimate() {
+    let folder = area();
+    let path = folder.path();
+    write(path, "long.json", &FIT.replace("0.3", "50"));
+    let call = ["texture", "long.json", "--size", "30x30", "--cell", "0.1", "--phase", "gaussian", "--seed", "4"];
+    assert_eq!(sastrugi_in(path, &[&call[..], &["--set", "periodic=false", "-o", "long.tif"]].concat()).code, 0);
+    let call = ["terrain", "multifractal", "--set", "size_px=[300,300]", "--set", "cell_m=0.1", "-o", "rough.tif"];
+    assert_eq!(sastrugi_in(path, &call).code, 0);
+    let options = ["--outer-scale", "1.5", "--bootstrap", "39", "--quiet"];
+    let fit = |more: &[&str]| sastrugi_in(path, &[&["fit"], more, &options].concat()).stdout;
+    let table = fit(&["long.tif", "rough.tif", "--table", "t.csv"]);
+    let line = |name: &str| table.lines().find(|line| line.starts_with(name)).unwrap().to_owned();
+    let (long, rough) = (line("long.tif"), line("rough.tif"));
+    assert!(long.matches("at least").count() == 2 && long.ends_with("95 %, profile likelihood"), "{long}");
+    assert!(rough.matches("not identified").count() == 2 && rough.contains("block bootstrap"), "{rough}");
+    let alone = fit(&["rough.tif", "-o", "rough.json"]);
+    assert!(alone.contains("range_m not identified (") && alone.contains("sigma^2/b_m = 0.00"), "{alone}");
+    assert!(!alone.contains("profile likelihood"), "{alone}");
+    let alone = fit(&["long.tif", "-o", "long.fit.json"]);
+    assert!(alone.contains("range_m at least ") && alone.contains("(95 %, profile likelihood)"), "{alone}");
+}
+
 #[test]
 fn val_one_failing_dem_does_not_lose_the_others() {
     let folder = site();
