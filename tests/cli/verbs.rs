@@ -122,6 +122,39 @@ fn val_fit_texture_roughness_and_info_work_on_files() {
     assert_eq!(ok_json(path, &["info", "sum.tif"])["rows"], 128);
 }
 
+const SNOW: &str = r#"{"model": "exponential", "parameters": {"sigma_m": 0.02, "range_m": 0.3}}"#;
+
+fn site(path: &Path) {
+    write(path, "truth.json", SNOW);
+    let call = ["texture", "truth.json", "--size", "12x12", "--cell", "0.1", "--phase", "gaussian", "-o", "site.tif"];
+    ok(path, &call);
+}
+
+/// The verb says when it takes `residual` by itself, when the base is the DEM that was fitted, and that `--fill` takes the model.
+#[test]
+fn val_notes_of_a_texture_on_a_base() {
+    let folder = area();
+    let path = folder.path();
+    site(path);
+    let fit = ["fit", "site.tif", "--outer-scale", "1.5", "--bootstrap", "0", "--model", "empirical"];
+    ok(path, &[&fit[..], &["--background", "background.tif", "-o", "f.json"]].concat());
+    let notes = |more: &[&str]| {
+        let call = ["texture", "f.json", "-o", "t.tif"];
+        ok_json(path, &[&call[..], more].concat())["notes"].to_string()
+    };
+    let size = ["--size", "12x12", "--cell", "0.1"];
+    let chosen = "covariance = residual: the base is taken for a measured background";
+    let own = "still has its own texture";
+    let onto = |base: &str, more: &[&str]| notes(&[&size[..], &["--onto", base], more].concat());
+    let said = onto("background.tif", &[]);
+    assert!(said.contains(chosen) && !said.contains(own), "{said}");
+    let said = onto("site.tif", &["--covariance", "residual"]);
+    assert!(!said.contains(chosen) && said.contains(own) && said.contains("fit --background"), "{said}");
+    assert!(!notes(&size).contains(chosen));
+    let said = notes(&["--fill", "site.tif"]);
+    assert!(said.contains("the fit is empirical; holes are filled with the fitted model (exponential)"), "{said}");
+}
+
 /// A surface that was scaled to 3 cm in a vehicle's band has that RMS there, by lengths, by name and by band; the map as text
 /// has a prediction beside each measured value.
 #[test]

@@ -329,6 +329,22 @@ fn parameters(item: &TextureItem, matched: &Matched, draft: &dyn Synthesis) -> V
     Value::Object(all)
 }
 
+/// Said of holes that are filled by an empirical fit.
+pub fn fill_note(fit: &FitFile) -> Option<String> {
+    let model = &fit.map.as_ref()?.model;
+    let text = "the fit is empirical; holes are filled with the fitted model";
+    Some(format!("{text} ({model}), not with the measured covariance"))
+}
+
+/// Said where a texture is added to the DEM that its fit was made from; `background` says where to find that DEM without its
+/// texture.
+pub fn has_its_texture(background: &str) -> String {
+    format!(
+        "the base is the DEM that was fitted and still has its own texture; add the texture to the background of the fit \
+         ({background}; in a release fit/<id>.background.tif)"
+    )
+}
+
 /// Base plus texture; a texture that does not repeat without seams must cover the base.
 ///
 /// # Errors
@@ -440,7 +456,7 @@ impl TextureJob {
         let dem = dem::read(&work.parent(dem, HEIGHTS)?).map_err(|e| input_error(&e))?;
         let covariance = Covariance::of_fit(fit).map_err(JobError::new)?;
         let filled = conditional::fill(&dem.grid, &covariance, &self.streams).map_err(JobError::new)?;
-        let notes = vec![filled.to_string()];
+        let notes = [filled.to_string()].into_iter().chain(fill_note(fit)).collect();
         self.released(work, &filled.grid, &dem.info.crs, Rows::default(), notes)
     }
 
