@@ -102,10 +102,52 @@ impl FitFile {
         self.diagnostics.get(p).and_then(Value::as_f64).is_some_and(|p| p <= Self::TEST_LEVEL)
     }
 
+    /// A parameter, or `sigma2_over_range_m` (sigma^2 / b, m) of a model that has it; `None` where the fit has none.
+    pub fn parameter(&self, name: &str) -> Option<f64> {
+        match name {
+            SILL_OVER_RANGE => self.diagnostics.get(name).and_then(Value::as_f64),
+            _ => self.parameters.get(name).copied(),
+        }
+    }
+
+    /// A parameter as it is to be quoted, with the interval of [`Self::quoted_intervals`]; `None` where the fit has none.
+    pub fn quoted(&self, name: &str) -> Option<Quoted> {
+        let value = self.parameter(name)?;
+        let interval = self.quoted_intervals().and_then(|(intervals, _)| intervals.values.get(name).copied());
+        let bounded = self.range_at_bound() && ["sigma_m", "range_m"].contains(&name);
+        Some(match (bounded, interval) {
+            (false, interval) => Quoted::Estimate { value, interval },
+            (true, Some([Some(low), _])) => Quoted::AtLeast(low),
+            (true, _) => Quoted::NotIdentified { ended: value },
+        })
+    }
+
     /// Whether the search for the range ended at its bound: then range and sigma are no estimates, only their lower limits are known.
     pub fn range_at_bound(&self) -> bool {
         self.diagnostics.get("range_at_search_bound").and_then(Value::as_bool).unwrap_or(false)
     }
+}
+
+/// Name of sigma^2 / b among intervals.
+pub const SILL_OVER_RANGE: &str = "sigma2_over_range_m";
+
+/// How a parameter of a fit is quoted.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Quoted {
+    /// An estimate with its interval, where there is one; an end is `None` where the data knows none.
+    Estimate {
+        /// The estimate.
+        value: f64,
+        /// Lower and upper end.
+        interval: Option<[Option<f64>; 2]>,
+    },
+    /// The search for the range ended at its bound: the lower end of the interval is all that is known.
+    AtLeast(f64),
+    /// The search ended at its bound, and the interval has no lower end.
+    NotIdentified {
+        /// Value where the search ended.
+        ended: f64,
+    },
 }
 
 /// Measured covariance by lag, of a fit whose `model` is `empirical`; its lags are in cells of `cell_m`.
@@ -289,4 +331,39 @@ pub struct GsTools {
     /// Other arguments: `rescale`, `nu`.
     #[serde(flatten)]
     pub more: BTreeMap<String, f64>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    fn intervals(range: [Option<f64>; 2], from_profile: bool) -> Option<Intervals> {
+        let values = [("range_m".to_owned(), range), (SILL_OVER_RANGE.to_owned(), [Some(0.001), Some(0.002)])].into();
+        Some(Intervals { level: 0.95, replicates: 99, from_profile, values })
+    }
+
+    /// At the bound of the search the lower end of the quoted interval is all that is quoted: the profile's, unless the model
+    /// misfits and there are blocks.
+    #[test]
+    fn val_a_range_at_the_bound_is_quoted_as_a_limit() {
+        let fit = FitFile {
+            parameters: [("sigma_m".to_owned(), 1.0), ("range_m".to_owned(), 420.0)].into(),
+            intervals: intervals([Some(4.4), None], true),
+            block_intervals: intervals([None, None], false),
+            diagnostics: [("range_at_search_bound".to_owned(), json!(true))].into(),
+            ..FitFile::default()
+        };
+        assert_eq!(fit.quoted("range_m"), Some(Quoted::AtLeast(4.4)));
+        assert_eq!(fit.quoted("sigma_m"), Some(Quoted::NotIdentified { ended: 1.0 }));
+        let sill = Quoted::Estimate { value: 1.0 / 420.0, interval: Some([Some(0.001), Some(0.002)]) };
+        assert_eq!(fit.quoted(SILL_OVER_RANGE), Some(sill));
+        assert_eq!(fit.quoted("nugget_m2"), None);
+        let mut misfit = fit.clone();
+        misfit.diagnostics.insert("misfit_p".to_owned(), json!(0.001));
+        assert_eq!(misfit.quoted("range_m"), Some(Quoted::NotIdentified { ended: 420.0 }));
+        let found = FitFile { diagnostics: BTreeMap::new(), ..fit };
+        let estimate = Quoted::Estimate { value: 420.0, interval: Some([Some(4.4), None]) };
+        assert_eq!(found.quoted("range_m"), Some(estimate));
+    }
 }

@@ -275,9 +275,10 @@ pub struct TextureItem {
     /// Realisations of each method that the scoreboard measures.
     #[serde(default = "default_realisations")]
     pub realisations: u32,
-    /// Id of the terrain or DEM that the texture is added to; the texture stands alone when absent.
+    /// What the texture is added to: the id of a terrain or DEM, or `{ background = "<fit id>" }`, the background that a fit took
+    /// off; the texture stands alone when absent.
     #[serde(default)]
-    pub onto: Option<String>,
+    pub onto: Option<Onto>,
     /// Factor of the texture on its base: the id of a raster of factors, or a table by the base's slope.
     #[serde(default)]
     pub modulate: Option<Modulate>,
@@ -296,6 +297,23 @@ pub struct TextureItem {
     /// One item (or one set of replicates) per value of a parameter: `sweep.<parameter> = [...]`.
     #[serde(default)]
     pub sweep: BTreeMap<String, Vec<serde_json::Value>>,
+}
+
+/// Base of a texture.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(
+    untagged,
+    deny_unknown_fields,
+    expecting = "`onto` is the id of a terrain or DEM, or a table `{ background = \"<fit id>\" }`"
+)]
+pub enum Onto {
+    /// Id of a terrain or DEM.
+    Id(String),
+    /// The DEM without its texture.
+    Background {
+        /// Id of the fit that took the background off its DEM.
+        background: String,
+    },
 }
 
 /// Factor of a texture on its base.

@@ -293,7 +293,7 @@ fn val_rasters_that_cannot_be_fitted_say_why() {
     let path = folder.path();
     let flat = "1 ".repeat(64 * 64);
     write(path, "flat.asc", &format!("ncols 64\nnrows 64\nxllcorner 0\nyllcorner 0\ncellsize 0.1\n{flat}\n"));
-    refused(path, &["fit", "flat.asc", "--outer-scale", "1", "-o", "fit.json"], INPUT, &["constant"]);
+    refused(path, &["fit", "flat.asc", "--outer-scale", "1", "-o", "fit.json"], INPUT, &["flat or a plane"]);
     refused(path, &["fit", "flat.asc", "--outer-scale", "5", "-o", "fit.json"], INPUT, &["window"]);
     refused(path, &["fit", "flat.asc", "--outer-scale", "-1", "-o", "fit.json"], USAGE, &["outer_scale_m"]);
     refused(path, &["fit", "flat.asc", "--trim", "0.7", "-o", "fit.json"], USAGE, &["trim"]);
@@ -350,7 +350,7 @@ fn val_everything_that_a_fit_refuses() {
     fit("white.asc", &[&scale("1")[..], &["--mode", "paper"]].concat(), INPUT, &["white"]);
     fit("white.asc", &["--trim", "0"], USAGE, &["trim"]);
     fit("white.asc", &["--trim", "0.5"], USAGE, &["trim"]);
-    fit("flat.asc", &scale("1"), INPUT, &["no texture", "constant", "3 m"]);
+    fit("flat.asc", &scale("1"), INPUT, &["flat or a plane", "rounding error"]);
     fit("void.asc", &scale("1"), INPUT, &["void.asc", "none of the 96 x 96 cells holds data"]);
     fit("sparse.asc", &scale("1"), INPUT, &["0.5 of its window", "min_valid_share"]);
     let ring = "[[-1, -1], [99, -1], [99, 99], [-1, 99], [-1, -1]]";

@@ -135,7 +135,7 @@ fn val_flat_ground_has_no_shift() {
     write(path, "b.asc", &noisy(&moved(&text, [0.0; 2], 1.0, [0.0; 2]), 0.01, 1));
     let result = coregistered(path, &["a.asc", "b.asc"]);
     let c = &result["coregistration"];
-    assert!(c["shift_m"].is_null() && c["gained"] == false && (number(&c["raise_m"]) + 1.0).abs() < 0.002, "{c}");
+    assert!(c["shift_m"].is_null() && c["gained"].is_null() && (number(&c["raise_m"]) + 1.0).abs() < 0.002, "{c}");
     assert!(result["verdict"].as_str().unwrap().starts_with("no horizontal shift"), "{result}");
     let call = sastrugi_in(path, &["coregister", "a.asc", "b.asc"]);
     assert!(call.code == 0 && !call.stdout.contains("shifted as well"), "{}", call.stdout);

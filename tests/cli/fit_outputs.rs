@@ -92,10 +92,18 @@ fn val_bins_are_flat_and_those_of_the_fit_file() {
     refused(path, &["snow.tif", "--csv", "refused.csv", "-o", "refused.csv"], "another file of this call");
 }
 
-/// Rows of a table as CSV, by the names of the columns.
-fn table(folder: &Path, name: &str) -> Vec<BTreeMap<String, String>> {
+/// Rows of a table as CSV, by the names of the columns. Commas within quotes stay.
+pub fn table(folder: &Path, name: &str) -> Vec<BTreeMap<String, String>> {
     let text = text(folder, name);
-    let mut lines = text.lines().map(|line| line.split(',').map(str::to_owned).collect::<Vec<_>>());
+    let cells = |line: &str| {
+        let mut quoted = false;
+        let comma = |c: char| {
+            quoted ^= c == '"';
+            c == ',' && !quoted
+        };
+        line.split(comma).map(str::to_owned).collect::<Vec<_>>()
+    };
+    let mut lines = text.lines().map(cells);
     let header = lines.next().unwrap();
     lines.map(|row| header.iter().cloned().zip(row).collect()).collect()
 }
@@ -125,6 +133,31 @@ fn val_several_dems_make_one_table() {
     let info = sastrugi_in(path, &["info", "season.parquet"]);
     assert!(info.code == 0 && info.stdout.contains("dem_fits"), "{}{}", info.stdout, info.stderr);
     assert!(!path.join("snow.json").exists());
+}
+
+/// A range at the bound of the search is no estimate: printed alone and in a table it is a lower limit of the profile, or, where the model
+/// misfits and blocks know no end, not identified; sigma^2 / b has its interval.
+#[test]
+fn val_a_range_at_the_bound_is_no_estimate() {
+    let folder = area();
+    let path = folder.path();
+    write(path, "long.json", &FIT.replace("0.3", "50"));
+    let call = ["texture", "long.json", "--size", "30x30", "--cell", "0.1", "--phase", "gaussian", "--seed", "4"];
+    assert_eq!(sastrugi_in(path, &[&call[..], &["--set", "periodic=false", "-o", "long.tif"]].concat()).code, 0);
+    let call = ["terrain", "multifractal", "--set", "size_px=[300,300]", "--set", "cell_m=0.1", "-o", "rough.tif"];
+    assert_eq!(sastrugi_in(path, &call).code, 0);
+    let options = ["--outer-scale", "1.5", "--bootstrap", "39", "--quiet"];
+    let fit = |more: &[&str]| sastrugi_in(path, &[&["fit"], more, &options].concat()).stdout;
+    let table = fit(&["long.tif", "rough.tif", "--table", "t.csv"]);
+    let line = |name: &str| table.lines().find(|line| line.starts_with(name)).unwrap().to_owned();
+    let (long, rough) = (line("long.tif"), line("rough.tif"));
+    assert!(long.matches("at least").count() == 2 && long.ends_with("95 %, profile likelihood"), "{long}");
+    assert!(rough.matches("not identified").count() == 2 && rough.contains("block bootstrap"), "{rough}");
+    let alone = fit(&["rough.tif", "-o", "rough.json"]);
+    assert!(alone.contains("range_m not identified (") && alone.contains("sigma^2/b_m = 0.00"), "{alone}");
+    assert!(!alone.contains("profile likelihood"), "{alone}");
+    let alone = fit(&["long.tif", "-o", "long.fit.json"]);
+    assert!(alone.contains("range_m at least ") && alone.contains("(95 %, profile likelihood)"), "{alone}");
 }
 
 #[test]
@@ -168,10 +201,39 @@ fn val_tables_that_would_replace_a_file_are_refused() {
         assert!(call.code == 2 && call.stderr.contains(words), "{arguments:?}: {} {}", call.code, call.stderr);
         assert!(!path.join("t.csv").exists() && !path.join("fits").exists());
     }
+    // Fit files of several DEMs go into a folder: a file of that name is refused before any fit.
+    write(path, "taken", "kept");
+    let call = fit(path, &["snow.tif", "april.tif", "--table", "t.csv", "-o", "taken"]);
+    assert!(call.code == 2 && call.stderr.contains("taken: is a file; `-o` names a folder"), "{}", call.stderr);
+    assert!(text(path, "taken") == "kept" && !path.join("t.csv").exists());
     // A mask's name is an input as well.
     write(path, "plot.csv", "");
     let call = fit(path, &["snow.tif", "april.tif", "--exclude", "plot.csv", "--table", "plot.csv"]);
     assert!(call.code != 0 && text(path, "plot.csv").is_empty(), "{}", call.stderr);
+}
+
+/// Maps that a fit cannot have are refused before it is made: a plane, which has no fit, is not looked at.
+#[test]
+fn val_maps_are_checked_before_the_fit() {
+    let folder = site();
+    let path = folder.path();
+    let row = |r: usize| (0..120).map(|c| (c + 2 * r).to_string()).collect::<Vec<_>>().join(" ");
+    let rows: Vec<String> = (0..120).map(row).collect();
+    let head = "ncols 120\nnrows 120\nxllcorner 0\nyllcorner 0\ncellsize 0.1\nnodata_value -9999\n";
+    write(path, "plane.asc", &format!("{head}{}\n", rows.join("\n")));
+    let call = fit(path, &["plane.asc", "--local", "m", "--local-block", "3", "-o", "refused.json"]);
+    let plane = "the DEM is flat or a plane: no residual above rounding error";
+    assert!(call.code == 65 && call.stderr.contains(plane), "{}", call.stderr);
+    for (more, words) in [
+        (&["--local-block", "2.9"][..], "`--local-block` is 2.9 m; blocks are at least two windows, 3 m"),
+        (&["--local-block", "nan"], "`--local-block`"),
+        (&["--mode", "paper"], "`--local` needs a `corrected` fit"),
+    ] {
+        refused(path, &[&["plane.asc", "--local", "m", "-o", "refused.json"], more].concat(), words);
+    }
+    let lines: String = (0..99).map(|k| format!("{k},{}\n", k % 2)).collect();
+    write(path, "lines.csv", &format!("x,a\n{lines}"));
+    refused(path, &["lines.csv", "--local", "m", "-o", "refused.json"], "`--local` needs a raster, not transects");
 }
 
 /// A site whose eastern half is twice as rough: the maps lie where the DEM lies and show it. Sigma of a block has a standard error of about
@@ -211,7 +273,8 @@ fn val_local_maps_show_where_a_site_is_rougher() {
         assert!((ratio / factor - 1.0).abs() < 0.1 * factor, "{name}: {ratio}");
     }
     for (arguments, words) in [
-        (&["site.asc", "--local", "refused", "--local-block", "1", "-o", "refused.json"][..], "at least two windows"),
+        (&["site.asc", "--local", "refused", "--local-block", "1", "-o", "refused.json"][..], "`--local-block` is 1 m"),
+        (&["site.asc", "--local", "refused", "--local-block", "20", "-o", "refused.json"], "at most the DEM, 12 m"),
         (&["site.asc", "--local-block", "4", "-o", "refused.json"], "--local"),
         (&["site.asc", "--local", "refused", "--mode", "paper", "-o", "refused.json"], "corrected"),
         (&["site.asc", "--local", "x", "--map", "x.sigma.tif", "-o", "refused.json"], "another file of this call"),

@@ -1,6 +1,7 @@
 //! `fit A --minus B`: B is co-registered to A, and the fit is that of the difference.
 
 use crate::coregister::{moved, noisy, number};
+use crate::fit_outputs::table;
 use sastrugi_tests::{area, sastrugi_in, write};
 use serde_json::Value;
 use std::path::Path;
@@ -117,6 +118,7 @@ fn val_a_failed_fit_keeps_the_coregistration() {
     let ground = ["terrain", "multifractal", "--set", "size_px=[150,150]", "--set", "cell_m=0.1", "-o", "ground.asc"];
     done(path, &ground);
     let text = std::fs::read_to_string(path.join("ground.asc")).unwrap();
+    write(path, "snow.json", FIT);
     write(path, "one.asc", &noisy(&text, 0.02, 1));
     write(path, "two.asc", &noisy(&moved(&text, [0.03, 0.02], 1.0, [0.0; 2]), 0.02, 2));
     let fit = ["fit", "one.asc", "--minus", "two.asc", "--bootstrap", "0", "-o", "fit.json"];
@@ -133,6 +135,39 @@ fn val_a_failed_fit_keeps_the_coregistration() {
     let c = &kept["source"]["minus"]["coregistration"];
     assert!(call.code == 65 && kept["error"].as_str().unwrap().contains("white"), "{kept}");
     assert!((number(&c["shift_m"][0]) + 0.03).abs() < 0.005 && (number(&c["raise_m"]) + 1.0).abs() < 0.005, "{c}");
+
+    // In a table the co-registration stands without a fit, and with one.
+    done(
+        path,
+        &[
+            "texture",
+            "snow.json",
+            "--size",
+            "15x15",
+            "--cell",
+            "0.1",
+            "--phase",
+            "gaussian",
+            "--onto",
+            "one.asc",
+            "-o",
+            "snow.asc",
+        ],
+    );
+    let call = ["fit", "one.asc", "snow.asc", "--minus", "two.asc", "--bootstrap", "0", "--table", "t.csv"];
+    assert_eq!(sastrugi_in(path, &call).code, 3);
+    let rows = table(path, "t.csv");
+    for row in &rows {
+        let column = |name: &str| row[name].parse::<f64>().unwrap();
+        // Snow of 10 cm hides some of the shift.
+        let off = [column("shift_east_m") + 0.03, column("shift_north_m") + 0.02];
+        assert!(off.iter().all(|off| off.abs() < 0.03), "{row:?}");
+        assert!(column("nmad_before_m") > 0.02 && column("nmad_after_m") > 0.02, "{row:?}");
+        assert!((column("raise_m") + 1.0).abs() < 0.05, "{row:?}");
+    }
+    assert_eq!([&rows[0]["gained"], &rows[1]["gained"]], ["true", "false"]);
+    assert!(rows[0]["error"].contains("white") && rows[0]["verdict"].is_empty(), "{rows:?}");
+    assert!(rows[1]["error"].is_empty() && rows[1]["carried_rms_share"].parse::<f64>().unwrap() > 0.5, "{rows:?}");
 
     let study = "[study]\nname = \"depth\"\nseed = 1\ndate = \"2026-01-01\"\n[[dem]]\nid = \"one\"\nfile = \"one.asc\"\n[[dem]]\n\
                  id = \"two\"\nfile = \"two.asc\"\n[[fit]]\nid = \"depth\"\ndem = \"one\"\nminus = \"two\"\nbootstrap = 0\n";

@@ -122,6 +122,90 @@ fn val_fit_texture_roughness_and_info_work_on_files() {
     assert_eq!(ok_json(path, &["info", "sum.tif"])["rows"], 128);
 }
 
+/// A study with a snow-like site, its fit, and textures of it.
+fn textured(textures: &str) -> String {
+    format!(
+        "[study]\nname = \"textured\"\nseed = 1\ndate = \"2026-01-01\"\n[[dem]]\nid = \"site\"\nfile = \"site.tif\"\n[[fit]]\nid = \"f\"\n\
+         dem = \"site\"\nouter_scale_m = 1.5\nbootstrap = 0\n{textures}"
+    )
+}
+
+const SNOW: &str = r#"{"model": "exponential", "parameters": {"sigma_m": 0.02, "range_m": 0.3}}"#;
+
+fn site(path: &Path) {
+    write(path, "truth.json", SNOW);
+    let call = ["texture", "truth.json", "--size", "12x12", "--cell", "0.1", "--phase", "gaussian", "-o", "site.tif"];
+    ok(path, &call);
+}
+
+fn heights(path: &Path, name: &str) -> Vec<f64> {
+    ok(path, &["convert", name, "heights.asc"]);
+    let text = std::fs::read_to_string(path.join("heights.asc")).unwrap();
+    let rows = text.lines().filter(|line| line.split_whitespace().count() > 2);
+    rows.flat_map(|line| line.split_whitespace().map(|z| z.parse().unwrap()).collect::<Vec<f64>>()).collect()
+}
+
+/// In a study a texture on the background of a fit is that background plus what it lacks; the release is recomputed to the same bytes.
+#[test]
+fn val_a_texture_is_added_to_the_background_of_a_fit() {
+    let folder = area();
+    let path = folder.path();
+    site(path);
+    let texture = |id: &str, more: &str| {
+        format!("[[texture]]\nid = \"{id}\"\nfit = \"f\"\nseed = 5\nsize_m = [12.0, 12.0]\ncell_m = 0.1\n{more}\n")
+    };
+    let on = texture("on", "onto = { background = \"f\" }");
+    let alone = texture("alone", "covariance = \"residual\"");
+    let over = texture("over", "onto = \"site\"");
+    write(path, "study.toml", &textured(&format!("{on}{alone}{over}")));
+    ok(path, &["run", "study.toml", "-o", "release", "--quiet"]);
+    let of = |name: &str| heights(path, &format!("release/{name}.tif"));
+    let (sum, background, residual) = (of("texture/on"), of("fit/f.background"), of("texture/alone"));
+    assert_eq!(sum.len(), 120 * 120);
+    for ((sum, background), residual) in sum.iter().zip(&background).zip(&residual) {
+        assert!((sum - background - residual).abs() < 1e-6, "{sum} {background} {residual}");
+    }
+    // The DEM that was fitted still has its texture, and only there a note says so.
+    let manifest: Value = serde_json::from_slice(&std::fs::read(path.join("release/manifest.json")).unwrap()).unwrap();
+    let own = |n: &&Value| n["note"].as_str().is_some_and(|n| n.contains("still has its own texture"));
+    let noted: Vec<&Value> = manifest["notes"].as_array().unwrap().iter().filter(own).collect();
+    assert!(noted.len() == 1 && noted[0]["item"] == "over", "{noted:?}");
+    ok(path, &["verify", "release", "--recompute", "all", "--quiet"]);
+
+    for (onto, words) in
+        [("{ background = \"g\" }", "`onto.background` names \"g\""), ("{ fit = \"f\" }", "`onto` is the id")]
+    {
+        write(path, "study.toml", &textured(&texture("on", &format!("onto = {onto}"))));
+        let call = sastrugi_in(path, &["run", "study.toml", "-o", "other", "--quiet"]);
+        assert!(call.code == 2 && call.stderr.contains(words), "{} {}", call.code, call.stderr);
+    }
+}
+
+/// The verb says when it takes `residual` by itself, when the base is the DEM that was fitted, and that `--fill` takes the model.
+#[test]
+fn val_notes_of_a_texture_on_a_base() {
+    let folder = area();
+    let path = folder.path();
+    site(path);
+    let fit = ["fit", "site.tif", "--outer-scale", "1.5", "--bootstrap", "0", "--model", "empirical"];
+    ok(path, &[&fit[..], &["--background", "background.tif", "-o", "f.json"]].concat());
+    let notes = |more: &[&str]| {
+        let call = ["texture", "f.json", "-o", "t.tif"];
+        ok_json(path, &[&call[..], more].concat())["notes"].to_string()
+    };
+    let size = ["--size", "12x12", "--cell", "0.1"];
+    let chosen = "covariance = residual: the base is taken for a measured background";
+    let own = "still has its own texture";
+    let onto = |base: &str, more: &[&str]| notes(&[&size[..], &["--onto", base], more].concat());
+    let said = onto("background.tif", &[]);
+    assert!(said.contains(chosen) && !said.contains(own), "{said}");
+    let said = onto("site.tif", &["--covariance", "residual"]);
+    assert!(!said.contains(chosen) && said.contains(own) && said.contains("fit --background"), "{said}");
+    assert!(!notes(&size).contains(chosen));
+    let said = notes(&["--fill", "site.tif"]);
+    assert!(said.contains("the fit is empirical; holes are filled with the fitted model (exponential)"), "{said}");
+}
+
 /// A surface that was scaled to 3 cm in a vehicle's band has that RMS there, by lengths, by name and by band; the map as text
 /// has a prediction beside each measured value.
 #[test]

@@ -14,7 +14,7 @@ use crate::render::axis::Axis;
 use crate::render::chart::{Entry, Mark, Plot};
 use crate::render::number as set;
 use crate::render::svg::{Anchor, Paint, Stroke, Svg, Symbol, TEXT, fitted};
-use sastrugi_schemas::fit::{DirectionBin, FitFile};
+use sastrugi_schemas::fit::{DirectionBin, FitFile, Quoted};
 
 /// Size of a panel, px.
 const PANEL: (f64, f64) = (470.0, 340.0);
@@ -64,18 +64,22 @@ fn model_words(fit: &FitFile) -> String {
     }
 }
 
-/// Every parameter with its unit and interval.
+/// Every parameter with its unit and the interval to quote; a lower limit where the search for the range ended at its bound.
 fn parameters(fit: &FitFile) -> String {
-    let interval = |name: &str| {
-        let intervals = fit.intervals.as_ref()?;
-        let [low, high] = intervals.values.get(name)?;
-        let end = |end: &Option<f64>| end.map_or_else(|| "open".to_owned(), |v| set::significant(v, 3));
-        Some(format!(" ({} %: {} to {})", set::plain(100.0 * intervals.level, 3), end(low), end(high)))
-    };
+    let level = fit.quoted_intervals().map_or_else(String::new, |(i, _)| set::plain(100.0 * i.level, 3));
+    let end = |end: Option<f64>| end.map_or_else(|| "open".to_owned(), |v| set::significant(v, 3));
     let one = |(name, value): (&String, &f64)| {
         let (symbol, unit) = symbol(name);
-        let value = set::with_unit(*value, 3, unit);
-        format!("{symbol} = {value}{}", interval(name).unwrap_or_default())
+        match fit.quoted(name) {
+            Some(Quoted::Estimate { value, interval: Some([low, high]) }) => {
+                format!("{symbol} = {} ({level} %: {} to {})", set::with_unit(value, 3, unit), end(low), end(high))
+            }
+            Some(Quoted::AtLeast(low)) => format!("{symbol} at least {} ({level} %)", set::with_unit(low, 3, unit)),
+            Some(Quoted::NotIdentified { .. }) => format!("{symbol} not identified"),
+            Some(Quoted::Estimate { interval: None, .. }) | None => {
+                format!("{symbol} = {}", set::with_unit(*value, 3, unit))
+            }
+        }
     };
     // Sigma and b first, whatever else the model has.
     let place = |name: &str| ["sigma", "range"].iter().position(|start| name.starts_with(start)).unwrap_or(2);
@@ -236,6 +240,7 @@ fn directions(fit: &FitFile, id: &str) -> Option<Plot> {
 mod tests {
     use super::*;
     use crate::tests::xml::assert_well_formed;
+    use sastrugi_schemas::fit::Intervals;
 
     fn fit() -> FitFile {
         let direction = |azimuth_deg: f64, lag_m: f64| DirectionBin {
@@ -281,6 +286,20 @@ mod tests {
         let words = ["snow &amp; ice.tif", "lag, m", "covariance, m²", "structure function, m²", "90°", "σ = 1.00 m"];
         words.into_iter().for_each(|word| assert!(svg.contains(word), "{word}"));
         assert!(svg.contains("9.00 m², above the frame"), "a surface model beyond the frame is said");
+    }
+
+    /// A range at the bound of the search is a lower limit where the quoted interval has one, else not identified.
+    #[test]
+    fn val_a_range_at_the_bound_is_not_drawn_as_an_estimate() {
+        let ends = |low| [("range_m".to_owned(), [low, None])].into();
+        let intervals = |low| Some(Intervals { level: 0.95, replicates: 99, from_profile: true, values: ends(low) });
+        let diagnostics = [("range_at_search_bound".to_owned(), true.into())].into();
+        let bounded = FitFile { diagnostics, intervals: intervals(Some(4.553)), ..fit() };
+        assert_eq!(parameters(&bounded), "σ not identified,  b at least 4.55 m (95 %)");
+        let open = FitFile { intervals: intervals(None), ..bounded };
+        assert_eq!(parameters(&open), "σ not identified,  b not identified");
+        let found = FitFile { intervals: intervals(Some(1.5)), ..fit() };
+        assert_eq!(parameters(&found), "σ = 1.00 m,  b = 2.00 m (95 %: 1.50 to open)");
     }
 
     #[test]

@@ -79,7 +79,7 @@ pub enum Verb {
     /// Synthesise a texture that matches a fit.
     #[command(
         after_help = "Examples:\n  sastrugi texture fit.json --size 20x20 --cell 0.1 --seed 1 -o texture.tif\n  \
-        sastrugi texture fit.json --size 10x10 --cell 0.05 --onto terrain.tif -o textured.tif\n  \
+        sastrugi texture fit.json --size 10x10 --cell 0.05 --onto terrain.tif --covariance surface -o textured.tif\n  \
         sastrugi texture fit.json --fill snow.tif -o without-holes.tif"
     )]
     Texture(Texture),

@@ -52,3 +52,12 @@ pub fn bytes(count: f64) -> String {
 pub fn seconds(count: f64) -> String {
     if count < 90.0 { format!("{count:.1} s") } else { format!("{:.1} min", count / 60.0) }
 }
+
+/// A number to four significant digits, without an exponent.
+pub fn significant(value: f64) -> String {
+    if value == 0.0 {
+        return "0".to_owned();
+    }
+    let decimals = (3.0 - value.abs().log10().floor()).clamp(0.0, 12.0) as usize;
+    format!("{value:.decimals$}")
+}

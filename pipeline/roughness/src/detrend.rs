@@ -212,6 +212,7 @@ impl Detrended {
         let g = &mean.geometry;
         let half = [(g.cell[1], g.rows), (g.cell[0], g.cols)]
             .map(|(cell, count)| odd_cells(WINDOW_LENGTHS * self.max_m, cell).min(largest_odd(count)) / 2);
+        // A mean of squares: a plane through them may go below zero at a border.
         // Running sums may leave a rounding error below zero.
         background_of(&mean, BoxWindow { half }, AtPartial::Mean, WINDOW_SHARE_MIN)
             .map(|square| if square < 0.0 { 0.0 } else { square.sqrt() })
@@ -238,6 +239,7 @@ fn mean_of_defined(a: f64, b: f64) -> f64 {
 
 fn above_average(dem: &Grid, window_m: f64) -> Grid {
     let window = BoxWindow::nearest(window_m, dem.geometry.cell);
+    // The published measure is defined by the plain mean, also where a window is incomplete; `band_rms` has the plane.
     let average = background_of(dem, window, AtPartial::Mean, FILLED_SHARE_MIN);
     sastrugi_numeric::ops::combine(dem, &average, |z, mean| z - mean)
 }

@@ -24,7 +24,7 @@ pub mod terrains;
 pub use candidate_curves::CandidateCurveRow;
 pub use candidates::CandidateRow;
 pub use covariance::CovarianceRow;
-pub use dem_fits::DemFitRow;
+pub use dem_fits::{BesideFit, DemFitRow};
 pub use fits::FitRow;
 pub use height_distribution::HeightDistributionRow;
 pub use likelihood_profile::LikelihoodProfileRow;

@@ -5,10 +5,12 @@ use super::shown::check_ending;
 use crate::Verdict;
 use crate::args::{Common, Fit};
 use crate::failure::{Code, Failure};
-use crate::output::{columns, print, warn};
+use crate::output::{columns, print, significant, warn};
+use sastrugi_schemas::fit::{FitFile, Intervals, Quoted, SILL_OVER_RANGE};
 use sastrugi_schemas::tables::DemFitRow;
 use sastrugi_stages::verbs::fits::{self, Request};
 use serde_json::json;
+use std::collections::BTreeMap;
 use std::path::Path;
 
 /// `fit A B C ... --table OUT`.
@@ -25,12 +27,17 @@ pub fn fits(args: &Fit, common: &Common) -> Verdict {
         reading: fit_reading(args)?,
         minus: args.minus.as_deref(),
     };
+    let mut fitted = BTreeMap::new();
     let rows = fits::fits(&request, &mut |dem, done| match done.as_ref().map(|done| &done.fit) {
-        Ok(Ok(_)) if common.quiet => {}
-        Ok(Ok(_)) => warn(&format!("{}: fitted", dem.display())),
+        Ok(Ok(fit)) => {
+            if !common.quiet {
+                warn(&format!("{}: fitted", dem.display()));
+            }
+            fitted.insert(dem.display().to_string(), fit.clone());
+        }
         Ok(Err(error)) | Err(error) => warn(&failure(dem, &error.to_string())),
     })?;
-    print(common.json, &json!(rows), &text(&rows))?;
+    print(common.json, &json!(rows), &text(&rows, &fitted))?;
     Ok(match rows.iter().filter(|row| row.error.is_some()).count() {
         0 => Code::Done,
         failed if failed == rows.len() => Code::Failed,
@@ -63,33 +70,59 @@ fn check_single(args: &Fit) -> Result<(), Failure> {
     }
 }
 
-/// Sigma, b and sigma^2 / b of every DEM with their intervals.
-fn text(rows: &[DemFitRow]) -> String {
-    let head = ["file", "model", "sigma m", "b m", "sigma^2/b m", "band RMS m"].map(str::to_owned).to_vec();
-    let number = |value: f64| if value.is_finite() { format!("{value:.5}") } else { "-".to_owned() };
-    let with_ends = |value: f64, low: f64, high: f64| match low.is_nan() && high.is_nan() {
-        true => number(value),
-        false => format!("{} [{}, {}]", number(value), end(low), end(high)),
-    };
-    let line = |row: &DemFitRow| {
-        let f = &row.fit;
-        if row.error.is_some() {
-            return vec![row.file.clone(), "not fitted".to_owned()];
+/// Sigma, b and sigma^2 / b of every DEM as `fit` quotes them.
+fn text(rows: &[DemFitRow], fitted: &BTreeMap<String, FitFile>) -> String {
+    let head =
+        ["file", "model", "sigma m", "b m", "sigma^2/b m", "band RMS m", "intervals"].map(str::to_owned).to_vec();
+    let line = |row: &DemFitRow| match fitted.get(&row.file) {
+        None => vec![row.file.clone(), "not fitted".to_owned()],
+        Some(fit) => {
+            let of = |name: &str| fit.quoted(name).map_or_else(|| "-".to_owned(), parameter);
+            // A sum of terms has no one sigma and b.
+            let of_one = |name: &str| if row.fit.sigma_m.is_finite() { of(name) } else { "-".to_owned() };
+            let kind = |(intervals, kind): (&Intervals, &str)| format!("{:.0} %, {kind}", 100.0 * intervals.level);
+            vec![
+                row.file.clone(),
+                fit.model.clone(),
+                of_one("sigma_m"),
+                of_one("range_m"),
+                of_one(SILL_OVER_RANGE),
+                number(row.fit.band_rms_m),
+                fit.quoted_intervals().map_or_else(|| "-".to_owned(), kind),
+            ]
         }
-        let sill = [f.sigma2_over_range_m, f.sigma2_over_range_low_m, f.sigma2_over_range_high_m];
-        vec![
-            row.file.clone(),
-            f.model.clone(),
-            with_ends(f.sigma_m, f.sigma_low_m, f.sigma_high_m),
-            with_ends(f.range_m, f.range_low_m, f.range_high_m),
-            with_ends(sill[0], sill[1], sill[2]),
-            number(f.band_rms_m),
-        ]
     };
     columns(&[head].into_iter().chain(rows.iter().map(line)).collect::<Vec<_>>())
 }
 
-/// An end of an interval; 0 and infinity stand for an open one.
-fn end(value: f64) -> String {
-    if value > 0.0 && value.is_finite() { format!("{value:.5}") } else { "open".to_owned() }
+fn number(value: f64) -> String {
+    if value.is_finite() { significant(value) } else { "-".to_owned() }
+}
+
+fn parameter(quoted: Quoted) -> String {
+    let end = |end: Option<f64>| end.map_or_else(|| "open".to_owned(), number);
+    match quoted {
+        Quoted::Estimate { value, interval: None } => number(value),
+        Quoted::Estimate { value, interval: Some([low, high]) } => {
+            format!("{} [{}, {}]", number(value), end(low), end(high))
+        }
+        Quoted::AtLeast(low) => format!("at least {}", number(low)),
+        Quoted::NotIdentified { .. } => "not identified".to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn val_limits_and_estimates_are_told_apart() {
+        assert_eq!(parameter(Quoted::AtLeast(4.395_78)), "at least 4.396");
+        assert_eq!(parameter(Quoted::AtLeast(0.012_345)), "at least 0.01235");
+        assert_eq!(parameter(Quoted::NotIdentified { ended: 420.0 }), "not identified");
+        let open = Quoted::Estimate { value: 0.3, interval: Some([Some(0.2), None]) };
+        assert_eq!(parameter(open), "0.3000 [0.2000, open]");
+        assert_eq!(parameter(Quoted::Estimate { value: 0.000_199_5, interval: None }), "0.0001995");
+        assert_eq!(parameter(Quoted::Estimate { value: f64::NAN, interval: None }), "-");
+    }
 }

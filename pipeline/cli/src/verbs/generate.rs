@@ -7,8 +7,8 @@ use super::{options, reading};
 use crate::Verdict;
 use crate::args::{Common, Detrend, Fit, Obstacles, Roughness, Terrain, Texture};
 use crate::failure::{Code, Failure};
-use crate::output::{columns, print};
-use sastrugi_schemas::fit::{FitFile, Source};
+use crate::output::{columns, print, significant};
+use sastrugi_schemas::fit::{FitFile, Quoted, SILL_OVER_RANGE, Source};
 use sastrugi_stages::Error;
 use sastrugi_stages::verbs::local::Local;
 use sastrugi_stages::verbs::roughness::{
@@ -170,25 +170,35 @@ fn no_fit(source: &Source, error: Error, common: &Common) -> Verdict {
     Err(error.into())
 }
 
-/// Parameters with the intervals to quote. Where the search for the range ended at its bound only lower limits are known.
+/// Parameters, and sigma^2 / b where it has an interval, with the intervals to quote. Where the search for the range ended at
+/// its bound only lower limits are known.
 fn fitted_parameters(fit: &FitFile) -> String {
-    let quoted = fit.quoted_intervals();
-    let ends = |name: &str| quoted.and_then(|(intervals, _)| intervals.values.get(name).copied());
-    let lower = |name: &str| fit.intervals.as_ref().and_then(|intervals| intervals.values.get(name)?[0]);
-    let one = |(name, value): (&String, &f64)| match (ends(name), fit.range_at_bound()) {
-        (_, true) if name == "range_m" || name == "sigma_m" => match lower(name) {
-            Some(low) => format!("{name} at least {low:.6} (profile likelihood)"),
-            None => format!("{name} not identified ({value:.6} is where the search ended)"),
-        },
-        (Some([low, high]), _) => {
-            let end = |end: Option<f64>| end.map_or_else(|| "open".to_owned(), |v| format!("{v:.6}"));
-            format!("{name} = {value:.6} [{}, {}]", end(low), end(high))
+    let kind = fit
+        .quoted_intervals()
+        .map_or_else(String::new, |(intervals, kind)| format!(" ({:.0} %, {kind})", 100.0 * intervals.level));
+    let sill = match fit.quoted(SILL_OVER_RANGE) {
+        Some(quoted @ Quoted::Estimate { interval: Some(_), .. }) => {
+            Some(parameter("sigma^2/b_m", quoted, significant))
         }
-        (None, _) => format!("{name} = {value:.6}"),
+        _ => None,
     };
-    let kind =
-        quoted.map_or_else(String::new, |(intervals, kind)| format!(" ({:.0} %, {kind})", 100.0 * intervals.level));
-    format!("{}{kind}", fit.parameters.iter().map(one).collect::<Vec<_>>().join(", "))
+    let one = |name: &String| Some(parameter(name, fit.quoted(name)?, |v| format!("{v:.6}")));
+    let all: Vec<String> = fit.parameters.keys().filter_map(one).chain(sill).collect();
+    format!("{}{kind}", all.join(", "))
+}
+
+fn parameter(name: &str, quoted: Quoted, number: impl Fn(f64) -> String) -> String {
+    let end = |end: Option<f64>| end.map_or_else(|| "open".to_owned(), &number);
+    match quoted {
+        Quoted::Estimate { value, interval: Some([low, high]) } => {
+            format!("{name} = {} [{}, {}]", number(value), end(low), end(high))
+        }
+        Quoted::Estimate { value, interval: None } => format!("{name} = {}", number(value)),
+        Quoted::AtLeast(low) => format!("{name} at least {}", number(low)),
+        Quoted::NotIdentified { ended } => {
+            format!("{name} not identified ({} is where the search ended)", number(ended))
+        }
+    }
 }
 
 /// Figures above the least-squares plane, as lines.

@@ -7,8 +7,9 @@
 //!
 //! # Formulas
 //! z' is the height above the least-squares plane, less its centred moving average over the outer scale where one is given,
-//! less its mean. The plane goes first: at borders and holes the window of a moving average is off-centre, and on a slope it
-//! would leave a bias there. The wind blows from azimuth theta, in degrees clockwise from grid north (+y); the unit vector
+//! less its mean. At borders and holes, where a window is incomplete, the local plane stands for its mean
+//! ([`crate::background`]): the mean of such a window lies off its centre, and on the flanks of a hill or hollow slope times offset
+//! would count as roughness. The wind blows from azimuth theta, in degrees clockwise from grid north (+y); the unit vector
 //! towards its origin is `w = (sin theta, cos theta)`.
 //!
 //! | symbol | meaning |
@@ -301,7 +302,7 @@ fn detrended(dem: &Grid, outer_scale_m: Option<f64>) -> Result<(Grid, Option<[f6
         let needed_m = OUTER_CELLS_MIN as f64 * cell[0].max(cell[1]);
         return Err(WindError::Narrow { outer_scale_m, needed_m });
     }
-    let average = background_of(&levelled, window, AtPartial::Mean, FILLED_SHARE_MIN);
+    let average = background_of(&levelled, window, AtPartial::Plane, FILLED_SHARE_MIN);
     let left = ops::combine(&levelled, &average, |z, mean| z - mean);
     if left.finite_count() == 0 && levelled.finite_count() > 0 {
         let [x_m, y_m] = dem.geometry.size();

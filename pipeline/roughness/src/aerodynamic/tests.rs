@@ -176,7 +176,7 @@ fn val_upcrossings_equal_a_count_along_lines_of_cells() {
 }
 
 /// Waves of 1 m and 1 cm on waves of 20 m and 5 cm, on a slope: with an outer scale of 2 m the short ones count, and a share of the long
-/// ones (amplitude `1 - sinc(0.1)`, 1.7 %; more at the borders).
+/// ones (amplitude `1 - sinc(0.1)`, 1.7 %). At the ends of x the local plane follows the short waves as well: sigma is 2.0 % low.
 #[test]
 fn val_the_outer_scale_takes_long_waves_off() {
     let g = Geometry::square(100, 1200, CELL_M);
@@ -188,10 +188,41 @@ fn val_the_outer_scale_takes_long_waves_off() {
     let whole = roughness(&dem, &from(&[90.0]));
     let within = roughness(&dem, &WindSettings { outer_scale_m: Some(2.05), ..from(&[90.0]) });
     assert!(near(whole.sigma_m, FRAC_1_SQRT_2 * 0.0026f64.sqrt(), 0.01), "{}", whole.sigma_m);
-    assert!(near(within.sigma_m, FRAC_1_SQRT_2 * 0.01, 0.02), "{}", within.sigma_m);
+    assert!(near(within.sigma_m, FRAC_1_SQRT_2 * 0.01, 0.03), "{}", within.sigma_m);
     assert!(within.outer_scale_m.unwrap().iter().all(|&width| near(width, 2.05, 1e-9)));
     assert!(near(within.directions[0].estimate.measures.frontal_area_index, 0.02, 0.05), "{within:?}");
     assert!(within.notes[0].contains("2.0500 x 2.0500 m"), "{:?}", within.notes);
+}
+
+/// Waves of 0.5 m and sigma 5 cm on 20 x 20 m, level, in a bowl of curvature 0.05 / m, and on a wave of 40 m and amplitude 2 m, whose
+/// curvature is up to 0.05 / m: at an outer scale of 2 m every z0 differs from level ground by less than 2 %. The plain mean of windows
+/// that the border cuts gave +21 to +181 %.
+#[test]
+fn val_curved_ground_changes_nothing_within_the_outer_scale() {
+    let g = Geometry::square(401, 401, CELL_M);
+    let z0 = |ground: &dyn Fn(f64, f64) -> f64| {
+        let texture = |x: f64, y: f64| 0.1 * libm::sin(TAU * x / 0.5) * libm::sin(TAU * y / 0.5);
+        let z = |k: usize| {
+            let (x, y) = (g.x(k % 401) - 10.0, g.y(k / 401) - 10.0);
+            texture(x, y) + ground(x, y)
+        };
+        let dem = Grid::new(g, (0..g.len()).map(z).collect());
+        let settings = WindSettings { outer_scale_m: Some(2.05), ..WindSettings::sectors(8) };
+        roughness(&dem, &settings).mean.measures
+    };
+    let level = z0(&|_, _| 0.0);
+    let bowl = z0(&|x, y| 0.5 * 0.05 * (x * x + y * y));
+    let wave = z0(&|x, _| 2.0 * libm::cos(TAU * x / 40.0));
+    for (name, curved) in [("bowl", bowl), ("wave", wave)] {
+        for (a, b) in [
+            (curved.z0_lettau_m, level.z0_lettau_m),
+            (curved.z0_munro_m, level.z0_munro_m),
+            (curved.z0_macdonald_m, level.z0_macdonald_m),
+        ] {
+            println!("{name}: {:.2} %", 100.0 * (a / b - 1.0));
+            assert!(near(a, b, 0.02), "{name}: {curved:?}, level {level:?}");
+        }
+    }
 }
 
 /// White noise on 64 x 64 cells: the jackknife's standard error against the scatter of 200 surfaces. A standard deviation of 200

@@ -26,7 +26,8 @@ use serde_json::{Value, json};
 pub const STAGE: &str = "fit";
 /// Fit file.
 pub const FIT: &str = "fit.json";
-const BACKGROUND: &str = "background.tif";
+/// The background that was taken off.
+pub const BACKGROUND: &str = "background.tif";
 const RESIDUAL: &str = "residual.tif";
 const MASK: &str = "mask.tif";
 /// Covariance at every lag; the raster's coordinates are the lag.

@@ -11,7 +11,7 @@ use crate::study::{Entry, Expanded, StudyError};
 use sastrugi_numeric::{Grid, Streams};
 use sastrugi_schemas::Kind;
 use sastrugi_schemas::fit::FitFile;
-use sastrugi_schemas::study::{FitReference, GeoTiff, Methods, Modulate, TextureItem};
+use sastrugi_schemas::study::{FitReference, GeoTiff, Methods, Modulate, Onto, TextureItem};
 use sastrugi_store::dem::{self, Crs};
 use sastrugi_store::digest;
 use sastrugi_texture::covariance::Covariance;
@@ -91,10 +91,59 @@ enum Modulation {
     Slope(SlopeFactors),
 }
 
+/// What a texture is added to.
+#[derive(Clone)]
+struct Base {
+    /// The item that makes it.
+    item: ItemRef,
+    /// Its file there.
+    file: &'static str,
+    /// The DEM behind a background, which shares its split.
+    dem: Option<ItemRef>,
+    /// Its cells.
+    cells: u64,
+    /// Whether it is the DEM that the texture's fit was made from.
+    was_fitted: bool,
+}
+
+impl Base {
+    fn of(builder: &Builder<'_>, entry: &Entry<'_>, onto: &Onto, matched: &Matched) -> Result<Self, BuildError> {
+        match onto {
+            Onto::Id(id) => {
+                let (item, cells) = heightfield(builder, entry, "onto", id)?;
+                let was_fitted = matched.parent().and_then(|fit| fitted_dem(builder, &fit)) == Some(&item);
+                Ok(Self { item, file: HEIGHTS, dem: None, cells, was_fitted })
+            }
+            Onto::Background { background } => {
+                let item = ItemRef::new(fit::STAGE, background);
+                let Some(dem) = fitted_dem(builder, &item) else {
+                    return Err(unknown_id(entry, "onto.background", background, builder.fits.iter()).into());
+                };
+                let cells = builder.heightfields.get(&dem.id).map_or(0, |field| field.cells);
+                Ok(Self { item, file: fit::BACKGROUND, dem: Some(dem.clone()), cells, was_fitted: false })
+            }
+        }
+    }
+
+    fn parents(&self) -> impl Iterator<Item = ItemRef> {
+        [&self.item].into_iter().chain(&self.dem).cloned()
+    }
+
+    /// As a recipe names it.
+    fn name(&self) -> String {
+        if self.file == HEIGHTS { self.item.to_string() } else { format!("{}: {}", self.item, self.file) }
+    }
+}
+
+/// The DEM of a fit: the first of its parents.
+fn fitted_dem<'b>(builder: &'b Builder<'_>, fit: &ItemRef) -> Option<&'b ItemRef> {
+    builder.nodes().iter().find(|node| node.item == *fit).and_then(|node| node.parents.first())
+}
+
 struct TextureJob {
     id: String,
     matched: Matched,
-    base: Option<ItemRef>,
+    base: Option<Base>,
     modulation: Option<Modulation>,
     /// The DEM whose holes are filled.
     fill: Option<ItemRef>,
@@ -121,7 +170,7 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
         entry.check_keys::<TextureItem>(&params, &joined_schema(&kinds, &methods))?;
         let matched = matched(builder, &entry, &item)?;
         check_purpose(&entry, &item, &params)?;
-        let base = item.onto.as_deref().map(|id| heightfield(builder, &entry, "onto", id)).transpose()?;
+        let base = item.onto.as_ref().map(|onto| Base::of(builder, &entry, onto, &matched)).transpose()?;
         let fill = item.fill.as_deref().map(|id| heightfield(builder, &entry, "fill", id)).transpose()?;
         let modulation = modulation(builder, &entry, &item)?;
         let mut ids = Vec::new();
@@ -156,19 +205,22 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
                     parameters: parameters(&item, &matched, draft.as_ref()),
                     stream: Some(streams.label()),
                     release_path: format!("texture/{id}.tif"),
-                    cells: base.as_ref().or(fill.as_ref()).map_or(draft.geometry().len() as u64, |(_, cells)| *cells),
+                    cells: match (&base, &fill) {
+                        (Some(Base { cells, .. }), _) | (None, Some((_, cells))) => *cells,
+                        (None, None) => draft.geometry().len() as u64,
+                    },
                     cell_m: Some(draft.geometry().cell.into_iter().fold(f64::INFINITY, f64::min)),
                     geometry: (base.is_none() && fill.is_none()).then(|| draft.geometry()),
                 };
                 let cells = field.cells;
                 let one_of_many = item.count.is_some_and(|count| count > 1);
-                let [base, fill] = [&base, &fill].map(|field| field.as_ref().map(|(item, _)| item.clone()));
+                let (base, fill) = (base.clone(), fill.as_ref().map(|(item, _)| item.clone()));
                 let raster = match &modulation {
                     Some(Modulation::Raster(raster)) => Some(raster.clone()),
                     _ => None,
                 };
-                let parents: BTreeSet<ItemRef> =
-                    [matched.parent(), base.clone(), fill.clone(), raster].into_iter().flatten().collect();
+                let others = [matched.parent(), fill.clone(), raster].into_iter().flatten();
+                let parents: BTreeSet<ItemRef> = others.chain(base.iter().flat_map(Base::parents)).collect();
                 let parents = parents.into_iter().collect();
                 let (method, matched, modulation) = (method.clone(), matched.clone(), modulation.clone());
                 let job = TextureJob {
@@ -209,9 +261,9 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
     Ok(())
 }
 
-/// On a measured DEM a texture has what its background lacks, unless the item says otherwise.
-fn on_background(mut one: Expanded, base: &Option<(ItemRef, u64)>, matched: &Matched, item: &TextureItem) -> Expanded {
-    let measured = base.as_ref().is_some_and(|(base, _)| base.stage == dem_job::STAGE);
+/// On a measured DEM or a fit's background a texture has what its background lacks, unless the item says otherwise.
+fn on_background(mut one: Expanded, base: &Option<Base>, matched: &Matched, item: &TextureItem) -> Expanded {
+    let measured = base.as_ref().is_some_and(|base| [dem_job::STAGE, fit::STAGE].contains(&base.item.stage.as_str()));
     let fitted = matches!(matched, Matched::Item(_)) && item.methods.is_none() && item.method == fft_ma::kind().kind;
     if measured && fitted && one.params["covariance"].is_null() {
         one.params["covariance"] = json!(fft_ma::CovarianceOf::Residual);
@@ -318,7 +370,7 @@ fn parameters(item: &TextureItem, matched: &Matched, draft: &dyn Synthesis) -> V
     let mut all = Map::new();
     all.insert("fit".to_owned(), matched.describe());
     let more = [
-        ("onto", item.onto.as_ref().map(|id| json!(id))),
+        ("onto", item.onto.as_ref().map(|onto| json!(onto))),
         ("modulate", item.modulate.as_ref().map(|m| json!(m))),
         ("fill", item.fill.as_ref().map(|id| json!(id))),
     ];
@@ -327,6 +379,22 @@ fn parameters(item: &TextureItem, matched: &Matched, draft: &dyn Synthesis) -> V
         all.extend(own);
     }
     Value::Object(all)
+}
+
+/// Said of holes that are filled by an empirical fit.
+pub fn fill_note(fit: &FitFile) -> Option<String> {
+    let model = &fit.map.as_ref()?.model;
+    let text = "the fit is empirical; holes are filled with the fitted model";
+    Some(format!("{text} ({model}), not with the measured covariance"))
+}
+
+/// Said where a texture is added to the DEM that its fit was made from; `background` says where to find that DEM without its
+/// texture.
+pub fn has_its_texture(background: &str) -> String {
+    format!(
+        "the base is the DEM that was fitted and still has its own texture; add the texture to the background of the fit \
+         ({background}; in a release fit/<id>.background.tif)"
+    )
 }
 
 /// Base plus texture; a texture that does not repeat without seams must cover the base.
@@ -350,7 +418,7 @@ pub fn lay_onto(base: &Grid, texture: &Grid, periodic: bool, factors: Option<&Gr
 
 impl Job for TextureJob {
     fn recipe(&self) -> Value {
-        let base = self.base.as_ref().map(ToString::to_string);
+        let base = self.base.as_ref().map(Base::name);
         let mut recipe = json!({
             "method": self.method,
             "params": self.draft.parameters(),
@@ -412,11 +480,14 @@ impl Job for TextureJob {
                 "{clip_share:.1e} of the spectrum was negative and set to 0; the covariance is off by at most {covariance_error_max_m2:.1e} m2"
             ));
         }
+        if self.base.as_ref().is_some_and(|base| base.was_fitted) {
+            notes.push(has_its_texture("onto = { background = \"<fit id>\" }"));
+        }
         let rows = self.alike(&grid, &fit);
         let (heights, crs) = match &self.base {
             None => (grid, Crs::default()),
             Some(base) => {
-                let base = dem::read(&work.parent(base, HEIGHTS)?).map_err(|e| input_error(&e))?;
+                let base = dem::read(&work.parent(&base.item, base.file)?).map_err(|e| input_error(&e))?;
                 let factors = self.factors(work, &base.grid)?;
                 (lay_onto(&base.grid, &grid, synthesis.is_periodic(), factors.as_ref())?, base.info.crs)
             }
@@ -440,7 +511,7 @@ impl TextureJob {
         let dem = dem::read(&work.parent(dem, HEIGHTS)?).map_err(|e| input_error(&e))?;
         let covariance = Covariance::of_fit(fit).map_err(JobError::new)?;
         let filled = conditional::fill(&dem.grid, &covariance, &self.streams).map_err(JobError::new)?;
-        let notes = vec![filled.to_string()];
+        let notes = [filled.to_string()].into_iter().chain(fill_note(fit)).collect();
         self.released(work, &filled.grid, &dem.info.crs, Rows::default(), notes)
     }
 

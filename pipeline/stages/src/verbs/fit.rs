@@ -67,6 +67,7 @@ pub fn fit(request: &Request<'_>) -> Result<Done, Error> {
     let settings = settings(&request.parameters)?;
     check_noise_reference(request.reading.noise_reference.is_some(), request.minus.is_some())?;
     check_outputs(request)?;
+    request.local.as_ref().map_or(Ok(()), |local| local.check_mode(&settings))?;
     let Fitted { outcome, notes, masked_share, noise, minus } = fitted(request, &settings)?;
     let source = Source { masked_share, minus, ..source_of(request, noise.as_ref())? };
     let fit = match outcome {
@@ -168,7 +169,9 @@ struct Fitted {
 fn fitted(request: &Request<'_>, settings: &FitSettings) -> Result<Fitted, Error> {
     let streams = Streams::for_seed(request.seed, STAGE);
     let whole = |heights: &dyn Heights, settings: &FitSettings, crs: &Crs, mut notes: Vec<String>| {
-        let outcome = sastrugi_texture::fit(heights, settings, &streams).map_err(refused);
+        // A fit and its replicates may take minutes: what cannot be mapped is refused before them.
+        let checked = request.local.as_ref().map_or(Ok(()), |local| local.check(settings, heights));
+        let outcome = checked.and_then(|()| sastrugi_texture::fit(heights, settings, &streams).map_err(refused));
         let mapped = |outcome: FitOutcome| {
             let said = request.local.as_ref().map(|local| local.write(&outcome, heights, crs)).transpose()?;
             notes.extend(said);

@@ -5,8 +5,8 @@ use super::fit::{self, Done};
 use super::{Reading, check_distinct};
 use crate::error::Error;
 use crate::jobs::fit::fit_row;
-use sastrugi_schemas::fit::FitFile;
-use sastrugi_schemas::tables::{DemFitRow, FitRow};
+use sastrugi_schemas::fit::{FitFile, Source};
+use sastrugi_schemas::tables::{BesideFit, DemFitRow, FitRow};
 use sastrugi_store::parquet::{TableMetadata, TableWriter};
 use sastrugi_store::{PROGRAM, csv};
 use serde_json::Value;
@@ -67,6 +67,10 @@ pub fn fits(request: &Request<'_>, hear: &mut dyn FnMut(&Path, &Result<Done, Err
 fn fit_files(request: &Request<'_>) -> Result<Vec<Option<PathBuf>>, Error> {
     let mut owners: BTreeMap<PathBuf, &Path> = BTreeMap::new();
     let single = request.dems.len() == 1;
+    if let Some(path) = request.output.filter(|path| !single && path.exists() && !path.is_dir()) {
+        let message = format!("{}: is a file; `-o` names a folder for the fit files of several DEMs", path.display());
+        return Err(Error::Usage(message));
+    }
     let of = |dem: &PathBuf| {
         request.output.map(|path| if single { path.to_owned() } else { path.join(format!("{}.json", stem(dem))) })
     };
@@ -102,14 +106,35 @@ fn stem(path: &Path) -> String {
 
 fn row(dem: &Path, done: Result<Done, Error>) -> DemFitRow {
     let (id, file) = (stem(dem), dem.display().to_string());
-    match done.and_then(|done| done.fit) {
-        Ok(fit) => DemFitRow { file, fit: fit_row(&id, &id, &fit), error: None },
+    let (fit, source) = match done {
+        Ok(done) => (done.fit, done.source),
+        Err(error) => (Err(error), Source::default()),
+    };
+    let beside = beside(fit.as_ref().ok(), &source);
+    match fit {
+        Ok(fit) => DemFitRow { file, fit: fit_row(&id, &id, &fit), beside, error: None },
         Err(error) => {
             let nothing = fit_row(&id, &id, &FitFile::default());
             // What a fit file may leave out has a default there; here it is not known.
             let unknown = FitRow { nugget_m2: f64::NAN, ratio: f64::NAN, trim_level: f64::NAN, ..nothing };
-            DemFitRow { file, fit: unknown, error: Some(error.to_string()) }
+            DemFitRow { file, fit: unknown, beside, error: Some(error.to_string()) }
         }
+    }
+}
+
+/// The co-registration, which stands whatever the fit says, and what the fit is good for.
+fn beside(fit: Option<&FitFile>, source: &Source) -> BesideFit {
+    let c = source.minus.as_ref().map(|minus| &minus.coregistration);
+    let [shift_east_m, shift_north_m] = c.and_then(|c| c.shift_m).unwrap_or([f64::NAN; 2]);
+    BesideFit {
+        shift_east_m,
+        shift_north_m,
+        raise_m: c.map_or(f64::NAN, |c| c.raise_m),
+        nmad_before_m: c.map_or(f64::NAN, |c| c.nmad_before_m),
+        nmad_after_m: c.map_or(f64::NAN, |c| c.nmad_after_m),
+        gained: c.and_then(|c| c.gained),
+        verdict: fit.map(|fit| fit.verdict.clone()).filter(|verdict| !verdict.is_empty()),
+        carried_rms_share: fit.and_then(|fit| fit.carried.as_ref()).map_or(f64::NAN, |carried| carried.rms_share),
     }
 }
 

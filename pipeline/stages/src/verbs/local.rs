@@ -3,8 +3,11 @@
 use super::write_error;
 use crate::error::Error;
 use sastrugi_numeric::Grid;
+use sastrugi_roughness::background::BoxWindow;
+use sastrugi_schemas::shown;
 use sastrugi_store::dem::{self, Crs, Values, WriteOptions};
-use sastrugi_texture::{FitOutcome, Heights, LocalMaps};
+use sastrugi_texture::fit::Mode;
+use sastrugi_texture::{FitOutcome, FitSettings, Heights, LocalMaps};
 use std::path::{Path, PathBuf};
 
 /// Maps that are asked for.
@@ -15,6 +18,10 @@ pub struct Local<'a> {
     pub block_m: Option<f64>,
 }
 
+/// Width of a block where none is asked for, and the least, windows: those of `FitOutcome::local_maps`.
+const BLOCK_WINDOWS: f64 = 4.0;
+const BLOCK_WINDOWS_MIN: f64 = 2.0;
+
 /// End of a map's name, and what it holds.
 const BAND_RMS: (&str, &str) = ("band-rms.tif", "root mean square of the residual before trimming");
 const SIGMA: (&str, &str) = ("sigma.tif", "standard deviation of the texture, range held at the fit's");
@@ -24,6 +31,45 @@ impl Local<'_> {
     /// Every file that may be written.
     pub fn files(&self) -> Vec<PathBuf> {
         [BAND_RMS, SIGMA, SIGMA2_OVER_B].into_iter().map(|(end, _)| self.file(end)).collect()
+    }
+
+    /// Refuses, before a fit is made, maps that its mode does not have.
+    ///
+    /// # Errors
+    /// Mode `paper`.
+    pub fn check_mode(&self, settings: &FitSettings) -> Result<(), Error> {
+        match settings.parameters().mode {
+            Mode::Corrected => Ok(()),
+            Mode::Paper => Err(Error::Usage("`--local` needs a `corrected` fit, not mode `paper`".to_owned())),
+        }
+    }
+
+    /// Refuses, before a fit is made, maps that its heights do not have, and blocks that do not fit the DEM.
+    ///
+    /// # Errors
+    /// Transects; blocks below two windows or wider than the DEM.
+    pub fn check(&self, settings: &FitSettings, heights: &dyn Heights) -> Result<(), Error> {
+        if heights.are_profiles() {
+            return Err(Error::Usage("`--local` needs a raster, not transects".to_owned()));
+        }
+        let geometry = heights.geometry();
+        let [x_m, y_m] = BoxWindow::nearest(settings.parameters().outer_scale_m, geometry.cell).size_m(geometry.cell);
+        let window_m = 0.5 * (x_m + y_m);
+        let [width_m, height_m] = geometry.size();
+        let (least_m, most_m) = (BLOCK_WINDOWS_MIN * window_m, width_m.max(height_m));
+        let block_m = self.block_m.unwrap_or(BLOCK_WINDOWS * window_m);
+        // Where no block fits, the outer scale is too large for the DEM, and the fit says so.
+        if block_m >= least_m * (1.0 - 1e-9) && block_m <= most_m || least_m > most_m {
+            return Ok(());
+        }
+        let [block, least, most] = [block_m, least_m, most_m].map(|m| shown((1e6 * m).round() / 1e6));
+        let given = match self.block_m {
+            Some(_) => format!("`--local-block` is {block} m"),
+            None => format!("`--local` takes blocks of four windows, {block} m, without `--local-block`"),
+        };
+        Err(Error::Usage(format!(
+            "{given}; blocks are at least two windows, {least} m, and at most the DEM, {most} m, wide"
+        )))
     }
 
     fn file(&self, end: &str) -> PathBuf {

@@ -2,11 +2,12 @@
 
 use super::parameters;
 use crate::error::Error;
-use crate::jobs::texture::{STAGE, kinds, lay_onto};
+use crate::jobs::texture::{STAGE, fill_note, has_its_texture, kinds, lay_onto};
 use crate::verbs::{Read, Reading, read};
 use sastrugi_numeric::Streams;
 use sastrugi_schemas::fit::FitFile;
 use sastrugi_store::dem::{self, Crs, WriteOptions};
+use sastrugi_store::digest;
 use sastrugi_store::points::GridSettings;
 use sastrugi_texture::covariance::Covariance;
 use sastrugi_texture::synth::{conditional, fft_ma};
@@ -35,8 +36,21 @@ pub struct Request<'a> {
     pub options: WriteOptions,
 }
 
-/// Synthesises a texture and writes it. A study's item with the same fit, parameters and explicit `seed` has the same bytes.
-/// Returns what was made.
+/// Said where `covariance` is not given with a base: a file does not say whether it was measured.
+const RESIDUAL_CHOSEN: &str =
+    "covariance = residual: the base is taken for a measured background; --covariance surface for a generated one";
+
+/// Whether a file is the DEM that a fit was made from, by its SHA-256.
+fn is_fitted_dem(path: &Path, fit: &FitFile) -> bool {
+    let fitted = fit.source.as_ref().map_or("", |source| source.sha256.as_str());
+    !fitted.is_empty() && digest::of_file(path).is_ok_and(|(_, sha256)| sha256 == fitted)
+}
+
+/// Synthesises a texture and writes it. Returns what was made.
+///
+/// A study's item with the same fit, parameters, explicit `seed` and explicit `covariance` has the same bytes. Without
+/// `covariance` the defaults differ: a study takes `residual` only on a measured DEM and on a fit's background, since it knows
+/// its bases.
 ///
 /// # Errors
 /// Unknown methods and parameters, an unusable fit file or base, a file that cannot be written.
@@ -53,7 +67,8 @@ pub fn texture(request: &Request<'_>) -> Result<Value, Error> {
     }
     let mut parameters = request.parameters.clone();
     let on_background = request.onto.is_some() && fit.window_m.is_some() && request.method == fft_ma::kind().kind;
-    if on_background && parameters["covariance"].is_null() {
+    let chosen = on_background && parameters["covariance"].is_null();
+    if chosen {
         parameters["covariance"] = json!(fft_ma::CovarianceOf::Residual);
     }
     let synthesis = sastrugi_texture::prepare(request.method, &parameters, &fit)?;
@@ -61,6 +76,10 @@ pub fn texture(request: &Request<'_>) -> Result<Value, Error> {
     let streams = Streams::for_seed(request.seed, STAGE);
     let mut notes = sastrugi_texture::fit_notes(&fit);
     notes.extend(synthesis.notes());
+    notes.extend(chosen.then(|| RESIDUAL_CHOSEN.to_owned()));
+    if let Some(path) = request.onto.filter(|path| is_fitted_dem(path, &fit)) {
+        notes.push(format!("{}: {}", path.display(), has_its_texture("`fit --background DEM` writes it")));
+    }
     let outcome = synthesis.generate(&streams).map_err(|e| Error::Usage(e.to_string()))?;
     let (heights, crs) = match request.onto {
         None => (outcome.grid, Crs::default()),
@@ -107,6 +126,7 @@ fn fill(request: &Request<'_>, path: &Path, fit: &FitFile) -> Result<Value, Erro
     let filled = conditional::fill(&dem.grid, &covariance, &streams)
         .map_err(|e| Error::Input(format!("{}: {e}", path.display())))?;
     notes.push(filled.to_string());
+    notes.extend(fill_note(fit));
     let lost = dem::write(request.output, &filled.grid, &dem.info.crs, &request.options);
     notes.extend(lost.map_err(super::write_error)?);
     Ok(json!({

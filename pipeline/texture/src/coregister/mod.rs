@@ -110,15 +110,15 @@ pub fn coregister(a: &Grid, b: &Grid) -> Result<Coregistered, CoregisterError> {
     let uncertainty = if converged { overlay.uncertainty(&terms, shifted.is_some(), resolution_m) } else { None };
     let shift_m = shifted.map(|_| terms.offset.map(|o| -o));
     let shift_p = uncertainty.as_ref().zip(shift_m).and_then(|(u, shift)| u.probability_beyond(shift));
-    let significant = shift_p.is_some_and(|p| p < SIGNIFICANCE);
     let near = shift_m.is_some_and(|[east, north]| (east * east + north * north).sqrt() < overlay.cell_m());
+    let gained = |p: f64| p < SIGNIFICANCE && (near || nmad_after_m < nmad_plane_m);
     let coregistration = Coregistration {
         shift_m,
         raise_m: terms.raise,
         tilt: terms.tilt,
         standard_errors: uncertainty.map(Uncertainty::standard_errors),
         shift_p,
-        gained: Some(significant && (near || nmad_after_m < nmad_plane_m)),
+        gained: shift_p.map(gained),
         median_before_m,
         median_plane_m: Some(median_plane_m),
         median_after_m: Some(median_after_m),

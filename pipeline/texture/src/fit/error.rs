@@ -48,7 +48,7 @@ pub enum FitError {
         cells: usize,
     },
     /// No variation to describe.
-    #[error("the DEM has no texture: its residual is constant to rounding (height {height_m} m)")]
+    #[error("the DEM is flat or a plane: no residual above rounding error")]
     Constant {
         /// A height of the DEM, m.
         height_m: f64,

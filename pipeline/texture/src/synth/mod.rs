@@ -93,13 +93,21 @@ pub struct TextureOutcome {
     pub clip_share: f64,
 }
 
+/// A length for a message: without the last digits of a computed one, m.
+fn to_micrometres(length_m: f64) -> f64 {
+    (1e6 * length_m).round() / 1e6
+}
+
 /// A texture that cannot be made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SynthesisError {
     /// The covariance does not fit on the torus.
     #[error(
-        "the covariance is not positive definite on a tile of {width_m} m x {height_m} m: {clip_share:.1e} of its spectrum \
-         is negative, more than {limit:.0e}; make the tile at least {needed_m} m each way or set periodic = false"
+        "the covariance is not positive definite on a tile of {width} m x {height} m: {clip_share:.1e} of its spectrum \
+         is negative, more than {limit:.0e}; make the tile at least {needed} m each way or set periodic = false",
+        width = to_micrometres(*.width_m),
+        height = to_micrometres(*.height_m),
+        needed = to_micrometres(*.needed_m)
     )]
     NegativeSpectrum {
         /// East-west size of the torus, m.

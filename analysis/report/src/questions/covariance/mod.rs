@@ -264,7 +264,7 @@ fn residual(data: &Data, fit: &FitRow) -> Result<Option<Figure>, ReportError> {
     let path = format!("fit/{}.residual.tif", fit.fit_id);
     let Some(grid) = data.files.grid(&path)? else { return Ok(None) };
     let caption = format!(
-        "DEM less background; {} of the cells entered the covariance, grey ones did not (no data, border, outliers, trimmed).",
+        "DEM less background; {} of the cells entered the covariance, grey ones did not (no data, border, objects, trimmed).",
         set::percent(fit.used_share, 1)
     );
     let id = slug(&format!("residual-{}", fit.fit_id));

@@ -308,6 +308,15 @@ fn val_a_torus_too_small_is_refused_and_enlarged_when_not_periodic() {
     let covariance = exponential(1.0, 5.0);
     let error = texture(&tile_of([20.0; 2], "unit", true), &covariance).generate(&streams(1)).err().unwrap();
     assert!(matches!(error, SynthesisError::NegativeSpectrum { needed_m: 80.0, .. }), "{error}");
+    let computed = SynthesisError::NegativeSpectrum {
+        width_m: 300.000_000_000_000_06,
+        height_m: 300.0,
+        clip_share: 0.01,
+        limit: 1e-4,
+        needed_m: 7_999.999_999_999_997,
+    };
+    let message = computed.to_string();
+    assert!(message.contains("of 300 m x 300 m") && message.contains("at least 8000 m each way"), "{message}");
     let cropped = texture(&tile_of([20.0; 2], "unit", false), &covariance);
     let made = cropped.generate(&streams(1)).unwrap();
     assert_eq!((made.grid.rows(), made.grid.cols()), (200, 200));
