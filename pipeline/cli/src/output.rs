@@ -55,9 +55,8 @@ pub fn seconds(count: f64) -> String {
 
 /// A number to four significant digits, without an exponent.
 pub fn significant(value: f64) -> String {
-    if value == 0.0 {
-        return "0".to_owned();
-    }
-    let decimals = (3.0 - value.abs().log10().floor()).clamp(0.0, 12.0) as usize;
+    let scientific = format!("{value:.3e}");
+    let exponent: i32 = scientific.split_once('e').and_then(|(_, exponent)| exponent.parse().ok()).unwrap_or(0);
+    let decimals = (3 - exponent).clamp(0, 12) as usize;
     format!("{value:.decimals$}")
 }
