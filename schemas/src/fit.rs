@@ -351,7 +351,11 @@ mod tests {
             parameters: [("sigma_m".to_owned(), 1.0), ("range_m".to_owned(), 420.0)].into(),
             intervals: intervals([Some(4.4), None], true),
             block_intervals: intervals([None, None], false),
-            diagnostics: [("range_at_search_bound".to_owned(), json!(true))].into(),
+            diagnostics: [
+                ("range_at_search_bound".to_owned(), json!(true)),
+                (SILL_OVER_RANGE.to_owned(), json!(1.0 / 420.0)),
+            ]
+            .into(),
             ..FitFile::default()
         };
         assert_eq!(fit.quoted("range_m"), Some(Quoted::AtLeast(4.4)));
