@@ -78,7 +78,7 @@ impl DetrendFilter {
         Self { shape, cell_m, reach: max_lag, measurement, noise, fft, response }
     }
 
-    /// The filter for all lags at which residuals are correlated, and up to `max_lag` cells: beyond [`REACH_WINDOWS`] windows they
+    /// The filter for all lags at which residuals are correlated, and up to `max_lag` cells: beyond one and a half windows they
     /// hardly are, whatever the surface.
     pub fn wide(window: BoxWindow, cell_m: [f64; 2], max_lag: [usize; 2], measurement: Measurement) -> Self {
         let width = window.cells();
