@@ -68,7 +68,8 @@ impl<'a> Case<'a> {
         let (noise_m, residual_m) = (noise.at([0, 0]).sqrt(), bins.covariance_m2[0].sqrt());
         if noise_m >= residual_m {
             let message = format!(
-                "leaves {noise_m:.3e} m of noise in the residual, which has a standard deviation of {residual_m:.3e} m itself"
+                "and `correlated_noise_sigma_m` leave {noise_m:.3e} m of noise in the residual, whose own standard deviation is \
+                 {residual_m:.3e} m: state less noise"
             );
             return Err(ParameterError::new("noise_sigma_m", message).into());
         }

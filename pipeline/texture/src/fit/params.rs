@@ -199,7 +199,14 @@ fn forms(text: &str) -> Result<(Vec<Form>, bool), ParameterError> {
         ["auto"] => AUTO.to_vec(),
         _ => named,
     };
-    Ok((names.into_iter().map(Form::parse).collect::<Result<_, _>>()?, !empirical.is_empty()))
+    let parsed = |name: &str| {
+        let also = |e: ParameterError| ParameterError {
+            message: format!("{}; or `auto`, or `{EMPIRICAL}`, the measured covariance", e.message),
+            ..e
+        };
+        Form::parse(name).map_err(also)
+    };
+    Ok((names.into_iter().map(parsed).collect::<Result<_, _>>()?, !empirical.is_empty()))
 }
 
 impl FitSettings {

@@ -94,6 +94,8 @@ fn val_impossible_noise_is_refused() {
         assert_eq!(key(noise).as_deref(), Some("correlated_noise_range_m"), "{noise:?}");
     }
     assert_eq!(key([0.0, f64::NAN, 0.3]).as_deref(), Some("correlated_noise_sigma_m"));
+    let unknown = FitParameters { model: "nonsense".to_owned(), ..FitParameters::default() };
+    assert!(FitSettings::try_from(unknown).err().unwrap().message.ends_with("`empirical`, the measured covariance"));
     let loud = Noise { correlated_sigma_m: 0.2, ..TRUTH };
     let settings = with_bootstrap("exponential", 0).with_noise(&loud).unwrap();
     let refused = fit(&measured(TRUTH, 0.0, 1), &settings, &streams()).err().unwrap().to_string();
