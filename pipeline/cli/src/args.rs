@@ -367,7 +367,7 @@ pub struct Fit {
     /// Covariance at every lag as a GeoTIFF, whose coordinates are the lag in m.
     #[arg(long, value_name = "MAP.tif")]
     pub map: Option<PathBuf>,
-    /// Background that the fit takes off, as a DEM: `texture --onto` it adds what it lacks.
+    /// Write the background that the fit removes, as a DEM: the base for `texture --onto`.
     #[arg(long, value_name = "DEM")]
     pub background: Option<PathBuf>,
     /// Other files that show the fit.
