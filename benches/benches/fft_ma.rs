@@ -1,6 +1,6 @@
 //! FFT-MA texture of 2048^2 and 4096^2 cells beside the transform it cannot do without, and beside numpy.
 //!
-//! The specification's target, at 4096^2, is 0.35 times numpy's rfft2 FFT-MA. Where `python3` with numpy is there, its time is
+//! The target, at 4096^2, is 0.35 times numpy's rfft2 FFT-MA. Where `python3` with numpy is there, its time is
 //! measured in the same run (`floors/fft_ma.py`, fastest of five) and printed before the table; another floor, in the
 //! same process, is one real transform (`sastrugi_numeric`, same bits on every CPU). Run one-threaded:
 //! `RAYON_NUM_THREADS=1 cargo bench -p sastrugi-benches --bench fft_ma`.

@@ -2,7 +2,7 @@
 //!
 //! Floors in the same process: copying the raster (moving average), and four real transforms of it, two of the data and two
 //! of the mask (covariance to 33 lags). Floors in the same run, printed before the table: numpy's summed-area tables and
-//! scipy's FFT (`floors/masked_covariance.py`, fastest of three). The specification's targets, at 4096^2, are 0.35 times the
+//! scipy's FFT (`floors/masked_covariance.py`, fastest of three). The targets, at 4096^2, are 0.35 times the
 //! former and 0.5 times the latter, and 1.5 s for the whole fit from a file. Run one-threaded:
 //! `RAYON_NUM_THREADS=1 cargo bench -p sastrugi-benches --bench masked_covariance`.
 

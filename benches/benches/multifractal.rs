@@ -1,4 +1,4 @@
-//! Multifractal terrain at the published size, beside the bare transform that the specification measures it by.
+//! Multifractal terrain at the published size, beside the bare transform that its targets are ratios to.
 //!
 //! Targets: a layer (M = 64, 1009^2, either mode) within 2.5 times `complex_fft_2048`; a whole three-layer DEM within
 //! 0.4 s on one core. Run one-threaded: `RAYON_NUM_THREADS=1 cargo bench -p sastrugi-benches --bench multifractal`.

@@ -325,7 +325,7 @@ fn noise(row: u32, col: u32) -> f64 {
     f64::from(bits >> 16) / 65536.0
 }
 
-/// Everything that the specification lists (section 5): one sentence and the code, no file.
+/// Everything that a fit cannot use: one sentence and the code, no file.
 #[test]
 fn val_everything_that_a_fit_refuses() {
     let folder = area();

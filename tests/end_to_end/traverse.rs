@@ -412,7 +412,7 @@ missions = "straight"
 const PROTOTYPE: [(&str, [f64; 4]); 3] =
     [("2.30", [96.5, 0.55, 12.7, 9.2]), ("2.45", [88.0, 0.88, 16.5, 12.4]), ("2.60", [66.5, 1.24, 19.3, 14.7])];
 
-/// Acceptance 9: every figure grows (success falls) with the fractal dimension, and lies within 15 % of the prototype's. One seed,
+/// Every figure grows (success falls) with the fractal dimension, and lies within 15 % of the prototype's. One seed,
 /// bit for bit, so no statistical test; standard errors over our 100 terrains are 1 to 3 % for success and 3 to 6 % for the others,
 /// those of the prototype's 20 about twice as large.
 #[test]

@@ -7,7 +7,7 @@ The table: slopes of 0 to 100 %, eight azimuths (two opposite ones for each slop
 change nothing, intervals of 95 % cover the truth in 95 % of fields.
 
 * Bias, pooled over the table. One field scatters by 2.2 % (sigma) and 4.9 % (b), measured here, so that the mean of `full`
-  (600 fields) errs by 0.09 % and 0.20 %: the limits of the specification, 0.5 % and 1 %, are 5.5 and 5 standard errors
+  (600 fields) errs by 0.09 % and 0.20 %: the limits, 0.5 % and 1 %, are 5.5 and 5 standard errors
   (false alarm 6e-7). `quick` (20 fields): limits of 2.4 % and 5.7 % are 4.9 and 5.2 (1e-6). -0.22 % and -0.73 % were
   measured by `full`: within the limits, but not 0.
 * Paired: the fit on the slope against that of the same field, undulation, holes and trees without the slope. Each without

@@ -52,8 +52,8 @@ fn script(python: &Path, name: &str, arguments: &[&Path]) -> Called {
     call
 }
 
-/// Acceptance 8: same outcome (success or not) on 80 % of 240 missions, medians of pitch and roll rate of the missions on
-/// which both succeed within 10 %. The bounds are those of the specification, and no statistical test: one seed, bit for
+/// Same outcome (success or not) on 80 % of 240 missions, medians of pitch and roll rate of the missions on
+/// which both succeed within 10 %. The bounds are agreed ones, and no statistical test: one seed, bit for
 /// bit the same on our side every time.
 #[test]
 #[ignore = "slow: ./test --full"]

@@ -37,7 +37,7 @@ fn fit(folder: &Path, dem: &Path, scale: &str, cell: Option<&str>, name: &str) -
     serde_json::from_slice(&std::fs::read(folder.join(name)).unwrap()).unwrap()
 }
 
-/// Acceptance 7: a measured site is fitted, a texture of its size made from the fit, and fitted again; the first fit's sigma,
+/// A measured site is fitted, a texture of its size made from the fit, and fitted again; the first fit's sigma,
 /// b and sigma^2 / b lie in the second one's 99.9 % intervals (95 % ones widened as those of a normal logarithm; an open
 /// end holds everything). 8 sites with 3 figures each: false alarm 2.4 % if all were independent.
 #[test]
@@ -70,7 +70,7 @@ fn stat_measured_sites_come_back() {
 /// Textures of each site that are averaged.
 const TEXTURES: u32 = 20;
 
-/// Acceptance 12: the background of a measured site and a texture of what it lacks, of the measured covariance, detrended and trimmed as
+/// The background of a measured site and a texture of what it lacks, of the measured covariance, detrended and trimmed as
 /// the site was: the mean over 20 textures has the residual's RMS within 5 %, and its increments within 5 % at lags up to half a window.
 /// Increments of two sites fall short: pozo blanca (cliffs: heights far from normal, background and residual depend on each other) and the HiRISE crop
 /// (six by three windows). Objects are kept in both, so that the same cells count. No test of chance: a texture's RMS scatters by 1 to 6 %.

@@ -27,7 +27,7 @@ fn sinc(x: f64) -> f64 {
     libm::sin(x) / x
 }
 
-/// Acceptance 10: a sine heave of amplitude A has RMS acceleration `A w^2 / sqrt 2` less the attenuation of the sampling.
+/// A sine heave of amplitude A has RMS acceleration `A w^2 / sqrt 2` less the attenuation of the sampling.
 /// Whole periods, so the tolerance of 1 % covers the end effects.
 #[test]
 fn val_sine_heave() {

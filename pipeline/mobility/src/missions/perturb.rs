@@ -6,7 +6,7 @@
 //! so that asking for more changes none of those before.
 //!
 //! A point uniform in a disk of radius `r` is `r sqrt(u)` away at the angle `2 pi v`, with `u`, `v` uniform in [0, 1).
-//! Source: specification of the traversal study. Cost: three draws per start.
+//! Cost: three draws per start.
 
 use super::{Mission, normalized};
 use sastrugi_numeric::Streams;

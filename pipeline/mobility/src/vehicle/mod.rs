@@ -17,7 +17,7 @@
 //! change of the wheels' momentum. Fixed steps, semi-implicit (velocities first, then positions with the new
 //! velocities); 500 Hz unless told otherwise.
 //!
-//! Source: specification of the traversal study; the vehicle of Majhor and Bos, section 2. Only `+ - * /`, `sqrt` and
+//! Source: the vehicle of Majhor and Bos, section 2; the model is described in `docs/traversal.md`. Only `+ - * /`, `sqrt` and
 //! `libm` are used. Cost: about a microsecond per step and vehicle. What the model leaves out (side walls, spikes between
 //! rays, soil) is listed in `docs/traversal.md`.
 

@@ -97,7 +97,7 @@ fn val_whole_vehicle_is_the_sum_of_its_parts() {
     }
 }
 
-/// Acceptance 1: static to 1e-6 m for 60 s, sag = load / stiffness, wheels carry the weight.
+/// Static to 1e-6 m for 60 s, sag = load / stiffness, wheels carry the weight.
 #[test]
 fn val_rests_on_a_plane() {
     parked(
@@ -134,7 +134,7 @@ fn val_sag_does_not_depend_on_the_ray_count() {
     }
 }
 
-/// Acceptance 1: with the motors off, a vehicle thrown at a plane only loses energy. Tolerance: 2e-3 of what it starts
+/// With the motors off, a vehicle thrown at a plane only loses energy. Tolerance: 2e-3 of what it starts
 /// with per step, the ripple of a semi-implicit step on a stiff spring.
 #[test]
 fn val_energy_never_grows_with_the_motor_off() {
@@ -238,7 +238,7 @@ fn val_other_vehicles_rest_on_a_plane() {
     }
 }
 
-/// Acceptance 1 for the other vehicles: dropped and thrown with free wheels, they only lose energy (ripple of a step 2e-3).
+/// The other vehicles: dropped and thrown with free wheels, they only lose energy (ripple of a step 2e-3).
 #[test]
 fn val_energy_of_other_vehicles_never_grows() {
     for name in OTHERS {
@@ -378,7 +378,7 @@ fn val_surfaces_decide_what_is_climbed() {
     assert_ne!(outcome(&drive(&icy_ground, &vehicle, &settings, &mission).unwrap()).kind, EventKind::Success);
 }
 
-/// Acceptance 2: planes of 20 and 30 deg are climbed at the commanded 1 m/s less what the closed form says: the droop of
+/// Planes of 20 and 30 deg are climbed at the commanded 1 m/s less what the closed form says: the droop of
 /// the servo under the torque of a side, and the tread's slip under the force `F` of a wheel, `F / (k L)`. Tolerance 0.5 %.
 #[test]
 fn val_climbs_planes() {
@@ -399,7 +399,7 @@ fn val_climbs_planes() {
     }
 }
 
-/// Acceptance 2: locked wheels hold where tan < mu, without creeping (1 mm in 20 s), and slide as `g (sin - mu cos)`
+/// Locked wheels hold where tan < mu, without creeping (1 mm in 20 s), and slide as `g (sin - mu cos)`
 /// where tan > mu (tolerance 2 %).
 #[test]
 fn val_slides_where_the_slope_exceeds_friction() {
@@ -421,7 +421,7 @@ fn val_slides_where_the_slope_exceeds_friction() {
     assert!((gained / 0.5 - expected).abs() < 0.02 * expected.abs(), "{gained} {expected}");
 }
 
-/// Acceptance 3: 35 m on level ground within 0.05 m of the line, in (35 - 0.5) m over the steady speed plus the time
+/// 35 m on level ground within 0.05 m of the line, in (35 - 0.5) m over the steady speed plus the time
 /// lost to the acceleration of 3 m/s2; the steady speed is 1 m/s less the servo's droop. Tolerance 0.1 s.
 #[test]
 fn val_drives_straight() {
@@ -434,7 +434,7 @@ fn val_drives_straight() {
     assert!((outcome(&recording).time_s - expected).abs() < 0.1, "{} {expected}", outcome(&recording).time_s);
 }
 
-/// Acceptance 4: 0.5 rad/s commanded turn the vehicle at 0.34 +- 0.04 rad/s, standing or driving.
+/// 0.5 rad/s commanded turn the vehicle at 0.34 +- 0.04 rad/s, standing or driving.
 #[test]
 fn val_yaw_response_of_the_skid_steer() {
     for speed in [0.0, 1.0] {
@@ -457,7 +457,7 @@ fn val_yaw_response_of_the_skid_steer() {
     }
 }
 
-/// Acceptance 5: on a side slope the vehicle rolls over its outer wheel edges beyond `atan(half width / height of the
+/// On a side slope the vehicle rolls over its outer wheel edges beyond `atan(half width / height of the
 /// centre of mass)` = 61.1 deg, +-2 deg. The closed form holds for rigid wheels set down gently, so tyres are stiff and
 /// damped here (found: 60.1 deg; the standard ones, dropped on the slope, give in and roll over at 56.4 deg). Friction 5
 /// keeps the vehicle from sliding.
@@ -486,7 +486,7 @@ fn val_rolls_over_beyond_the_static_angle() {
     assert!(rolls(static_deg + 2.0));
 }
 
-/// Acceptance 7: across a bump at 0.1 m/s the front hub follows the envelope of a rigid wheel within 5 mm, less the
+/// Across a bump at 0.1 m/s the front hub follows the envelope of a rigid wheel within 5 mm, less the
 /// sag. The envelope is the highest rigid circle that the bilinear profile carries at each place.
 #[test]
 fn val_wheel_envelops_a_bump() {
@@ -513,7 +513,7 @@ fn val_wheel_envelops_a_bump() {
     }
 }
 
-/// Acceptance 11: leaving out what the ceiling proves to be clear changes no bit, here with wheels and belly on rough
+/// Leaving out what the ceiling proves to be clear changes no bit, here with wheels and belly on rough
 /// ground.
 #[test]
 fn prop_culling_changes_no_bit() {
@@ -621,7 +621,7 @@ fn gold_one_mission() {
 }
 const GOLD_POSES: u64 = 0x77ca_0a0f_6b89_05c7;
 
-/// Every refusal of section 7 of the specification, and the key it names.
+/// Every refusal, and the key it names.
 #[test]
 fn val_bad_vehicles_are_refused() {
     let refused = |value: Value| {
@@ -732,7 +732,7 @@ fn val_ground_is_the_stored_bilinear_surface() {
     assert!(!ground.contains(100.0, -18.0) && ground.contains(100.03, -18.0));
 }
 
-/// Acceptance 6: outcomes at 500 and 1000 Hz agree on at least 90 % of 400 missions, and the medians of the figures over
+/// Outcomes at 500 and 1000 Hz agree on at least 90 % of 400 missions, and the medians of the figures over
 /// missions that succeed at either rate within 3 %. The amplitudes make success as frequent as on the study's terrains
 /// and rarer (100 to 41 %). Found: 390 of 400. With a true agreement of 94 % the count falls below 90 % once in 1000 draws
 /// of missions; seeds are fixed.

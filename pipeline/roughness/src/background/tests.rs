@@ -142,7 +142,7 @@ fn val_planes_are_their_own_background() {
     }
 }
 
-/// Variances of the specification (texture, section 2.2), times the number of cells: 1 for a complete window, 4 at a straight border,
+/// Variances of the plane at the centre times the number of cells, in closed form: 1 for a complete window, 4 at a straight border,
 /// 7 in a corner, to the size of a cell.
 #[test]
 fn val_leverages() {
@@ -163,7 +163,7 @@ fn val_leverages() {
     assert!((leverage(0..=0, 0..=100).unwrap() - 4.0).abs() < 0.1);
 }
 
-/// Windows of the specification: 2 m is 33 cells of 6 cm and 21 cells of 10 cm.
+/// A window is the odd number of cells nearest to its length: 2 m is 33 cells of 6 cm and 21 cells of 10 cm.
 #[test]
 fn val_windows_are_odd() {
     assert_eq!(BoxWindow::nearest(2.0, [0.06; 2]).cells(), [33, 33]);

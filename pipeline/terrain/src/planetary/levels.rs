@@ -216,7 +216,7 @@ mod tests {
         offsets.map(|[a, b]| [i + a * step, j + b * step])
     }
 
-    /// Acceptance 3: parents have higher levels.
+    /// Parents have higher levels.
     #[test]
     fn prop_parents_have_higher_levels() {
         let mut s = Streams::for_seed(1, "levels").stream("points");
@@ -228,7 +228,7 @@ mod tests {
         }
     }
 
-    /// Acceptance 3: each point of the plane lies in exactly one diamond.
+    /// Each point of the plane lies in exactly one diamond.
     #[test]
     fn prop_diamonds_tile_the_plane() {
         let mut s = Streams::for_seed(2, "levels").stream("points");

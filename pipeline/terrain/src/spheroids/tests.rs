@@ -80,7 +80,7 @@ proptest! {
 }
 
 /// Share of nodes, in percent, that the thesis' extraction without height-difference threshold marks (Bayrak, 2008, Algorithms 1 to 3 and
-/// the filter of section 3.1, in our specification's reading): extrema and saddles that stand out, cells beside steps of more than 30
+/// the filter of section 3.1, as docs/papers/bayrak.md reads them): extrema and saddles that stand out, cells beside steps of more than 30
 /// degrees, and the points that join lone ones.
 fn vertex_percent(z: &Grid) -> f64 {
     let (rows, cols) = (z.rows(), z.cols());

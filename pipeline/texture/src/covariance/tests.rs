@@ -182,7 +182,7 @@ fn prop_series_equals_integral() {
     }
 }
 
-/// Slopes at rho = 0 of the specification: T'(0) = 0.576 and T(1) = 0.759 at 5 %.
+/// Slopes at rho = 0 in closed form: T'(0) = 0.576 and T(1) = 0.759 at 5 %.
 #[test]
 fn val_trimming_bends_the_shape() {
     let trimmed = TrimmedNormal::new(1.959_963_984_540_054);

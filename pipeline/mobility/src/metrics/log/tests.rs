@@ -202,7 +202,7 @@ fn val_an_imu_is_turned_upright() {
     assert!(parallel.notes[0].contains("no transform tells how `imu` lies in `base_link`"), "{:?}", parallel.notes);
 }
 
-/// 1 mm of white noise on the heights at 20 Hz: 0.98 m/s2 (specification, section 3), nothing told; a heave of 1.6 m/s2 within
+/// 1 mm of white noise on the heights at 20 Hz: 0.98 m/s2, nothing told; a heave of 1.6 m/s2 within
 /// 0.1 mm of noise is. The floor is within 25 % (its top eighth holds 12 bins of 7 half-overlapping segments: standard error
 /// of the density 14 %, of the root 7 %; 3.5 times that: false alarm 5e-4).
 #[test]

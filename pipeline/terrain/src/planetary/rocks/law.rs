@@ -95,7 +95,7 @@ mod tests {
         Law { coverage, exact_union: true }
     }
 
-    /// Acceptance 9: q and N(>D) per square metre of the four densities of the paper.
+    /// `q` and N(>D) per square metre of the four densities of the paper.
     #[test]
     fn val_rocks_per_square_metre() {
         let table = [
@@ -114,7 +114,7 @@ mod tests {
         assert!((law(0.176).decay_per_m() - 2.6536).abs() < 5e-5);
     }
 
-    /// Acceptance 9: the closed form against Simpson's rule in log D, and E1 against tables (Abramowitz and Stegun, 5.1).
+    /// The closed form against Simpson's rule in log D, and E1 against tables (Abramowitz and Stegun, 5.1).
     #[test]
     fn val_closed_forms() {
         for (x, value) in

@@ -11,7 +11,7 @@ fn bits(patch: &Patch, col: usize, row: usize) -> Bits {
     [z, albedo, u64::from(patch.class[k]), potential]
 }
 
-/// Acceptance 1: every second sample of a patch is the patch of twice the spacing.
+/// Every second sample of a patch is the patch of twice the spacing.
 #[test]
 fn prop_zooms_agree() {
     let world = world(everything(), 1);
@@ -26,7 +26,7 @@ fn prop_zooms_agree() {
     }
 }
 
-/// Acceptance 2: overlapping patches, single samples and tiles agree; so do 1 and 8 threads.
+/// Overlapping patches, single samples and tiles agree; so do 1 and 8 threads.
 #[test]
 fn prop_patches_agree() {
     let made = world(everything(), 2);
@@ -68,7 +68,7 @@ fn prop_patches_agree() {
     assert_eq!(one, made.patch(&large));
 }
 
-/// Acceptance 13: what lies somewhere lies there at any spacing: a rock of 2 m is met by samples 1.28 m apart.
+/// What lies somewhere lies there at any spacing: a rock of 2 m is met by samples 1.28 m apart.
 #[test]
 fn val_a_rock_of_two_metres_is_seen_at_every_zoom() {
     let processes =

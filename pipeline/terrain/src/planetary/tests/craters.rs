@@ -51,7 +51,7 @@ fn struck(craters: Vec<Crater>, ground: Value) -> World {
     made
 }
 
-/// Acceptance 5: one crater of 60 samples across on flat ground.
+/// One crater of 60 samples across on flat ground.
 #[test]
 fn val_one_crater() {
     let (diameter_m, centre) = (0.6, [13.3, -7.8]);
@@ -111,7 +111,7 @@ fn val_old_ground_is_annihilated() {
     }
 }
 
-/// Acceptance 6: of two craters that meet, the later one is whole, and swapping times swaps which one is.
+/// Of two craters that meet, the later one is whole, and swapping times swaps which one is.
 #[test]
 fn val_later_craters_overprint_earlier_ones() {
     let area = window(0, -60, -60, 200, 121);
@@ -171,7 +171,7 @@ fn exponent_of(mean_log: f64, range: f64) -> f64 {
     from
 }
 
-/// Acceptance 7: exponents by maximum likelihood (truncated power law) from more than 1e4 craters: within 0.05 of 2 and 0.1 of 3.5.
+/// Exponents by maximum likelihood (truncated power law) from more than 1e4 craters: within 0.05 of 2 and 0.1 of 3.5.
 /// The estimate's standard error is about A / sqrt(n) / 0.9 = 0.01 for n = 4e4, so that a right kernel fails with less than 1e-6.
 #[test]
 fn stat_sizes_follow_their_power_laws() {
@@ -190,7 +190,7 @@ fn stat_sizes_follow_their_power_laws() {
     }
 }
 
-/// Acceptance 7: counts per square of ground are Poisson, also across the borders of diamonds: index of dispersion of 40 x 40 squares
+/// Counts per square of ground are Poisson, also across the borders of diamonds: index of dispersion of 40 x 40 squares
 /// against chi-square (1599 degrees of freedom, 5 standard deviations of sqrt(2 / n): 6e-7); and for A = 2 every bin has the same mean
 /// per diamond, 24 times the density.
 #[test]
@@ -352,7 +352,7 @@ fn visible(density: f64, seed: u64) -> [f64; 2] {
     [own as f64, elsewhere as f64]
 }
 
-/// Acceptance 8: saturation. Ten times the equilibrium density (10^-1.1 = 0.079), and twice that, leave the same number of craters to
+/// Saturation. Ten times the equilibrium density (10^-1.1 = 0.079), and twice that, leave the same number of craters to
 /// see, within 20 %: 3903 over 4348 in 480 patches, 0.90 with a standard error of 0.022. Were that the true ratio, the bound would be 4.4
 /// standard errors away (5e-6). The seeds are the first ones; the counts at a tenth of the equilibrium and at the equilibrium itself are
 /// printed. Six minutes of one core.

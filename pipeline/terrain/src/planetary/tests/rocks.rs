@@ -13,7 +13,7 @@ fn rocky(coverage: f64, law: &str) -> World {
     world(json!([{"kind": "rocks", "coverage": coverage, "law": law}]), 11)
 }
 
-/// Acceptance 10: share of samples on rock over nine hectares, 32 cm apart, against the law's own: F(>0.03 m) to 3 % of itself where
+/// Share of samples on rock over nine hectares, 32 cm apart, against the law's own: F(>0.03 m) to 3 % of itself where
 /// overlaps are made up for, 1 - exp(-F) where not. One hectare scatters by 1.2 % of itself (large rocks), nine by 0.4 %, the
 /// samples by as much again: 3 % is 5 standard deviations.
 #[test]
@@ -42,7 +42,7 @@ fn found(world: &World, side: usize, coverage: impl Fn([f64; 2]) -> f64) -> Vec<
     rocks
 }
 
-/// Acceptance 11: cumulative counts of the mode's own law, at 0.1, 0.2 and 0.5 m: `literal` against the published N(>D) up to 5 m;
+/// Cumulative counts of the mode's own law, at 0.1, 0.2 and 0.5 m: `literal` against the published N(>D) up to 5 m;
 /// `exact_union` against the integral of n / (1 - F), which exceeds the published one by 12, 8 and 3 % at 17.6 %. The bound is the
 /// list's, 3 standard deviations (Poisson) of the count on a hectare, met by the mean of nine hectares: 9 of its own, 1e-18 a figure.
 /// A density wrong by 3 % at 0.1 m would be caught.
@@ -79,7 +79,7 @@ fn count_above(law: &Law, diameter_m: f64) -> f64 {
     (0..n).map(at).sum()
 }
 
-/// Acceptance 12: nothing in craters and most of their ejecta, and an exponential fall around wide ones.
+/// Nothing in craters and most of their ejecta, and an exponential fall around wide ones.
 #[test]
 fn val_craters_clear_and_strew_rocks() {
     let spec = json!([

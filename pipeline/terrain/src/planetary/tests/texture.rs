@@ -22,7 +22,7 @@ fn slope(grid: &Grid) -> f64 {
     sum(&|p| (p[0] - x) * (p[1] - y)) / sum(&|p| (p[0] - x) * (p[0] - x))
 }
 
-/// Acceptance 4: spectra of profiles fall with -(2 H + 1), within 0.15, between 8 and 128 samples: shorter waves are lifted by the
+/// Spectra of profiles fall with -(2 H + 1), within 0.15, between 8 and 128 samples: shorter waves are lifted by the
 /// aliases that point samples have. One patch of 1024 x 1024 scatters by 0.015 (printed) about 0.05 to 0.07 less than H says, so that a
 /// right kernel fails with 1e-6 or so; an exponent of H + 1 or a missing level would be off by more than 0.3.
 #[test]
@@ -36,8 +36,7 @@ fn stat_spectra_follow_the_hurst_exponent() {
     }
 }
 
-/// Root mean square difference of neighbours: 2.12 s1 d^H at H = 0.8 over a world with 20 levels (2.05 was measured for the
-/// specification, on fewer). Over 4000 places; half of the squares come from waves longer than 8 points, so that they scatter by
+/// Root mean square difference of neighbours: 2.12 s1 d^H at H = 0.8 over a world with 20 levels (2.05 on fewer). Over 4000 places; half of the squares come from waves longer than 8 points, so that they scatter by
 /// about 1.5 % as one figure a place: 6 % is 5 standard errors of the root and more.
 #[test]
 fn stat_neighbours_differ_as_specified() {

@@ -120,7 +120,7 @@ fn val_paper_mode_has_the_published_bias() {
     assert_bias("paper 1 m", study(1.0, 512, 6, &s, untouched), [-0.43, -0.76], [0.02; 2]);
 }
 
-/// Acceptance 1 of the specification, b = 0.28 m. Null: no bias. 200 fields: standard errors 0.07 % and 0.16 %, with 10 %
+/// An exponential of b = 0.28 m. Null: no bias. 200 fields: standard errors 0.07 % and 0.16 %, with 10 %
 /// trimmed 0.08 % and 0.18 %; limits of 0.5 % and 1 % are at least five of them (false alarm below 6e-7).
 #[test]
 #[ignore = "slow: ./test --full"]
@@ -138,7 +138,7 @@ fn stat_corrected_fit_is_unbiased() {
     check("b 0.28 m, 20 % blocky no-data", 2.0, 0.05, blocky);
 }
 
-/// Acceptance 1, b = 1 m at a window of 2 m. Null: no bias. 600 fields: standard errors 0.18 % and 0.38 %, so limits of
+/// An exponential of b = 1 m, window 2 m. Null: no bias. 600 fields: standard errors 0.18 % and 0.38 %, so limits of
 /// 1 % and 2 % are above five of them (4e-7).
 #[test]
 #[ignore = "slow: ./test --full"]
@@ -147,7 +147,7 @@ fn stat_corrected_fit_is_unbiased_near_the_window() {
     assert_bias("b 1 m", found, [0.0; 2], [0.01, 0.02]);
 }
 
-/// Acceptance 4. Null: trees are taken out without a trace. 200 fields: standard errors 0.07 % and 0.16 %.
+/// Null: trees are taken out without a trace. 200 fields: standard errors 0.07 % and 0.16 %.
 #[test]
 #[ignore = "slow: ./test --full"]
 fn stat_trees_do_not_enter() {
@@ -155,7 +155,7 @@ fn stat_trees_do_not_enter() {
     assert_bias("25 trees", found, [0.0; 2], [0.015, 0.03]);
 }
 
-/// Acceptance 2: scatter at most twice the Cramer-Rao bound of raw data (0.78 % and 1.62 % at b = 0.28 m; 2.75 % and
+/// Scatter at most twice the Cramer-Rao bound of raw data (0.78 % and 1.62 % at b = 0.28 m; 2.75 % and
 /// 5.53 % at 1 m). 200 fields know a scatter to 5 %; measured ratios are 1.1 to 1.7, so a false alarm needs more than
 /// three of these errors at the worst (1e-3) and ten at the others.
 #[test]
@@ -195,7 +195,7 @@ fn refused(dem: &Grid, parameters: FitParameters) -> FitError {
     fit(dem, &parameters.try_into().unwrap(), &streams()).err().unwrap()
 }
 
-/// Section 5 of the specification.
+/// Too few cells, no relief, windows that are too small or too large: one sentence each.
 #[test]
 fn val_what_cannot_be_fitted_is_refused() {
     let flat = |rows, cols, z| Grid::filled(Geometry::square(rows, cols, 0.1), z);
@@ -364,7 +364,7 @@ fn holds(ends: [Option<f64>; 2], value: f64) -> bool {
     ends[0].is_none_or(|low| low <= value) && ends[1].is_none_or(|high| value <= high)
 }
 
-/// Acceptances 3 and 11: nominal 95 % intervals hold the truth in 95 +- 7 points of 200 fields (binomial standard deviation 1.5
+/// Nominal 95 % intervals hold the truth in 95 +- 7 points of 200 fields (binomial standard deviation 1.5
 /// points; 99 replicates add 1: false alarm below 1e-3), a quarter of them each level, on slopes of 20, 50 and 100 %, every
 /// other one with 15 % holes. `SASTRUGI_FIELDS` is another number of fields.
 #[test]
@@ -407,7 +407,7 @@ fn warned(name: &str, truth: &Covariance, count: u64, bootstrap: u32) -> f64 {
     share
 }
 
-/// Acceptance 9: what is no exponential is warned of in 95 % of 200 self-affine fields (40 of each H) and of 200 von Karman ones
+/// What is no exponential is warned of in 95 % of 200 self-affine fields (40 of each H) and of 200 von Karman ones
 /// (100 of each smoothness), an exponential in at most 5 % of 200. Any warning counts, and their kinds are printed: a self-affine surface of H = 0.5 is the limit of exponentials of endless range, so that its
 /// warning is that b cannot be told, and no misfit. Without replicates all tests but that of normal heights are made, with
 /// theory's nulls.

