@@ -54,8 +54,14 @@ fn val_a_plot_shows_measured_and_model() {
     assert_eq!(svg, text(path, "again.svg"));
     assert_eq!(text(path, "fit.json"), text(path, "other.json"));
 
-    refused(path, &["snow.tif", "--plot", "plot.png", "-o", "refused.json"], ".svg");
-    refused(path, &["snow.tif", "--plot", "plot", "-o", "refused.json"], ".svg");
+    let png = ["first.PNG", "second.png"].map(|name| {
+        assert_eq!(fit(path, &["snow.tif", "--plot", name, "-o", "other.json"]).code, 0);
+        std::fs::read(path.join(name)).unwrap()
+    });
+    assert!(png[0].starts_with(b"\x89PNG\r\n\x1a\n") && png[0] == png[1]);
+
+    refused(path, &["snow.tif", "--plot", "plot.pdf", "-o", "refused.json"], ".svg or .png");
+    refused(path, &["snow.tif", "--plot", "plot", "-o", "refused.json"], ".svg or .png");
     write(path, "mask.svg", "");
     for same in ["refused.svg", "mask.svg"] {
         let arguments = ["snow.tif", "--exclude", "mask.svg", "--plot", same, "-o", "refused.svg"];

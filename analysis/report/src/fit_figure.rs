@@ -9,10 +9,12 @@
 //!
 //! Everything is read from the fit file; nothing is computed but the differences above.
 
+use crate::ReportError;
 use crate::content::slug;
 use crate::render::axis::Axis;
 use crate::render::chart::{Entry, Mark, Plot};
 use crate::render::number as set;
+use crate::render::raster;
 use crate::render::svg::{Anchor, Paint, Stroke, Svg, Symbol, TEXT, fitted};
 use sastrugi_schemas::fit::{DirectionBin, FitFile, Quoted};
 
@@ -55,6 +57,14 @@ pub fn fit_svg(fit: &FitFile, name: &str) -> String {
     svg.text(foot, Anchor::Start, Paint::Muted, &fitted(&explanation(fit), room, TEXT));
     let description = format!("Covariance in {} rings with the fitted model. {}", fit.lags_m.len(), parameters(fit));
     svg.finish(&id, &title, &description)
+}
+
+/// The same as a PNG file.
+///
+/// # Errors
+/// When it cannot be drawn, for want of memory.
+pub fn fit_png(fit: &FitFile, name: &str) -> Result<Vec<u8>, ReportError> {
+    raster::png(&fit_svg(fit, name))
 }
 
 fn model_words(fit: &FitFile) -> String {

@@ -4,7 +4,7 @@
 //! * [`questions`]: one folder per question that the page answers (query, figure, table), listed in one registry.
 //! * [`papers`]: published figures as data.
 //! * [`releases`]: two releases beside each other, for the page and for the verb `compare`.
-//! * [`fit_svg`]: the picture of one fit file, for the verb `fit`.
+//! * [`fit_svg`] and [`fit_png`]: the picture of one fit file, for the verb `fit`.
 //! * [`mod@render`]: drawing, which knows nothing of what it draws.
 //! * [`data`]: the only way to the release's rows and files.
 //!
@@ -25,7 +25,7 @@ mod fit_figure;
 mod release;
 mod write;
 
-pub use fit_figure::fit_svg;
+pub use fit_figure::{fit_png, fit_svg};
 pub use write::{Summary, render, render_with};
 
 use std::path::PathBuf;
@@ -87,6 +87,9 @@ pub enum ReportError {
     /// A picture could not be encoded.
     #[error("encode a picture: {0}")]
     Picture(#[from] png::EncodingError),
+    /// A figure could not be drawn as pixels.
+    #[error("draw a figure as PNG: {0}")]
+    Raster(String),
 }
 
 impl ReportError {

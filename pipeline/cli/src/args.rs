@@ -381,8 +381,9 @@ pub struct Fit {
 /// Files that show a fit.
 #[derive(Debug, Args)]
 pub struct FitShown {
-    /// Plot of the fit (.svg): covariance by lag and structure function, measured and model, and covariance by direction.
-    #[arg(long, value_name = "FILE.svg")]
+    /// Plot of the fit (.svg or .png): covariance by lag and structure function, measured and model, and covariance by
+    /// direction.
+    #[arg(long, value_name = "FILE.svg|png")]
     pub plot: Option<PathBuf>,
     /// Bins of the covariance as flat CSV: kind (ring or direction), lag_m, azimuth_deg (clockwise from grid north),
     /// covariance_m2, pairs, model_m2 (as the estimator sees it), surface_model_m2 (rings only).

@@ -8,5 +8,6 @@ pub mod html;
 pub mod map;
 pub mod number;
 pub mod picture;
+pub mod raster;
 pub mod svg;
 pub mod thin;

@@ -2,7 +2,7 @@
 
 use crate::args::FitShown;
 use crate::failure::Failure;
-use sastrugi_report::fit_svg;
+use sastrugi_report::{fit_png, fit_svg};
 use sastrugi_schemas::fit::FitFile;
 use sastrugi_stages::verbs::fit::write_bins;
 use sastrugi_store::atomic;
@@ -18,8 +18,8 @@ impl<'a> ShownFiles<'a> {
     /// Refuses endings that nothing is written as.
     pub fn of(args: &'a FitShown) -> Result<Self, Failure> {
         let plot = args.plot.as_deref();
-        let why = "plots are written as .svg, which browsers and drawing programs open and export to PNG or PDF";
-        plot.into_iter().try_for_each(|path| check_ending(path, &["svg"], why))?;
+        let why = "plots are written as .svg or .png";
+        plot.into_iter().try_for_each(|path| check_ending(path, &["svg", "png"], why))?;
         let csv = args.csv.as_deref();
         csv.into_iter().try_for_each(|path| check_ending(path, &["csv"], "`--csv` writes a file that ends in .csv"))?;
         Ok(Self { plot, csv })
@@ -34,7 +34,7 @@ impl<'a> ShownFiles<'a> {
     pub fn write(&self, fit: &FitFile) -> Result<(), Failure> {
         if let Some(path) = self.plot {
             let name = fit.source.as_ref().map_or("fit", |source| source.file.as_str());
-            write(path, &fit_svg(fit, name))?;
+            write(path, &plot(path, fit, name)?)?;
         }
         if let Some(path) = self.csv {
             write_bins(path, fit)?;
@@ -45,13 +45,24 @@ impl<'a> ShownFiles<'a> {
 
 /// Refuses a file whose ending is not among those given.
 pub fn check_ending(path: &Path, endings: &[&str], why: &str) -> Result<(), Failure> {
-    let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase());
-    match ending {
-        Some(ending) if endings.contains(&ending.as_str()) => Ok(()),
-        _ => Err(Failure::usage(format!("{}: {why}", path.display()))),
+    if endings.iter().any(|ending| ends_in(path, ending)) {
+        return Ok(());
     }
+    Err(Failure::usage(format!("{}: {why}", path.display())))
 }
 
-fn write(path: &Path, text: &str) -> Result<(), Failure> {
-    atomic::write(path, text.as_bytes()).map_err(|e| Failure::failed(format!("{}: {e}", path.display())))
+/// The picture of a fit in the format of the file's ending.
+fn plot(path: &Path, fit: &FitFile, name: &str) -> Result<Vec<u8>, Failure> {
+    if ends_in(path, "png") {
+        return fit_png(fit, name).map_err(|e| Failure::failed(format!("{}: {e}", path.display())));
+    }
+    Ok(fit_svg(fit, name).into_bytes())
+}
+
+fn ends_in(path: &Path, ending: &str) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending))
+}
+
+fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    atomic::write(path, bytes).map_err(|e| Failure::failed(format!("{}: {e}", path.display())))
 }
