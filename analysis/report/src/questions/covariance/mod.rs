@@ -18,6 +18,7 @@ use crate::render::chart::{Mark, Plot, WIDTH};
 use crate::render::hillshade::exaggeration;
 use crate::render::number as set;
 use crate::render::svg::{Paint, Stroke, Symbol};
+use sastrugi_schemas::fit::FitFile;
 use sastrugi_schemas::tables::{CovarianceRow, FitRow};
 use std::collections::BTreeSet;
 
@@ -39,7 +40,10 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     for dem in dems.iter().take(DEMS_MAX) {
         let fits: Vec<&FitRow> = data.fits.iter().filter(|f| f.dem_id == *dem).collect();
         blocks.push(Block::Heading(format!("DEM {dem}")));
-        blocks.extend(fits.iter().map(|fit| Block::Text(verdict::paragraph(fit, &models::of_fit(data, fit)))));
+        for fit in &fits {
+            let file = file(data, fit)?;
+            blocks.push(Block::Text(verdict::paragraph(fit, &models::of_fit(data, fit), file.as_ref())));
+        }
         blocks.extend(warnings(data, &fits)?.into_iter().map(Block::Warning));
         blocks.push(Block::Figures(covariances(data, &fits)));
         blocks.push(Block::Table(verdict::intervals(dem, &fits)));
@@ -58,13 +62,17 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     Ok(blocks)
 }
 
+/// The fit file; `None` where the release does not have it.
+fn file(data: &Data, fit: &FitRow) -> Result<Option<FitFile>, ReportError> {
+    data.files.fit(&format!("fit/{}.json", fit.fit_id))
+}
+
 /// What a reader must know, as full sentences, each once with the fits it concerns.
 fn warnings(data: &Data, fits: &[&FitRow]) -> Result<Vec<String>, ReportError> {
     let mut sentences: Vec<(String, Vec<&str>)> = Vec::new();
     for fit in fits {
-        let file = data.files.fit(&format!("fit/{}.json", fit.fit_id))?;
         let of_table = || fit.warnings.split("; ").map(str::to_owned).collect();
-        let list: Vec<String> = file.map_or_else(of_table, |f| f.warnings);
+        let list: Vec<String> = file(data, fit)?.map_or_else(of_table, |f| f.warnings);
         for sentence in list.iter().filter(|w| !w.trim().is_empty()).map(|w| sentence(w)) {
             match sentences.iter_mut().find(|known| known.0 == sentence) {
                 Some((_, of)) => of.push(&fit.fit_id),

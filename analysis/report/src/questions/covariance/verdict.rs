@@ -3,6 +3,7 @@
 use super::of_dem;
 use crate::content::{Numbers, TableBlock, number, slug, text};
 use crate::render::number as set;
+use sastrugi_schemas::fit::{FitFile, Quoted};
 use sastrugi_schemas::tables::FitRow;
 
 /// Level of tests.
@@ -15,6 +16,8 @@ const SLIGHT_RATIO: f64 = 0.9;
 const SLIGHT_SPREAD: f64 = 1.2;
 /// Width of an interval, high over low, beyond which a parameter is called poorly known.
 const WIDE: f64 = 2.0;
+/// Factor by which σ²/b moves between windows from which on that is said.
+const SPREAD: f64 = 1.25;
 
 /// A parameter with its intervals: name in words, unit, estimate, parametric and block interval.
 type Parameter = (&'static str, &'static str, f64, [f64; 2], [f64; 2]);
@@ -49,12 +52,14 @@ fn interval_words([low, high]: [f64; 2], unit: &str) -> Option<String> {
     }
 }
 
-/// The paragraph of one fit; `all` are the parameters of its model.
-pub fn paragraph(fit: &FitRow, all: &[(String, &str, f64)]) -> String {
+/// The paragraph of one fit; `all` are the parameters of its model, `file` its fit file where the release has it: its verdict
+/// comes first, as `sastrugi fit` prints it.
+pub fn paragraph(fit: &FitRow, all: &[(String, &str, f64)], file: Option<&FitFile>) -> String {
+    let verdict = file.map(|f| f.verdict.clone()).filter(|verdict| !verdict.is_empty());
     let sentences = [
-        no_scale(fit),
-        Some(estimate(fit, all)),
-        poorly_known(fit),
+        verdict.or_else(|| no_scale(fit)),
+        Some(estimate(fit, all, file)),
+        poorly_known(fit, file),
         model(fit),
         window(fit),
         direction(fit),
@@ -85,8 +90,12 @@ fn no_scale(fit: &FitRow) -> Option<String> {
     })
 }
 
-fn estimate(fit: &FitRow, all: &[(String, &str, f64)]) -> String {
+fn estimate(fit: &FitRow, all: &[(String, &str, f64)], file: Option<&FitFile>) -> String {
+    let bounded = file.filter(|f| f.range_at_bound());
     let one = |(name, unit, value, interval, _): Parameter| {
+        if let Some(limit) = bounded.and_then(|file| at_bound(file, name)) {
+            return limit;
+        }
         let value = format!("{name} = {}", set::with_unit(value, 3, unit));
         match interval_words(interval, unit) {
             Some(words) => format!("{value} ({words})"),
@@ -114,15 +123,37 @@ fn estimate(fit: &FitRow, all: &[(String, &str, f64)]) -> String {
     }
 }
 
-fn poorly_known(fit: &FitRow) -> Option<String> {
+/// σ and b of a fit whose search for the range ended at its bound: at most their lower limits are known.
+fn at_bound(file: &FitFile, name: &str) -> Option<String> {
+    let parameter = match name {
+        "σ" => "sigma_m",
+        "b" => "range_m",
+        _ => return None,
+    };
+    match file.quoted(parameter)? {
+        Quoted::AtLeast(low) => Some(format!("{name} at least {}", set::with_unit(low, 3, "m"))),
+        Quoted::NotIdentified { .. } => Some(format!("{name} not identified")),
+        Quoted::Estimate { .. } => None,
+    }
+}
+
+fn poorly_known(fit: &FitRow, file: Option<&FitFile>) -> Option<String> {
     let [_, range, ratio] = parameters(fit);
     let wide = |interval: [f64; 2]| interval[1] > WIDE * interval[0];
+    let spread = file.and_then(|f| f.diagnostics.get("sigma2_over_range_spread")?.as_f64()).unwrap_or(1.0);
+    let ratio_words = match spread > SPREAD {
+        true => format!(
+            "σ²/b is better known at this window, but moves by a factor of {} between windows",
+            set::significant(spread, 2)
+        ),
+        false => "σ²/b is better known".to_owned(),
+    };
     (wide(range.3) && known(ratio.3) && !wide(ratio.3)).then(|| match range.3 {
         [low, high] if low > 0.0 && high.is_finite() => {
             let factor = set::significant(high / low, 2);
-            format!("b is known to a factor of {factor} only; σ²/b is what the data tells.")
+            format!("b is known only to a factor of {factor}; {ratio_words}.")
         }
-        _ => "The data knows no end to b; σ²/b is what it tells.".to_owned(),
+        _ => format!("The data sets no upper limit to b; {ratio_words}."),
     })
 }
 
@@ -238,11 +269,12 @@ pub fn intervals(dem: &str, fits: &[&FitRow]) -> TableBlock {
 mod tests {
     use super::*;
     use crate::tests::made_up;
+    use sastrugi_schemas::fit::Intervals;
 
     #[test]
     fn val_sentences_say_what_the_row_says() {
         let data = made_up::full(1, 24);
-        let corrected = paragraph(&data.fits[0], &[]);
+        let corrected = paragraph(&data.fits[0], &[], None);
         for part in [
             "σ = 21.0 m (19.2 to 24.1 m)",
             "95 % intervals from 99 surfaces",
@@ -255,7 +287,7 @@ mod tests {
             assert!(corrected.contains(part), "{part} in {corrected}");
         }
         assert!(!corrected.contains("to a factor of"));
-        let paper = paragraph(&data.fits[1], &[]);
+        let paper = paragraph(&data.fits[1], &[], None);
         assert!(paper.ends_with("σ²/b = 0.613 m, without intervals."), "{paper}");
         let lost = FitRow {
             window_disagreement_z: 9.0,
@@ -267,7 +299,7 @@ mod tests {
             sigma2_over_range_m: f64::NAN,
             ..data.fits[0].clone()
         };
-        let lost = paragraph(&lost, &[("hurst".into(), "1", 0.61)]);
+        let lost = paragraph(&lost, &[("hurst".into(), "1", 0.61)], None);
         for part in [
             "There is no one scale: the root mean square height below 3034 m is 15.0 m, and increments grow as 0.500 m × \
              (lag / 1 m)^0.60",
@@ -276,6 +308,23 @@ mod tests {
         ] {
             assert!(lost.contains(part), "{part} in {lost}");
         }
+        let ends = |name: &str| (name.to_owned(), [Some(0.6), None]);
+        let file = FitFile {
+            verdict: "No single scale below 12 m: publish band RMS 0.2 m.".into(),
+            parameters: [("sigma_m".to_owned(), 21.0), ("range_m".to_owned(), 500.0)].into(),
+            intervals: Some(Intervals {
+                level: 0.95,
+                replicates: 99,
+                from_profile: true,
+                values: [ends("range_m")].into(),
+            }),
+            diagnostics: [("range_at_search_bound".to_owned(), true.into())].into(),
+            ..FitFile::default()
+        };
+        let bounded = paragraph(&data.fits[0], &[], Some(&file));
+        let words =
+            "): No single scale below 12 m: publish band RMS 0.2 m. σ not identified, b at least 0.600 m, σ²/b = ";
+        assert!(bounded.contains(words), "{bounded}");
         let fits: Vec<&FitRow> = data.fits.iter().collect();
         let table = intervals("jacksboro", &fits).numbers;
         let names: Vec<&str> = table.columns.iter().map(|c| c.name.as_str()).collect();
