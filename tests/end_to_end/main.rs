@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may end where it stands")]
 
+mod machine;
 mod traverse;
 
 use sastrugi_tests::{area, rows, sastrugi_in, small_study, sums, write};
@@ -256,7 +257,8 @@ fn val_a_failed_import_keeps_its_input() {
 fn val_a_plan_only_looks() {
     let folder = area();
     release_in(folder.path());
-    let unfinished = folder.path().join("release.work/items/terrain/smooth/unfinished-0");
+    let unfinished =
+        folder.path().join("release.work/items/terrain/smooth/unfinished-0123456789abcdef0123456789abcdef");
     fs::create_dir(&unfinished).unwrap();
     let lock = fs::File::open(folder.path().join("release.work/lock")).unwrap();
     lock.try_lock().unwrap();

@@ -196,6 +196,9 @@ pub struct Run {
     /// Run one of N shards (I = 1..N) to a partial folder for `merge`.
     #[arg(long, value_name = "I/N")]
     pub shard: Option<String>,
+    /// Replace a release of the same study even where fewer of its items failed.
+    #[arg(long)]
+    pub replace: bool,
     /// Working memory of the items at once, GiB.
     #[arg(long, value_name = "GIB", default_value_t = 4.0, allow_negative_numbers = true)]
     pub memory: f64,
@@ -220,6 +223,9 @@ pub struct Merge {
     /// Release folder.
     #[arg(short, long, value_name = "DIR", default_value = "release")]
     pub output: PathBuf,
+    /// Replace a release of the same study even where fewer of its items failed.
+    #[arg(long)]
+    pub replace: bool,
 }
 
 /// `verify`.
@@ -572,6 +578,9 @@ pub struct Traverse {
     /// Starts driven of each mission: the drawn one and perturbed ones, for a probability of success.
     #[arg(long, value_name = "N")]
     pub replicates: Option<u32>,
+    /// Replace a release of the same study even where fewer of its items failed.
+    #[arg(long)]
+    pub replace: bool,
     /// Seed of the random streams.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,

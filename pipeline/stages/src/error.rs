@@ -1,10 +1,13 @@
 //! What a caller of this room can be told, sorted by what the caller should do about it.
 
-use crate::jobs::JobError;
+use crate::jobs::{Cause, JobError};
+use crate::machine::{Fault, fault};
 use crate::registry::BuildError;
 use crate::runner::cache::CacheError;
+use crate::runner::execute::Stopped;
 use crate::study::StudyError;
 use sastrugi_schemas::ParameterError;
+use std::path::Path;
 
 /// An error, one sentence each.
 #[derive(Debug, thiserror::Error)]
@@ -34,15 +37,44 @@ pub enum Error {
 }
 
 impl Error {
-    /// A failure of this machine.
+    /// Work that could not be done.
     pub fn failed(message: impl std::fmt::Display) -> Self {
         Self::Failed(message.to_string())
+    }
+
+    /// A failure to read or write: to be tried again where the error says that this may help.
+    pub fn io(error: impl std::error::Error + 'static) -> Self {
+        match fault(&error) {
+            Some(Fault::Passing) => Self::Retry(error.to_string()),
+            _ => Self::Failed(error.to_string()),
+        }
+    }
+
+    /// The same about a file.
+    pub fn at(path: &Path, error: std::io::Error) -> Self {
+        let words = format!("{}: {error}", path.display());
+        match Self::io(error) {
+            Self::Retry(_) => Self::Retry(words),
+            _ => Self::Failed(words),
+        }
     }
 }
 
 impl From<JobError> for Error {
     fn from(error: JobError) -> Self {
-        if error.unusable_input { Self::Input(error.message) } else { Self::Failed(error.message) }
+        match error.cause {
+            Cause::Input => Self::Input(error.message),
+            Cause::Machine(Fault::Passing) => Self::Retry(error.message),
+            Cause::Item | Cause::Machine(Fault::Lasting) => Self::Failed(error.message),
+        }
+    }
+}
+
+impl From<Stopped> for Error {
+    fn from(stopped: Stopped) -> Self {
+        let Stopped { item, error } = stopped;
+        let advice = "the run ended there and wrote no release; what is finished stays in the work area";
+        error.reworded(|words| format!("{item}: {words}; {advice}")).into()
     }
 }
 
@@ -50,7 +82,8 @@ impl From<CacheError> for Error {
     fn from(error: CacheError) -> Self {
         match error {
             CacheError::Busy(_) => Self::Retry(error.to_string()),
-            CacheError::Io { .. } => Self::Failed(error.to_string()),
+            CacheError::NotOurs(_) | CacheError::Link(_) => Self::Usage(error.to_string()),
+            CacheError::Io { .. } => Self::io(error),
         }
     }
 }

@@ -4,6 +4,7 @@
 mod error;
 mod hypotheses;
 pub mod jobs;
+mod machine;
 pub mod packing;
 pub mod registry;
 mod revision;

@@ -91,6 +91,8 @@ pub struct RunRequest<'a> {
     pub part: Option<Part>,
     /// The stage whose results are asked for: without any of them there is nothing to release.
     pub purpose: Option<&'static str>,
+    /// Whether a release of the same study with fewer failed items is replaced.
+    pub replace: bool,
     /// Limits.
     pub limits: Limits,
 }
@@ -126,14 +128,14 @@ pub fn run(loaded: &Loaded, request: &RunRequest<'_>, progress: &dyn Progress) -
     let graph = &loaded.graph;
     let chosen = (0..graph.len()).filter(|&p| request.part.is_none_or(|part| part.owns(graph.key(p))));
     let needed = graph.closure(chosen);
-    let execution = execute(graph, &cache, &needed, request.limits, progress);
+    let execution = execute(graph, &cache, &needed, request.limits, progress)?;
     write_timings(&cache, &execution)?;
     let made = execution.done.iter().any(|&p| is_worth_a_release(&graph.node(p).item.stage, request.purpose));
     if !made && !execution.failures.is_empty() {
         return Err(all_failed(&execution.failures));
     }
     match request.part {
-        Some(part) => shard::write(request.output, loaded, &cache, part, &execution.failures)?,
+        Some(part) => shard::write(request.output, loaded, &cache, part, &execution.failures, request.replace)?,
         None => {
             let items = (0..graph.len()).map(|p| located(graph, &cache, &execution, p)).collect();
             let contents = Contents {
@@ -142,6 +144,7 @@ pub fn run(loaded: &Loaded, request: &RunRequest<'_>, progress: &dyn Progress) -
                 splits: &loaded.splits,
                 items,
                 failures: &execution.failures,
+                replace: request.replace,
             };
             assemble(contents, request.output, progress)?;
         }
@@ -222,7 +225,7 @@ fn write_timings(cache: &Cache, execution: &Execution) -> Result<(), Error> {
     let mut seconds: BTreeMap<String, f64> = earlier.unwrap_or_default();
     seconds.extend(execution.seconds.clone());
     let text = serde_json::to_vec_pretty(&seconds).map_err(Error::failed)?;
-    sastrugi_store::atomic::write(&path, &text).map_err(|e| Error::failed(format!("{}: {e}", path.display())))
+    sastrugi_store::atomic::write(&path, &text).map_err(|e| Error::at(&path, e))
 }
 
 /// What a run would do, without doing it.
@@ -238,7 +241,7 @@ pub fn plan_of(loaded: &Loaded, output: &Path, work: Option<&Path>) -> Result<Pl
 ///
 /// # Errors
 /// Shards that do not make one study, or a destination that is not ours.
-pub fn merge(shards: &[PathBuf], output: &Path, progress: &dyn Progress) -> Result<RunSummary, Error> {
+pub fn merge(shards: &[PathBuf], output: &Path, replace: bool, progress: &dyn Progress) -> Result<RunSummary, Error> {
     let joined = shard::join(shards)?;
     let study = Study::parse(&joined.study, Path::new(""), &registry::section_names()).map_err(Error::failed)?;
     let items = joined.items.len();
@@ -248,6 +251,7 @@ pub fn merge(shards: &[PathBuf], output: &Path, progress: &dyn Progress) -> Resu
         splits: &joined.splits,
         items: joined.items,
         failures: &joined.failures,
+        replace,
     };
     assemble(contents, output, progress)?;
     Ok(RunSummary { output: output.to_owned(), items, computed: 0, failures: joined.failures })

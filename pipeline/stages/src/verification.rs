@@ -114,7 +114,7 @@ impl Scratch {
         let path = std::env::temp_dir().join(format!("sastrugi-verify-{}", std::process::id()));
         // Left by a killed process that had the same number.
         let _ = fs::remove_dir_all(&path);
-        fs::create_dir(&path).map_err(|e| Error::failed(format!("{}: {e}", path.display())))?;
+        fs::create_dir(&path).map_err(|e| Error::at(&path, e))?;
         Ok(Self(path))
     }
 }
@@ -136,7 +136,11 @@ fn recompute_all(
 ) -> Result<(), Error> {
     let output = scratch.join("release");
     let work = scratch.join("work");
-    run(loaded, &RunRequest { output: &output, work: Some(&work), part: None, purpose: None, limits }, progress)?;
+    run(
+        loaded,
+        &RunRequest { output: &output, work: Some(&work), part: None, purpose: None, replace: false, limits },
+        progress,
+    )?;
     let (there, here) = (manifest_in(release.folder())?, manifest_in(&output)?);
     let failed = |item: &ItemRef| {
         let mut list = here["failed"].as_array().into_iter().flatten();
@@ -151,7 +155,7 @@ fn recompute_all(
 /// The manifest in a folder with all that its text holds, known to this program or not.
 fn manifest_in(folder: &Path) -> Result<Value, Error> {
     let path = folder.join(MANIFEST);
-    let text = fs::read(&path).map_err(|e| Error::failed(format!("{}: {e}", path.display())))?;
+    let text = fs::read(&path).map_err(|e| Error::at(&path, e))?;
     serde_json::from_slice(&text).map_err(|e| Error::Input(format!("{}: {e}", path.display())))
 }
 
@@ -209,7 +213,7 @@ fn recompute_some(
     by_key.sort_by_key(|&p| graph.key(p).to_owned());
     let chosen: Vec<usize> = by_key.into_iter().take(count).collect();
     let cache = Cache::open(scratch)?;
-    let execution = execute(graph, &cache, &graph.closure(chosen.iter().copied()), limits, progress);
+    let execution = execute(graph, &cache, &graph.closure(chosen.iter().copied()), limits, progress)?;
     let failed_there: Vec<ItemRef> =
         release.manifest().failed.iter().map(|f| ItemRef::new(&f.stage, &f.item)).collect();
     let unexpected = execution.failures.iter().filter(|f| !failed_there.contains(&f.item));
@@ -221,7 +225,7 @@ fn recompute_some(
     );
     let items = (0..graph.len()).map(|p| located(graph, &cache, &execution, p)).collect();
     let Loaded { study, released: text, splits, .. } = loaded;
-    let contents = Contents { study, text, splits, items, failures: &execution.failures };
+    let contents = Contents { study, text, splits, items, failures: &execution.failures, replace: false };
     let mut again = Again { sources: Sources::of(&contents)?, ..Again::default() };
     for position in chosen {
         let item = &graph.node(position).item;

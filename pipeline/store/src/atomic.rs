@@ -172,7 +172,7 @@ fn is_at(_: &File, path: &Path) -> bool {
 }
 
 /// True for the name of a file under construction, or of what a killed process left of one.
-pub(crate) fn is_temporary(name: &OsStr) -> bool {
+pub fn is_temporary(name: &OsStr) -> bool {
     name.to_string_lossy().starts_with(TEMPORARY_PREFIX)
 }
 

@@ -7,7 +7,7 @@ mod verify;
 #[cfg(test)]
 mod tests;
 
-pub use builder::{GrowingTable, Head, Incoming, ReleaseBuilder, beside};
+pub use builder::{GrowingTable, Head, Incoming, ReleaseBuilder, beside, put_in_place};
 pub use pack::{Packed, pack};
 pub use verify::{Problem, ProblemKind, VerifyReport, verify};
 

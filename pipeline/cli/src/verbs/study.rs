@@ -34,13 +34,13 @@ pub fn run(args: &Run, common: &Common) -> Verdict {
     let limits = limits(args.memory)?;
     let loaded = studies::load(&args.study)?;
     let Place { output, work } = &args.place;
-    let request = RunRequest { output, work: work.as_deref(), part, purpose: None, limits };
+    let request = RunRequest { output, work: work.as_deref(), part, purpose: None, replace: args.replace, limits };
     finish_run(common, |teller| Ok(studies::run(&loaded, &request, teller)?))
 }
 
 /// `merge`.
 pub fn merge(args: &Merge, common: &Common) -> Verdict {
-    finish_run(common, |teller| Ok(studies::merge(&args.shards, &args.output, teller)?))
+    finish_run(common, |teller| Ok(studies::merge(&args.shards, &args.output, args.replace, teller)?))
 }
 
 /// `traverse`.
@@ -57,7 +57,7 @@ pub fn traverse(args: &Traverse, common: &Common) -> Verdict {
     parameters::assign(&mut roughness, &args.set_roughness)?;
     let request = drive::Request { dem: &args.dem, seed: args.seed, roughness, missions, parameters, date: &args.date };
     let Place { output, work } = &args.place;
-    let place = drive::Place { output, work: work.as_deref(), limits: limits(MEMORY_GIB)? };
+    let place = drive::Place { output, work: work.as_deref(), replace: args.replace, limits: limits(MEMORY_GIB)? };
     finish_run(common, |teller| Ok(drive::traverse(&request, &place, teller)?))
 }
 

@@ -9,8 +9,8 @@ use crate::study::terms::{self, Objection};
 use sastrugi_numeric::{Geometry, Grid, resample};
 use sastrugi_schemas::study::{DemItem, GeoTiff};
 use sastrugi_store::dem::{self, Claimed, Crs, Dem, ReadOptions};
+use sastrugi_store::digest;
 use sastrugi_store::points::GridSettings;
-use sastrugi_store::{atomic, digest};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use std::path::Path;
@@ -57,7 +57,7 @@ impl Place {
         if !path.is_file() {
             return Ok(Self::of(heights, heights));
         }
-        let bytes = std::fs::read(path).map_err(JobError::new)?;
+        let bytes = std::fs::read(path).map_err(|e| JobError::at(path, e))?;
         serde_json::from_slice(&bytes).map_err(JobError::new)
     }
 
@@ -206,15 +206,14 @@ impl Job for DemJob {
     fn run(&self, work: &Work<'_>) -> Result<Outcome, JobError> {
         let copy = work.parent(&self.original, original::name(&self.release_path))?;
         // Messages are part of the release: they name the file as it is called there, wherever it lies now.
-        let name_it =
-            |e: JobError| JobError { message: e.message.replace(&copy.display().to_string(), &self.release_path), ..e };
+        let name_it = |e: JobError| e.reworded(|words| words.replace(&copy.display().to_string(), &self.release_path));
         let Imported { metric, place, notes } = import(&copy, &self.item).map_err(name_it)?;
         dem::write(&work.output(HEIGHTS), &metric.grid, &metric.info.crs, &raster_options(self.geotiff))
-            .map_err(JobError::new)?;
+            .map_err(JobError::io)?;
         let content = digest::heights(&metric.grid);
         let path = format!("dem/{}.metric.tif", self.item.id);
         let place = serde_json::to_vec(&place).map_err(JobError::new)?;
-        atomic::write(&work.output(PLACE), &place).map_err(JobError::new)?;
+        work.write(PLACE, &place)?;
         let products = vec![Product::released(HEIGHTS, path, Some(content)), Product::internal(PLACE)];
         Ok(Outcome { products, notes, ..Outcome::default() })
     }
@@ -231,7 +230,7 @@ struct Imported {
 fn import(path: &Path, item: &DemItem) -> Result<Imported, JobError> {
     let gridding = gridding(item).map_err(JobError::new)?;
     let options = ReadOptions { cell_m: item.cell_m };
-    let read = dem::read_gridded(path, &options, &gridding).map_err(|e| input_error(&e))?;
+    let read = dem::read_gridded(path, &options, &gridding).map_err(input_error)?;
     let cut = match item.window {
         Some(window) => window_of(&read.grid, window)?,
         None => read.grid.clone(),
@@ -279,6 +278,6 @@ pub fn metres_note(degrees: &Geometry, metres: &Geometry) -> String {
 }
 
 /// A store error as a job's.
-pub fn input_error(error: &dem::DemError) -> JobError {
-    if error.unusable_input() { JobError::input(error) } else { JobError::new(error) }
+pub fn input_error(error: dem::DemError) -> JobError {
+    if error.unusable_input() { JobError::input(error) } else { JobError::io(error) }
 }

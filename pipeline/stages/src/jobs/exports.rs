@@ -3,7 +3,6 @@
 use super::{JobError, Outcome, Product, Work};
 use sastrugi_numeric::{Geometry, Grid};
 use sastrugi_schemas::study::Simulator;
-use sastrugi_store::atomic;
 use sastrugi_store::dem::DemError;
 use sastrugi_store::dem::simulators::{self, Cost, Fit};
 use serde_json::{Value, json};
@@ -63,7 +62,7 @@ impl Exports {
             let export = simulators::export(&heights, simulator, Fit::Resample).map_err(JobError::new)?;
             for (file, bytes) in &export.files {
                 let own = format!("{name}.{file}");
-                atomic::write(&work.output(&own), bytes).map_err(JobError::new)?;
+                work.write(&own, bytes)?;
                 outcome.products.push(Product::released(&own, format!("{FOLDER}{id}/{name}/{file}"), None));
             }
             outcome.notes.extend(export.notes.iter().map(|note| format!("{name}: {note}")));

@@ -16,7 +16,7 @@ use sastrugi_schemas::study::FitItem;
 use sastrugi_schemas::tables::{CandidateCurveRow, CandidateRow, CovarianceRow, FitRow, LikelihoodProfileRow};
 use sastrugi_schemas::{Kind, ParameterError};
 use sastrugi_store::dem::{Crs, Dem};
-use sastrugi_store::{atomic, dem, digest};
+use sastrugi_store::{dem, digest};
 use sastrugi_texture::coregister::Coregistered;
 use sastrugi_texture::noise::{Noise, ReferenceNoise};
 use sastrugi_texture::{FitError, FitParameters, FitSettings, shown};
@@ -70,7 +70,7 @@ impl Subtrahend {
 
     /// The DEM of an item less this one.
     fn subtract(&self, item: &ItemRef, dem: &Dem, work: &Work<'_>) -> Result<(Grid, Minus), JobError> {
-        let other = dem::read(&work.parent(&self.dem, HEIGHTS)?).map_err(|e| input_error(&e))?;
+        let other = dem::read(&work.parent(&self.dem, HEIGHTS)?).map_err(input_error)?;
         for (item, heights) in [(item, &dem.grid), (&self.dem, &other.grid)] {
             let place = Place::read(&work.parent(item, PLACE)?, &heights.geometry)?;
             if place.was_converted(&heights.geometry) {
@@ -177,7 +177,7 @@ impl Job for FitJob {
     }
 
     fn run(&self, work: &Work<'_>) -> Result<Outcome, JobError> {
-        let mut read = dem::read(&work.parent(&self.dem, HEIGHTS)?).map_err(|e| input_error(&e))?;
+        let mut read = dem::read(&work.parent(&self.dem, HEIGHTS)?).map_err(input_error)?;
         let mut settings = self.settings.clone();
         let mut notes = Vec::new();
         let mut source = self.source.clone();
@@ -207,16 +207,16 @@ impl Job for FitJob {
         let band = shown::covariance_band(&residual, &outcome);
         let map = outcome.covariance_map();
         let fit = with_source(outcome.fit, source);
-        atomic::write(&work.output(FIT), to_json(&fit)?.as_bytes()).map_err(JobError::new)?;
+        work.write(FIT, to_json(&fit)?.as_bytes())?;
         let id = &self.id;
         let mut products = vec![Product::released(FIT, format!("fit/{id}.json"), None)];
         for (file, grid) in [(BACKGROUND, &background), (RESIDUAL, &residual)] {
-            dem::write(&work.output(file), grid, &read.info.crs, &Default::default()).map_err(JobError::new)?;
+            dem::write(&work.output(file), grid, &read.info.crs, &Default::default()).map_err(JobError::io)?;
             products.push(Product::released(file, format!("fit/{id}.{file}"), Some(digest::heights(grid))));
         }
-        dem::write(&work.output(MAP), &map, &Crs::default(), &Default::default()).map_err(JobError::new)?;
+        dem::write(&work.output(MAP), &map, &Crs::default(), &Default::default()).map_err(JobError::io)?;
         products.push(Product::released(MAP, format!("fit/{id}.{MAP}"), Some(digest::heights(&map))));
-        dem::write_classes(&work.output(MASK), &mask, &read.info.crs).map_err(JobError::new)?;
+        dem::write_classes(&work.output(MASK), &mask, &read.info.crs).map_err(JobError::io)?;
         products.push(Product::released(MASK, format!("fit/{id}.{MASK}"), Some(digest::classes(&mask))));
         let surface = Surface { id, stage: STAGE, fit_id: Some(id), grid: &residual };
         let rows = Rows {

@@ -168,7 +168,7 @@ pub fn of_files(heights: &mut Grid, place: &Place, masks: &[(PathBuf, bool)]) ->
 }
 
 fn apply(heights: &mut Grid, place: &Place, path: &Path, excludes: bool) -> Result<(), JobError> {
-    let keep = mask::read_with(path, &place.whole(), &MaskOptions { invert: excludes }).map_err(|e| mask_error(&e))?;
+    let keep = mask::read_with(path, &place.whole(), &MaskOptions { invert: excludes }).map_err(mask_error)?;
     let kept = place.part(Grid::new(place.whole(), keep));
     heights.values.iter_mut().zip(&kept.values).filter(|(_, kept)| !**kept).for_each(|(height, _)| *height = f64::NAN);
     Ok(())
@@ -182,6 +182,6 @@ fn dropped_share(before: usize, heights: &Grid) -> Result<f64, JobError> {
     }
 }
 
-fn mask_error(error: &MaskError) -> JobError {
-    if error.unusable_input() { JobError::input(error) } else { JobError::new(error) }
+fn mask_error(error: MaskError) -> JobError {
+    if error.unusable_input() { JobError::input(error) } else { JobError::io(error) }
 }

@@ -11,7 +11,7 @@ use sastrugi_numeric::{Geometry, Streams};
 use sastrugi_schemas::Kind;
 use sastrugi_schemas::kind::{read_parameters, schema_of};
 use sastrugi_schemas::study::MissionsItem;
-use sastrugi_store::{atomic, dem};
+use sastrugi_store::dem;
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -189,11 +189,11 @@ impl Job for MissionsJob {
 
     fn run(&self, work: &Work<'_>) -> Result<Outcome, JobError> {
         let path = work.parent(&roughness::item(&self.heightfield), roughness::CLASSES)?;
-        let classes = dem::read_classes(&path).map_err(|e| input_error(&e))?;
+        let classes = dem::read_classes(&path).map_err(input_error)?;
         let missions = draw_missions(&classes, &self.settings, self.start_cells, &self.streams)
             .map_err(|e| JobError::input(format!("cannot {e}")))?;
         let text = serde_json::to_vec(&missions).map_err(JobError::new)?;
-        atomic::write(&work.output(MISSIONS), &text).map_err(JobError::new)?;
+        work.write(MISSIONS, &text)?;
         Ok(Outcome { products: vec![Product::internal(MISSIONS)], ..Outcome::default() })
     }
 }
@@ -203,7 +203,7 @@ impl Job for MissionsJob {
 /// # Errors
 /// A file that cannot be read.
 pub fn read(folder_file: &Path) -> Result<Vec<Mission>, JobError> {
-    let bytes = std::fs::read(folder_file).map_err(JobError::new)?;
+    let bytes = std::fs::read(folder_file).map_err(|e| JobError::at(folder_file, e))?;
     serde_json::from_slice(&bytes).map_err(JobError::new)
 }
 

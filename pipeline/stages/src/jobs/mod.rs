@@ -14,6 +14,7 @@ pub mod terrain;
 pub mod texture;
 pub mod traverse;
 
+use crate::machine::{Fault, fault};
 use crate::revision::Room;
 use sastrugi_schemas::study::GeoTiff;
 use sastrugi_schemas::tables::{
@@ -21,13 +22,13 @@ use sastrugi_schemas::tables::{
     ParameterRow, ProfilePsdRow, PsdRow, ReplicateRow, ScoreCovarianceRow, ScoreRow, StructureRow, SurfaceRow,
     TerrainRow,
 };
-use sastrugi_store::atomic::{Draft, DraftFile};
+use sastrugi_store::atomic::{self, Draft, DraftFile};
 use sastrugi_store::dem::WriteOptions;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fmt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Name of an item: its stage and its id.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -116,6 +117,14 @@ impl Work<'_> {
     pub fn output(&self, file: &str) -> DraftFile {
         self.folder.file(file)
     }
+
+    /// Writes an output of a few bytes.
+    ///
+    /// # Errors
+    /// When the file system refuses.
+    pub fn write(&self, file: &str, bytes: &[u8]) -> Result<(), JobError> {
+        atomic::write(&self.output(file), bytes).map_err(|e| JobError::at(&self.folder.0.join(file), e))
+    }
 }
 
 /// What a job leaves behind.
@@ -198,18 +207,45 @@ pub struct Rows {
 pub struct JobError {
     /// One sentence.
     pub message: String,
-    /// The cause lies in input data rather than in the study or the machine.
-    pub unusable_input: bool,
+    /// Where the reason lies.
+    pub cause: Cause,
+}
+
+/// Where the reason for a failure lies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Cause {
+    /// In the item: other items are not concerned.
+    Item,
+    /// In the item's input data.
+    Input,
+    /// In the machine: every item would fail.
+    Machine(Fault),
 }
 
 impl JobError {
-    /// A failure with its reason.
+    /// A failure of the item, with its reason.
     pub fn new(message: impl fmt::Display) -> Self {
-        Self { message: message.to_string(), unusable_input: false }
+        Self { message: message.to_string(), cause: Cause::Item }
     }
 
     /// A failure that lies in the input data.
     pub fn input(message: impl fmt::Display) -> Self {
-        Self { message: message.to_string(), unusable_input: true }
+        Self { message: message.to_string(), cause: Cause::Input }
+    }
+
+    /// A failure to read or write: the machine's where the error says so, else the item's.
+    pub fn io(error: impl std::error::Error + 'static) -> Self {
+        let cause = fault(&error).map_or(Cause::Item, Cause::Machine);
+        Self { message: error.to_string(), cause }
+    }
+
+    /// The same about a file.
+    pub fn at(path: &Path, error: std::io::Error) -> Self {
+        Self::io(error).reworded(|words| format!("{}: {words}", path.display()))
+    }
+
+    /// The same with other words.
+    pub fn reworded(self, words: impl FnOnce(&str) -> String) -> Self {
+        Self { message: words(&self.message), ..self }
     }
 }

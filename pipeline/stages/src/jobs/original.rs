@@ -135,22 +135,23 @@ impl Job for Original {
     fn run(&self, work: &Work<'_>) -> Result<Outcome, JobError> {
         let mut products = Vec::new();
         for file in &self.files {
-            copy(&file.input, &work.output(file.name()))?;
+            copy(&file.input, work, file.name())?;
             products.push(Product::released(file.name(), file.release_path.clone(), None));
         }
         Ok(Outcome { products, ..Outcome::default() })
     }
 }
 
-fn copy(input: &InputFile, target: &atomic::DraftFile) -> Result<(), JobError> {
+fn copy(input: &InputFile, work: &Work<'_>, name: &str) -> Result<(), JobError> {
+    let refused = |e| JobError::at(&work.folder.0.join(name), e);
     let unreadable = |e: std::io::Error| JobError::input(format!("{}: {e}", input.path.display()));
     let mut from = std::fs::File::open(&input.path).map_err(unreadable)?;
-    let mut to = atomic::AtomicFile::create(target).map_err(JobError::new)?;
-    let (_, sha256) = digest::copy(&mut from, &mut to).map_err(JobError::new)?;
+    let mut to = atomic::AtomicFile::create(&work.output(name)).map_err(refused)?;
+    let (_, sha256) = digest::copy(&mut from, &mut to).map_err(refused)?;
     if sha256 != input.sha256 {
         return Err(JobError::input(format!("{}: the file changed during the run", input.path.display())));
     }
-    to.commit().map_err(JobError::new)
+    to.commit().map_err(refused)
 }
 
 #[cfg(test)]

@@ -136,13 +136,13 @@ impl Job for RoughnessJob {
     }
 
     fn run(&self, work: &Work<'_>) -> Result<Outcome, JobError> {
-        let read = dem::read(&work.parent(&self.field.item, HEIGHTS)?).map_err(|e| input_error(&e))?;
+        let read = dem::read(&work.parent(&self.field.item, HEIGHTS)?).map_err(input_error)?;
         let settings = settings(&self.section)?;
         let summary = describe(&read.grid, &settings);
         let raw = classify(&moore_gradient(&read.grid), &settings.thresholds);
         let closed = close_disk(&raw, self.section.closing_radius_m);
-        dem::write_classes(&work.output(CLASSES), &closed, &read.info.crs).map_err(JobError::new)?;
-        dem::write_classes(&work.output(CLASSES_RAW), &raw, &read.info.crs).map_err(JobError::new)?;
+        dem::write_classes(&work.output(CLASSES), &closed, &read.info.crs).map_err(JobError::io)?;
+        dem::write_classes(&work.output(CLASSES_RAW), &raw, &read.info.crs).map_err(JobError::io)?;
         let id = &self.id;
         let products = vec![
             Product::released(CLASSES, format!("classes/{id}.tif"), Some(digest::classes(&closed))),

@@ -174,7 +174,7 @@ impl TerrainJob {
         let mut grids = Vec::new();
         let mut crs = None;
         for base in &self.bases {
-            let read = dem::read(&work.parent(base, HEIGHTS)?).map_err(|e| input_error(&e))?;
+            let read = dem::read(&work.parent(base, HEIGHTS)?).map_err(input_error)?;
             crs.get_or_insert(read.info.crs);
             grids.push(read.grid);
         }
@@ -191,7 +191,7 @@ impl TerrainJob {
         crs: &Crs,
         options: &WriteOptions,
     ) -> Result<Product, JobError> {
-        dem::write(&work.output(file), values, crs, options).map_err(JobError::new)?;
+        dem::write(&work.output(file), values, crs, options).map_err(JobError::io)?;
         let content = digest::heights(values);
         Ok(Product::released(file, format!("terrain/{}{ending}.tif", self.id), Some(content)))
     }
@@ -228,9 +228,9 @@ pub fn write_png16<'a>(
     target: impl Into<Target<'a>>,
 ) -> Result<String, JobError> {
     let Some(levels) = generator.levels(heights) else {
-        return dem::write_png_heights(target.into(), heights).map(|scale| scale.sentence()).map_err(JobError::new);
+        return dem::write_png_heights(target.into(), heights).map(|scale| scale.sentence()).map_err(JobError::io);
     };
-    dem::write_png16(target.into(), &levels.grid).map_err(JobError::new)?;
+    dem::write_png16(target.into(), &levels.grid).map_err(JobError::io)?;
     Ok(format!(
         "16-bit PNG: height_m = (level - {}) * {:e}; {} x {} posts",
         levels.zero_level,

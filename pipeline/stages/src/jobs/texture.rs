@@ -48,7 +48,8 @@ impl Matched {
         match self {
             Self::Stated(fit) => Ok(FitFile::clone(fit)),
             Self::Item(item) => {
-                let bytes = std::fs::read(work.parent(item, fit::FIT)?).map_err(JobError::new)?;
+                let path = work.parent(item, fit::FIT)?;
+                let bytes = std::fs::read(&path).map_err(|e| JobError::at(&path, e))?;
                 serde_json::from_slice(&bytes).map_err(JobError::new)
             }
         }
@@ -487,7 +488,7 @@ impl Job for TextureJob {
         let (heights, crs) = match &self.base {
             None => (grid, Crs::default()),
             Some(base) => {
-                let base = dem::read(&work.parent(&base.item, base.file)?).map_err(|e| input_error(&e))?;
+                let base = dem::read(&work.parent(&base.item, base.file)?).map_err(input_error)?;
                 let factors = self.factors(work, &base.grid)?;
                 (lay_onto(&base.grid, &grid, synthesis.is_periodic(), factors.as_ref())?, base.info.crs)
             }
@@ -508,7 +509,7 @@ impl TextureJob {
 
     /// The DEM with its holes filled.
     fn filled(&self, work: &Work<'_>, dem: &ItemRef, fit: &FitFile) -> Result<Outcome, JobError> {
-        let dem = dem::read(&work.parent(dem, HEIGHTS)?).map_err(|e| input_error(&e))?;
+        let dem = dem::read(&work.parent(dem, HEIGHTS)?).map_err(input_error)?;
         let covariance = Covariance::of_fit(fit).map_err(JobError::new)?;
         let filled = conditional::fill(&dem.grid, &covariance, &self.streams).map_err(JobError::new)?;
         let notes = [filled.to_string()].into_iter().chain(fill_note(fit)).collect();
@@ -521,7 +522,7 @@ impl TextureJob {
             None => None,
             Some(Modulation::Slope(factors)) => Some(factors.over(base)),
             Some(Modulation::Raster(raster)) => {
-                let raster = dem::read(&work.parent(raster, HEIGHTS)?).map_err(|e| input_error(&e))?;
+                let raster = dem::read(&work.parent(raster, HEIGHTS)?).map_err(input_error)?;
                 Some(sastrugi_texture::amplitude(base, &raster.grid).map_err(JobError::input)?)
             }
         })
@@ -535,7 +536,7 @@ impl TextureJob {
         rows: Rows,
         notes: Vec<String>,
     ) -> Result<Outcome, JobError> {
-        dem::write(&work.output(HEIGHTS), heights, crs, &raster_options(self.geotiff)).map_err(JobError::new)?;
+        dem::write(&work.output(HEIGHTS), heights, crs, &raster_options(self.geotiff)).map_err(JobError::io)?;
         let content = digest::heights(heights);
         let products = vec![Product::released(HEIGHTS, format!("texture/{}.tif", self.id), Some(content))];
         Ok(Outcome { products, rows, notes })

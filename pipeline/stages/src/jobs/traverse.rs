@@ -24,7 +24,7 @@ use sastrugi_schemas::topics::{EventKind, Recording};
 use sastrugi_schemas::{Kind, ParameterError};
 use sastrugi_store::mcap::{MissionMcap, TerrainView, bag_metadata, write_mission};
 use sastrugi_store::parquet::{TableMetadata, TableWriter};
-use sastrugi_store::{atomic, dem, digest};
+use sastrugi_store::{dem, digest};
 use serde_json::{Map, Value, json};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -219,9 +219,9 @@ struct Site {
 
 impl TraverseJob {
     fn site(&self, work: &Work<'_>) -> Result<Site, JobError> {
-        let heights = dem::read(&work.parent(&self.heightfield, HEIGHTS)?).map_err(|e| input_error(&e))?;
+        let heights = dem::read(&work.parent(&self.heightfield, HEIGHTS)?).map_err(input_error)?;
         let path = work.parent(&roughness::item(&self.terrain), roughness::CLASSES_RAW)?;
-        let classes = dem::read_classes(&path).map_err(|e| input_error(&e))?;
+        let classes = dem::read_classes(&path).map_err(input_error)?;
         let ground =
             Ground::new(&heights.grid, &self.drive.vehicle).map_err(|e| JobError::input(format!("cannot {e}")))?;
         let ground = self.with_surface(ground, work, &heights.grid, &classes)?;
@@ -261,7 +261,7 @@ impl TraverseJob {
         mission: &Mission,
     ) -> Result<Driven, JobError> {
         let id = format!("{}-{:04}", self.drive.id, mission.index + 1);
-        let fail = |e: &dyn std::fmt::Display| JobError::new(format!("{id}: {e}"));
+        let fail = |e: JobError| e.reworded(|words| format!("{id}: {words}"));
         let release_path = match self.drive.head.mcap {
             McapFlavour::Viewer => format!("mcap/{}/{id}.mcap", self.terrain),
             McapFlavour::Ros2 => format!("mcap/{}/{id}/{id}.mcap", self.terrain),
@@ -274,11 +274,11 @@ impl TraverseJob {
             traverse_id: self.drive.id.clone(),
             path: release_path.clone(),
         };
-        let recording = self.recording(site, mission).map_err(|e| fail(&e))?;
+        let recording = self.recording(site, mission).map_err(|e| fail(JobError::new(e)))?;
         let difficulty = Difficulty::along(&site.heights, &site.classes, mission, self.drive.vehicle.wheelbase_m());
         let mut row = mission_row(&labels, mission, &difficulty, &recording, self.differentiator());
         row.mission_id.clone_from(&id);
-        let replicates = self.replicates(site, mission, &labels, &recording).map_err(|e| fail(&e))?;
+        let replicates = self.replicates(site, mission, &labels, &recording).map_err(|e| fail(JobError::new(e)))?;
         if !replicates.is_empty() {
             let successes = replicates.iter().filter(|r| r.outcome == EventKind::Success.name()).count();
             row.replicates = replicates.len() as i64;
@@ -297,11 +297,11 @@ impl TraverseJob {
             metadata: &metadata,
         };
         let file = format!("{id}.mcap");
-        let summary = write_mission(&work.output(&file), &mcap).map_err(|e| fail(&e))?;
+        let summary = write_mission(&work.output(&file), &mcap).map_err(|e| fail(JobError::io(e)))?;
         let mut products = Vec::new();
         if self.drive.head.mcap == McapFlavour::Ros2 {
             let (bag, place) = (format!("{id}.metadata.yaml"), format!("mcap/{}/{id}/metadata.yaml", self.terrain));
-            atomic::write(&work.output(&bag), bag_metadata(&file, &summary).as_bytes()).map_err(|e| fail(&e))?;
+            work.write(&bag, bag_metadata(&file, &summary).as_bytes()).map_err(fail)?;
             products.push(Product::released(&bag, place, None));
         }
         let recorded = Product::released(&file, release_path, Some(summary.content_sha256));
@@ -388,17 +388,17 @@ impl TraverseJob {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             license: head.license.clone(),
         };
-        let mut writer = TableWriter::<SampleRow>::create(&work.output(SAMPLES), &metadata).map_err(JobError::new)?;
+        let mut writer = TableWriter::<SampleRow>::create(&work.output(SAMPLES), &metadata).map_err(JobError::io)?;
         for samples in driven.iter_mut().map(|d| std::mem::take(&mut d.samples)) {
-            samples.iter().try_for_each(|row| writer.push(row)).map_err(JobError::new)?;
+            samples.iter().try_for_each(|row| writer.push(row)).map_err(JobError::io)?;
         }
-        writer.finish().map(drop).map_err(JobError::new)
+        writer.finish().map(drop).map_err(JobError::io)
     }
 }
 
 /// A raster of the surface, which must share ground with the terrain.
 fn read_raster(work: &Work<'_>, item: &ItemRef, terrain: &Grid) -> Result<Grid, JobError> {
-    let raster = dem::read(&work.parent(item, HEIGHTS)?).map_err(|e| input_error(&e))?.grid;
+    let raster = dem::read(&work.parent(item, HEIGHTS)?).map_err(input_error)?.grid;
     if terrain.geometry.overlaps(&raster.geometry) {
         return Ok(raster);
     }

@@ -6,6 +6,7 @@
 use super::cache::{Record, StoredFile, load_record};
 use super::documents::{self, Described};
 use super::execute::Failure;
+use super::lock;
 use super::progress::Progress;
 use super::sources::Sources;
 use crate::error::Error;
@@ -23,7 +24,7 @@ use sastrugi_store::mcap::VIEWER_LAYOUT;
 use sastrugi_store::release::{self, Head, Incoming, Release, ReleaseBuilder, ReleaseError};
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs::{File, TryLockError};
+use std::fs::File;
 use std::path::{Path, PathBuf};
 
 /// What goes into a release.
@@ -38,16 +39,19 @@ pub struct Contents<'a> {
     pub items: Vec<(ItemRef, Option<PathBuf>)>,
     /// Items without a result.
     pub failures: &'a [Failure],
+    /// Whether a release of the same study may be replaced by this one where it has fewer failed items.
+    pub replace: bool,
 }
 
 /// Assembles and seals a release.
 ///
 /// # Errors
-/// A destination that is not ours, results that cannot be read, or a file system that refuses.
+/// A destination that is not ours or holds more of the study, results that cannot be read, or a file system that refuses.
 pub fn assemble(mut contents: Contents<'_>, dest: &Path, progress: &dyn Progress) -> Result<Release, Error> {
     let sources = Sources::of(&contents)?;
     contents.items.sort();
     let _lock = DestinationLock::take(dest)?;
+    contents.check_replaced(dest)?;
     let mut builder = ReleaseBuilder::beside(dest, contents.head()).map_err(release_error)?;
     progress.phase("assembling artifacts");
     add_artifacts(&mut builder, &contents, &sources)?;
@@ -86,15 +90,11 @@ impl DestinationLock {
     pub fn take(dest: &Path) -> Result<Self, Error> {
         let path = release::beside(dest, "lock");
         if let Some(folder) = path.parent().filter(|f| !f.as_os_str().is_empty()) {
-            std::fs::create_dir_all(folder).map_err(|e| Error::failed(format!("{}: {e}", folder.display())))?;
+            std::fs::create_dir_all(folder).map_err(|e| Error::at(folder, e))?;
         }
-        let file = File::create(&path).map_err(|e| Error::failed(format!("{}: {e}", path.display())))?;
-        match file.try_lock() {
-            Ok(()) => Ok(Self { path, _file: file }),
-            Err(TryLockError::WouldBlock) => {
-                Err(Error::Retry(format!("another run is writing {}; wait for it", dest.display())))
-            }
-            Err(TryLockError::Error(e)) => Err(Error::failed(format!("{}: {e}", path.display()))),
+        match lock::take(&path).map_err(|e| Error::at(&path, e))? {
+            Some(file) => Ok(Self { path, _file: file }),
+            None => Err(Error::Retry(format!("another run is writing {}; wait for it", dest.display()))),
         }
     }
 }
@@ -111,7 +111,7 @@ pub fn release_error(error: ReleaseError) -> Error {
     match error {
         ReleaseError::Occupied { .. } => Error::Usage(error.to_string()),
         _ if error.unusable_input() => Error::Input(error.to_string()),
-        _ => Error::Failed(error.to_string()),
+        _ => Error::io(error),
     }
 }
 
@@ -128,6 +128,17 @@ impl Contents<'_> {
         }
     }
 
+    /// Refuses to replace a release of the same study by one with more failed items.
+    fn check_replaced(&self, dest: &Path) -> Result<(), Error> {
+        let Ok(there) = Release::open(dest) else { return Ok(()) };
+        let (before, now) = (there.manifest().failed.len(), self.failures.len());
+        let same = there.manifest().study_sha256 == sastrugi_store::digest::of_text(self.text);
+        match same && before < now && !self.replace {
+            true => Err(fewer_items(dest, before, now)),
+            false => Ok(()),
+        }
+    }
+
     /// Results of these stages, in order of their ids.
     fn results(&self, stages: &[&str]) -> Vec<(&ItemRef, &PathBuf)> {
         let of_stages = |(item, _): &&(ItemRef, Option<PathBuf>)| stages.contains(&item.stage.as_str());
@@ -136,6 +147,14 @@ impl Contents<'_> {
         results.sort_by(|a, b| a.0.id.cmp(&b.0.id));
         results
     }
+}
+
+/// The error for a run that would replace one of the same study with fewer failed items.
+pub fn fewer_items(dest: &Path, before: usize, now: usize) -> Error {
+    Error::Failed(format!(
+        "{}: is left as it is: {before} items of the study failed in it, {now} in this run; `--replace` replaces it",
+        dest.display()
+    ))
 }
 
 /// The record of a result.

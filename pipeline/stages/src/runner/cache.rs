@@ -5,17 +5,25 @@
 //! rename makes it a result.
 
 use super::graph::{Graph, Ingredients};
+use super::lock;
 use crate::jobs::{ItemRef, Outcome, Product, Rows};
 use sastrugi_store::atomic::{self, Draft};
 use sastrugi_store::digest;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
-use std::fs::{self, File, TryLockError};
+use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
 
 const RECORD: &str = "record.json";
 const FAILURE: &str = "failure.json";
+/// File that marks a work area.
+const MARK: &str = "CACHEDIR.TAG";
+/// Its text: backups leave such folders out (Cache Directory Tagging Specification).
+const MARK_TEXT: &str = "Signature: 8a477f597d28d172789f06886806bc55\n# Work area of sastrugi: finished items of a study. It can be removed; \
+    a run then makes them again.\n";
+/// Hexadecimal digits of a key.
+const KEY_DIGITS: usize = 32;
 /// Start of the name of a folder that a job writes into.
 const UNFINISHED: &str = "unfinished-";
 
@@ -61,6 +69,12 @@ pub enum CacheError {
     /// Another run holds it.
     #[error("another run is using {0}; wait for it, or name another work area with --work")]
     Busy(PathBuf),
+    /// The folder holds something else.
+    #[error("{0}: the folder is not empty and no work area of ours; name another one with --work")]
+    NotOurs(PathBuf),
+    /// A symbolic link where the work area has folders of its own.
+    #[error("{0}: a symbolic link in a work area; remove it, or name another work area with --work")]
+    Link(PathBuf),
     /// The file system refused.
     #[error("{action} {path}: {source}")]
     Io {
@@ -88,16 +102,12 @@ impl Cache {
     /// Opens or makes a work area, takes its lock, and clears what killed runs left unfinished.
     ///
     /// # Errors
-    /// When another run holds it, or the file system refuses.
+    /// When the folder holds anything but a work area, another run holds it, or the file system refuses.
     pub fn open(folder: &Path) -> Result<Self, CacheError> {
-        fs::create_dir_all(folder).map_err(io_error("cannot make the work area", folder))?;
+        mark(folder)?;
         let path = folder.join("lock");
-        let lock = File::create(&path).map_err(io_error("cannot write", &path))?;
-        match lock.try_lock() {
-            Ok(()) => {}
-            Err(TryLockError::WouldBlock) => return Err(CacheError::Busy(folder.to_owned())),
-            Err(TryLockError::Error(e)) => return Err(io_error("cannot lock", &path)(e)),
-        }
+        let lock = lock::take(&path).map_err(io_error("cannot lock", &path))?;
+        let lock = lock.ok_or_else(|| CacheError::Busy(folder.to_owned()))?;
         let cache = Self { folder: folder.to_owned(), _lock: Some(lock) };
         cache.for_each_result(
             |path, name| if name.starts_with(UNFINISHED) { fs::remove_dir_all(path) } else { Ok(()) },
@@ -231,6 +241,9 @@ impl Cache {
             for item in children(&stage)? {
                 for result in children(&item)? {
                     let name = result.file_name().unwrap_or_default().to_string_lossy().into_owned();
+                    if !is_result(&name) {
+                        continue;
+                    }
                     f(&result, &name).map_err(io_error("cannot remove", &result))?;
                 }
             }
@@ -239,14 +252,50 @@ impl Cache {
     }
 }
 
-/// Folders below a folder, sorted; none when it is not there.
+/// Makes a folder a work area. Only in such folders anything is ever removed.
+fn mark(folder: &Path) -> Result<(), CacheError> {
+    fs::create_dir_all(folder).map_err(io_error("cannot make the work area", folder))?;
+    let path = folder.join(MARK);
+    match fs::read(&path) {
+        Ok(text) if text == MARK_TEXT.as_bytes() => return Ok(()),
+        Ok(_) => return Err(CacheError::NotOurs(folder.to_owned())),
+        Err(e) if e.kind() == io::ErrorKind::NotFound => {}
+        Err(e) => return Err(io_error("cannot read", &path)(e)),
+    }
+    let entries = fs::read_dir(folder).map_err(io_error("cannot list", folder))?;
+    // Another run may be marking it.
+    if entries.flatten().any(|entry| !atomic::is_temporary(&entry.file_name())) && !path.exists() {
+        return Err(CacheError::NotOurs(folder.to_owned()));
+    }
+    atomic::write(&path, MARK_TEXT.as_bytes()).map_err(io_error("cannot write", &path))
+}
+
+/// True for the name of a result's folder, or of one that a job writes into.
+fn is_result(name: &str) -> bool {
+    let key = name.strip_prefix(UNFINISHED).unwrap_or(name);
+    key.len() == KEY_DIGITS && key.bytes().all(|b| b.is_ascii_hexdigit())
+}
+
+/// Folders below a folder, sorted; none when it is not there. Links are not followed: what they lead to is not ours.
 fn children(folder: &Path) -> Result<Vec<PathBuf>, CacheError> {
+    if fs::symlink_metadata(folder).is_ok_and(|there| there.is_symlink()) {
+        return Err(CacheError::Link(folder.to_owned()));
+    }
     let entries = match fs::read_dir(folder) {
         Ok(entries) => entries,
         Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
         Err(e) => return Err(io_error("cannot list", folder)(e)),
     };
-    let mut paths: Vec<PathBuf> = entries.flatten().map(|e| e.path()).filter(|p| p.is_dir()).collect();
+    let mut paths = Vec::new();
+    for entry in entries {
+        let entry = entry.map_err(io_error("cannot list", folder))?;
+        let kind = entry.file_type().map_err(io_error("cannot list", folder))?;
+        match () {
+            () if kind.is_symlink() => return Err(CacheError::Link(entry.path())),
+            () if kind.is_dir() => paths.push(entry.path()),
+            () => {}
+        }
+    }
     paths.sort();
     Ok(paths)
 }

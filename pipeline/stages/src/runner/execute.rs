@@ -3,7 +3,7 @@
 use super::cache::Cache;
 use super::graph::Graph;
 use super::progress::{End, Progress};
-use crate::jobs::{ItemRef, JobError, Work};
+use crate::jobs::{Cause, ItemRef, JobError, Work};
 use sastrugi_store::atomic::Draft;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -36,6 +36,15 @@ pub struct Failure {
     pub parameters: Value,
 }
 
+/// Why a run ended before its end: an item met an error of the machine.
+#[derive(Debug)]
+pub struct Stopped {
+    /// The item.
+    pub item: ItemRef,
+    /// What happened.
+    pub error: JobError,
+}
+
 /// What a run came to.
 #[derive(Debug, Default)]
 pub struct Execution {
@@ -54,6 +63,7 @@ struct State {
     memory_bytes: u64,
     execution: Execution,
     failed: BTreeMap<usize, Failure>,
+    stopped: Option<Stopped>,
 }
 
 struct Run<'a> {
@@ -69,7 +79,16 @@ struct Run<'a> {
 /// Brings the `needed` items (parents included) to results.
 ///
 /// A process may be ended at any moment: an item that has not finished leaves no result.
-pub fn execute(graph: &Graph, cache: &Cache, needed: &[usize], limits: Limits, progress: &dyn Progress) -> Execution {
+///
+/// # Errors
+/// The first error of the machine. Items that were running are finished; no other is begun.
+pub fn execute(
+    graph: &Graph,
+    cache: &Cache,
+    needed: &[usize],
+    limits: Limits,
+    progress: &dyn Progress,
+) -> Result<Execution, Stopped> {
     let (ready, missing): (Vec<usize>, Vec<usize>) =
         needed.iter().partition(|&&p| cache.holds(&graph.node(p).item, graph.key(p)));
     let seconds = missing.iter().map(|&p| graph.node(p).job.estimate().seconds).sum();
@@ -89,11 +108,14 @@ pub fn execute(graph: &Graph, cache: &Cache, needed: &[usize], limits: Limits, p
         }
     });
     let state = run.state.into_inner().unwrap_or_else(PoisonError::into_inner);
+    if let Some(stopped) = state.stopped {
+        return Err(stopped);
+    }
     let mut execution = state.execution;
     execution.done.extend(ready);
     execution.done.sort_unstable();
     execution.failures = state.failed.into_values().collect();
-    execution
+    Ok(execution)
 }
 
 fn children(graph: &Graph, missing: &[usize]) -> BTreeMap<usize, Vec<usize>> {
@@ -111,7 +133,15 @@ fn initial(graph: &Graph, missing: &[usize]) -> State {
     let waiting_for: BTreeMap<usize, usize> =
         missing.iter().map(|&p| (p, graph.parents(p).filter(|q| open.contains(q)).count())).collect();
     let ready = waiting_for.iter().filter(|(_, n)| **n == 0).map(|(p, _)| *p).collect();
-    State { waiting_for, ready, running: 0, memory_bytes: 0, execution: Execution::default(), failed: BTreeMap::new() }
+    State {
+        waiting_for,
+        ready,
+        running: 0,
+        memory_bytes: 0,
+        execution: Execution::default(),
+        failed: BTreeMap::new(),
+        stopped: None,
+    }
 }
 
 impl Run<'_> {
@@ -131,7 +161,7 @@ impl Run<'_> {
     fn take(&self) -> Option<usize> {
         let mut state = self.lock();
         loop {
-            if state.ready.is_empty() && state.running == 0 {
+            if state.stopped.is_some() || state.ready.is_empty() && state.running == 0 {
                 return None;
             }
             if let Some(position) = self.first_that_fits(&state) {
@@ -155,7 +185,7 @@ impl Run<'_> {
     fn run_item(&self, position: usize) -> Result<Vec<String>, JobError> {
         let node = self.graph.node(position);
         let key = self.graph.key(position);
-        let folder = self.cache.begin(&node.item, key).map_err(JobError::new)?;
+        let folder = self.cache.begin(&node.item, key).map_err(JobError::io)?;
         let parents = self
             .graph
             .parents(position)
@@ -170,9 +200,11 @@ impl Run<'_> {
         let outcome = outcome.inspect_err(|error| {
             // The reason for the failure matters more than what stays behind: the next run clears it and finds out again.
             let _ = std::fs::remove_dir_all(&folder);
-            let _ = self.cache.keep_failure(&node.item, key, &error.message);
+            if !matches!(error.cause, Cause::Machine(_)) {
+                let _ = self.cache.keep_failure(&node.item, key, &error.message);
+            }
         })?;
-        let record = self.cache.finish(self.graph, position, &folder, outcome).map_err(JobError::new)?;
+        let record = self.cache.finish(self.graph, position, &folder, outcome).map_err(JobError::io)?;
         Ok(record.notes)
     }
 
@@ -189,12 +221,15 @@ impl Run<'_> {
                 self.release_children(&mut state, position);
                 self.progress.ended(item, &End::Done(notes), job.estimate().seconds);
             }
+            Err(error) if matches!(error.cause, Cause::Machine(_)) => {
+                state.stopped.get_or_insert(Stopped { item: item.clone(), error });
+            }
             Err(error) => {
                 self.progress.ended(item, &End::Failed(error.message.clone()), job.estimate().seconds);
                 let failure = Failure {
                     item: item.clone(),
                     message: error.message,
-                    unusable_input: error.unusable_input,
+                    unusable_input: error.cause == Cause::Input,
                     skipped_for: None,
                     parameters: job.recipe(),
                 };

@@ -5,6 +5,7 @@ pub mod cache;
 mod documents;
 pub mod execute;
 pub mod graph;
+mod lock;
 pub mod plan;
 pub mod progress;
 pub mod shard;

@@ -3,7 +3,7 @@
 //! An item belongs to shard `1 + (key modulo N)`. A shard computes the parents that its items need, whether they are its
 //! own or not, and keeps its own items only.
 
-use super::assemble::DestinationLock;
+use super::assemble::{DestinationLock, fewer_items, release_error};
 use super::cache::{Cache, Record, StoredFile, load_record};
 use super::execute::Failure;
 use super::graph::Graph;
@@ -11,7 +11,7 @@ use crate::error::Error;
 use crate::jobs::ItemRef;
 use crate::splits::Splits;
 use crate::studies::Loaded;
-use sastrugi_store::{atomic, digest};
+use sastrugi_store::{atomic, digest, release};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fs::{self, File};
@@ -73,13 +73,20 @@ pub fn all_items(graph: &Graph) -> Vec<(ItemRef, String)> {
 ///
 /// # Errors
 /// A folder that is not empty and no shard, or a file system that refuses.
-pub fn write(target: &Path, loaded: &Loaded, cache: &Cache, part: Part, failures: &[Failure]) -> Result<(), Error> {
+pub fn write(
+    target: &Path,
+    loaded: &Loaded,
+    cache: &Cache,
+    part: Part,
+    failures: &[Failure],
+    replace: bool,
+) -> Result<(), Error> {
     let (graph, study) = (&loaded.graph, loaded.released.as_str());
-    check_target(target)?;
+    let replaced = occupant(target)?;
     let _lock = DestinationLock::take(target)?;
-    let staging = sastrugi_store::release::beside(target, "assembling");
+    let staging = release::beside(target, "assembling");
     remove(&staging)?;
-    fs::create_dir_all(&staging).map_err(Error::failed)?;
+    fs::create_dir_all(&staging).map_err(|e| Error::at(&staging, e))?;
     let own: Vec<usize> = (0..graph.len()).filter(|&p| part.owns(graph.key(p))).collect();
     for &position in &own {
         let (item, key) = (&graph.node(position).item, graph.key(position));
@@ -96,22 +103,32 @@ pub fn write(target: &Path, loaded: &Loaded, cache: &Cache, part: Part, failures
         failures: failures.iter().filter(owned).cloned().collect(),
         splits: loaded.splits.clone(),
     };
+    if let Some(before) = replaced.filter(|before| !replace && before.holds_more_than(&description)) {
+        return Err(fewer_items(target, before.failures.len(), description.failures.len()));
+    }
     let text = serde_json::to_vec_pretty(&description).map_err(Error::failed)?;
-    atomic::write(&staging.join(STUDY), study.as_bytes()).map_err(Error::failed)?;
-    atomic::write(&staging.join(DESCRIPTION), &text).map_err(Error::failed)?;
-    remove(target)?;
-    fs::rename(&staging, target).map_err(Error::failed)
+    for (name, bytes) in [(STUDY, study.as_bytes()), (DESCRIPTION, &text)] {
+        let path = staging.join(name);
+        atomic::write(&path, bytes).map_err(|e| Error::at(&path, e))?;
+    }
+    release::put_in_place(&staging, target).map_err(release_error)
 }
 
-fn check_target(target: &Path) -> Result<(), Error> {
-    let occupied = fs::read_dir(target).is_ok_and(|mut d| d.next().is_some());
-    if occupied && !target.join(DESCRIPTION).is_file() {
-        return Err(Error::Usage(format!(
-            "{}: the folder is not empty and no shard; name another one",
-            target.display()
-        )));
+impl Description {
+    /// Whether it is of the same part of the same study, with fewer failed items.
+    fn holds_more_than(&self, other: &Self) -> bool {
+        let same = self.study_sha256 == other.study_sha256 && self.part == other.part;
+        same && self.failures.len() < other.failures.len()
     }
-    Ok(())
+}
+
+/// The shard that is there already.
+fn occupant(target: &Path) -> Result<Option<Description>, Error> {
+    if fs::read_dir(target).is_ok_and(|mut d| d.next().is_some()) {
+        let refused = || format!("{}: the folder is not empty and no shard; name another one", target.display());
+        return read(target).map(Some).map_err(|_| Error::Usage(refused()));
+    }
+    Ok(None)
 }
 
 fn remove(folder: &Path) -> Result<(), Error> {
@@ -126,13 +143,13 @@ fn item_folder(shard: &Path, item: &ItemRef) -> PathBuf {
 }
 
 fn copy_result(record: &Record, from: &Path, to: &Path) -> Result<(), Error> {
-    fs::create_dir_all(to).map_err(Error::failed)?;
+    fs::create_dir_all(to).map_err(|e| Error::at(to, e))?;
     let names = record.files.iter().map(|f| f.product.file.as_str()).chain(["record.json"]);
     for name in names {
         let target = to.join(name);
         fs::copy(from.join(name), &target)
             .and_then(|_| File::open(&target)?.sync_all())
-            .map_err(|e| Error::failed(format!("{}: {e}", target.display())))?;
+            .map_err(|e| Error::at(&target, e))?;
     }
     Ok(())
 }

@@ -95,8 +95,7 @@ fn written(request: &Request<'_>, outcome: FitOutcome, source: Source) -> Result
     }
     let fit = with_source(outcome.fit, source);
     if let Some(path) = request.output {
-        atomic::write(path, to_json(&fit)?.as_bytes())
-            .map_err(|e| Error::failed(format!("{}: {e}", path.display())))?;
+        atomic::write(path, to_json(&fit)?.as_bytes()).map_err(|e| Error::at(path, e))?;
     }
     Ok(fit)
 }
@@ -106,7 +105,7 @@ fn written(request: &Request<'_>, outcome: FitOutcome, source: Source) -> Result
 /// # Errors
 /// The file system refused.
 pub fn write_bins(path: &Path, fit: &FitFile) -> Result<(), Error> {
-    csv::write_rows(path, &BIN_COLUMNS, bins(fit)).map_err(|e| Error::failed(format!("{}: {e}", path.display())))
+    csv::write_rows(path, &BIN_COLUMNS, bins(fit)).map_err(|e| Error::at(path, e))
 }
 
 /// Columns of the bins.
@@ -222,7 +221,7 @@ impl Parts {
             return Ok(None);
         }
         let options = ReadOptions { cell_m: reading.cell_m };
-        let reader = dem::open(path, &options).map_err(|e| Error::from(input_error(&e)))?;
+        let reader = dem::open(path, &options).map_err(|e| Error::from(input_error(e)))?;
         let (own, mut notes) = (reader.geometry(), reader.info().notes.clone());
         if own.len() <= PARTS_CELLS {
             return Ok(None);

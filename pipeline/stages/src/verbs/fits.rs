@@ -141,7 +141,7 @@ fn beside(fit: Option<&FitFile>, source: &Source) -> BesideFit {
 /// Writes the table `dem_fits`: as CSV where the name ends so, else as Parquet.
 fn write(path: &Path, rows: &[DemFitRow]) -> Result<(), Error> {
     if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("csv")) {
-        return csv::write_records(path, rows).map_err(|e| Error::failed(format!("{}: {e}", path.display())));
+        return csv::write_records(path, rows).map_err(|e| Error::at(path, e));
     }
     let metadata =
         TableMetadata { study_sha256: String::new(), seed: 0, version: PROGRAM.to_owned(), license: String::new() };

@@ -31,7 +31,7 @@ pub fn hillshade(read: &Read, output: &Path, pixels: u32, factor: Option<f64>) -
         None => exaggeration(rms_slope(grid)),
     };
     let (png, [cols, rows]) = picture::relief_png(grid, factor, pixels as usize).map_err(Error::failed)?;
-    atomic::write(output, &png).map_err(|e| Error::failed(format!("{}: {e}", output.display())))?;
+    atomic::write(output, &png).map_err(|e| Error::at(output, e))?;
     Ok(json!({
         "file": output.display().to_string(),
         "pixels": [cols, rows],

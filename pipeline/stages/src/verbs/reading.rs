@@ -93,6 +93,6 @@ pub fn transects(path: &Path, reading: &Reading) -> Result<Option<Transects>, Er
 fn refused(error: DemError) -> Error {
     match error {
         DemError::Unfit { .. } => Error::Usage(error.to_string()),
-        other => input_error(&other).into(),
+        other => input_error(other).into(),
     }
 }

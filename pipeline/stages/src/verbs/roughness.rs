@@ -160,7 +160,7 @@ fn ride_over(dem: &Grid, request: &RideRequest<'_>, band: &WaveBand) -> Result<R
     if let Some(path) = request.map {
         let predicted = request.predicted.map(|path| predicted(path, dem)).transpose()?;
         let text = map_as_text(&ride, predicted.as_ref());
-        atomic::write(path, text.as_bytes()).map_err(|e| Error::failed(format!("{}: {e}", path.display())))?;
+        atomic::write(path, text.as_bytes()).map_err(|e| Error::at(path, e))?;
     }
     Ok(ride)
 }

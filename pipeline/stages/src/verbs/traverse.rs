@@ -32,6 +32,8 @@ pub struct Place<'a> {
     pub output: &'a Path,
     /// Work area; `<output>.work` when absent.
     pub work: Option<&'a Path>,
+    /// Whether a release of the same missions with fewer failed items is replaced.
+    pub replace: bool,
     /// Limits.
     pub limits: Limits,
 }
@@ -57,8 +59,8 @@ pub fn traverse(request: &Request<'_>, place: &Place<'_>, progress: &dyn Progres
         tables.push(table(&item)?);
         document[section] = Item::ArrayOfTables(tables);
     }
-    let Place { output, work, limits } = *place;
-    let run = RunRequest { output, work, part: None, purpose: Some(STAGE), limits };
+    let Place { output, work, replace, limits } = *place;
+    let run = RunRequest { output, work, part: None, purpose: Some(STAGE), replace, limits };
     run_text(&document.to_string(), Path::new(""), &run, progress)
 }
 

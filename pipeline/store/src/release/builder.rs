@@ -363,7 +363,11 @@ fn remove_folder(folder: &Path) -> Result<(), ReleaseError> {
     }
 }
 
-fn put_in_place(staging: &Path, dest: &Path) -> Result<(), ReleaseError> {
+/// Gives a finished folder its name; what has the name is replaced, and is there until then.
+///
+/// # Errors
+/// The file system refused.
+pub fn put_in_place(staging: &Path, dest: &Path) -> Result<(), ReleaseError> {
     let aside = beside(dest, "replaced");
     remove_folder(&aside)?;
     if dest.exists() {

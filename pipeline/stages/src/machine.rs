@@ -1,0 +1,70 @@
+//! Errors of the machine: no space, no memory, no permission, a failing device. They say nothing about a study, so they end a
+//! run and never count as failed items.
+
+use std::error::Error;
+use std::io::{self, ErrorKind};
+use std::iter::successors;
+
+/// Numbers that Linux gives to errors which the standard library does not name.
+mod os {
+    /// Input or output failed.
+    pub const EIO: i32 = 5;
+    /// The system has no more open files.
+    pub const ENFILE: i32 = 23;
+    /// The process has no more open files.
+    pub const EMFILE: i32 = 24;
+}
+
+/// Whether the same call may work later.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fault {
+    /// It may: no space, quota, memory or open files.
+    Passing,
+    /// It will not, until somebody mends the place: read-only, not permitted, largest file exceeded, failing device.
+    Lasting,
+}
+
+/// The fault of the machine behind an error; `None` where the cause lies elsewhere.
+pub fn fault(error: &(dyn Error + 'static)) -> Option<Fault> {
+    successors(Some(error), |&e| e.source()).find_map(|e| of_io(e.downcast_ref()?))
+}
+
+fn of_io(error: &io::Error) -> Option<Fault> {
+    match (error.kind(), error.raw_os_error()) {
+        (ErrorKind::StorageFull | ErrorKind::QuotaExceeded | ErrorKind::OutOfMemory, _) => Some(Fault::Passing),
+        (_, Some(os::EMFILE | os::ENFILE)) => Some(Fault::Passing),
+        (ErrorKind::FileTooLarge | ErrorKind::ReadOnlyFilesystem | ErrorKind::PermissionDenied, _) => {
+            Some(Fault::Lasting)
+        }
+        (_, Some(os::EIO)) => Some(Fault::Lasting),
+        // An error that wraps another one tells its own kind only.
+        _ => error.get_ref().and_then(|inner| fault(inner)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[derive(Debug, thiserror::Error)]
+    #[error("outer")]
+    struct Outer {
+        source: io::Error,
+    }
+
+    #[test]
+    fn val_faults_are_told_from_other_errors() {
+        let passing = [28, 122, 12, 24, 23];
+        let lasting = [27, 5, 30, 13, 1];
+        let cases = passing.map(|n| (n, Fault::Passing)).into_iter().chain(lasting.map(|n| (n, Fault::Lasting)));
+        for (number, expected) in cases {
+            let error = io::Error::from_raw_os_error(number);
+            assert_eq!(fault(&error), Some(expected), "{error}");
+            let wrapped = io::Error::other(Outer { source: error });
+            assert_eq!(fault(&wrapped), Some(expected), "{wrapped:?}");
+        }
+        for other in [io::Error::from(ErrorKind::NotFound), io::Error::other("words"), ErrorKind::InvalidData.into()] {
+            assert_eq!(fault(&other), None, "{other}");
+        }
+    }
+}

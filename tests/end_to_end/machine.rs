@@ -1,0 +1,125 @@
+//! Nothing of a user's is lost: work areas that are none of ours, links, full disks, good releases.
+
+use sastrugi_tests::{area, called, program, rows, sastrugi_in, small_study, sums, write};
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+
+const STUDY: &str = "[study]\nname = \"x\"\nseed = 1\ndate = \"2026-01-01\"\n\n[[terrain]]\nid = \"t\"\nkind = \"multifractal\"\n\
+    size_px = [64, 64]\n\n[[dem]]\nid = \"d\"\nfile = \"d.asc\"\n";
+const DEM: &str = "ncols 3\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 1\n1 2 3\n4 5 6\n";
+
+fn study(folder: &Path) {
+    write(folder, "study.toml", STUDY);
+    write(folder, "d.asc", DEM);
+}
+
+fn run(folder: &Path, more: &[&str]) -> sastrugi_tests::Called {
+    sastrugi_in(folder, &[&["run", "study.toml", "-o", "release", "--quiet"], more].concat())
+}
+
+#[test]
+fn val_a_folder_that_is_no_work_area_is_left_alone() {
+    let folder = area();
+    study(folder.path());
+    let mine = folder.path().join("photos/items/terrain/t/holiday");
+    fs::create_dir_all(&mine).unwrap();
+    fs::write(mine.join("a.jpg"), "a").unwrap();
+    let call = run(folder.path(), &["--work", "photos"]);
+    assert!(call.code == 2 && call.stderr.contains("no work area of ours"), "{} {}", call.code, call.stderr);
+    assert!(mine.join("a.jpg").is_file() && !folder.path().join("photos/lock").exists());
+
+    // In a work area of ours, only what has the name of a result is ever removed.
+    assert_eq!(run(folder.path(), &[]).code, 0);
+    let kept = folder.path().join("release.work/items/terrain/t/notes");
+    let orphan = folder.path().join("release.work/items/terrain/t/unfinished-0123456789abcdef0123456789abcdef");
+    [&kept, &orphan].into_iter().for_each(|path| fs::create_dir(path).unwrap());
+    assert_eq!(run(folder.path(), &[]).code, 0);
+    assert!(kept.is_dir() && !orphan.exists());
+}
+
+#[cfg(unix)]
+#[test]
+fn val_links_in_a_work_area_are_not_followed() {
+    use std::os::unix::fs::symlink;
+    let folder = area();
+    let path = folder.path();
+    study(path);
+    assert_eq!(run(path, &[]).code, 0);
+    let elsewhere = path.join("elsewhere");
+    let precious = elsewhere.join("terrain/t/unfinished-0123456789abcdef0123456789abcdef");
+    fs::create_dir_all(&precious).unwrap();
+    fs::remove_dir_all(path.join("release.work/items")).unwrap();
+    symlink(&elsewhere, path.join("release.work/items")).unwrap();
+    let call = run(path, &[]);
+    assert!(call.code == 2 && call.stderr.contains("symbolic link"), "{} {}", call.code, call.stderr);
+    assert!(precious.is_dir());
+    fs::remove_file(path.join("release.work/items")).unwrap();
+
+    write(path, "diary.txt", "dear diary");
+    fs::remove_file(path.join("release.work/lock")).unwrap();
+    for lock in ["release.work/lock", ".sastrugi-lock-release"] {
+        symlink(path.join("diary.txt"), path.join(lock)).unwrap();
+        let call = run(path, &[]);
+        assert!(call.code == 1 && call.stderr.contains("plain file"), "{lock}: {} {}", call.code, call.stderr);
+        assert_eq!(fs::read_to_string(path.join("diary.txt")).unwrap(), "dear diary");
+        fs::remove_file(path.join(lock)).unwrap();
+    }
+    assert_eq!(run(path, &[]).code, 0);
+}
+
+/// A limit on the size of files stands for a disk that is full: the run ends, and the release that is there stays.
+#[cfg(unix)]
+#[test]
+fn val_errors_of_the_machine_are_no_failed_items() {
+    let folder = area();
+    let path = folder.path();
+    write(path, "study.toml", &small_study());
+    assert_eq!(run(path, &[]).code, 0);
+    let before = sums(&path.join("release"));
+    fs::remove_dir_all(path.join("release.work")).unwrap();
+    let limited = format!("trap '' XFSZ; ulimit -f 8; exec {} run study.toml -o release --quiet", program().display());
+    let call = called(Command::new("bash").args(["-c", &limited]).current_dir(path));
+    assert_eq!(call.code, 1, "{}", call.stderr);
+    let words = ["File too large", "release.work", "wrote no release"];
+    assert!(words.iter().all(|word| call.stderr.contains(word)), "{}", call.stderr);
+    assert_eq!(sums(&path.join("release")), before);
+    assert_eq!(run(path, &[]).code, 0);
+    assert_eq!(sums(&path.join("release")), before);
+}
+
+#[test]
+fn val_a_good_release_is_not_replaced_by_a_worse_one() {
+    let folder = area();
+    let path = folder.path();
+    study(path);
+    assert_eq!(run(path, &[]).code, 0);
+    let before = sums(&path.join("release"));
+    write(path, "d.asc", "no raster");
+    let call = run(path, &[]);
+    assert!(call.code == 1 && call.stderr.contains("--replace"), "{} {}", call.code, call.stderr);
+    assert_eq!(sums(&path.join("release")), before);
+    assert_eq!(run(path, &["--replace"]).code, 3);
+    assert_eq!(rows(&path.join("release"), "terrains").len(), 1);
+    // As good as the one before, and better.
+    assert_eq!(run(path, &[]).code, 3);
+    write(path, "d.asc", DEM);
+    assert_eq!(run(path, &[]).code, 0);
+    assert_eq!(sums(&path.join("release")), before);
+
+    let shard = |more: &[&str]| {
+        let call = ["run", "study.toml", "-o", "shard", "--work", "release.work", "--shard", "1/1", "--quiet"];
+        sastrugi_in(path, &[&call[..], more].concat())
+    };
+    assert_eq!(shard(&[]).code, 0);
+    write(path, "d.asc", "no raster");
+    let call = shard(&[]);
+    assert!(call.code == 1 && call.stderr.contains("--replace"), "{} {}", call.code, call.stderr);
+    assert_eq!(shard(&["--replace"]).code, 3);
+    // A file of that name does not make a folder a shard.
+    fs::create_dir(path.join("mine")).unwrap();
+    write(path, "mine/shard.json", "{}");
+    let call = sastrugi_in(path, &["run", "study.toml", "-o", "mine", "--shard", "1/1", "--quiet"]);
+    assert_eq!(call.code, 2, "{}", call.stderr);
+    assert_eq!(fs::read_to_string(path.join("mine/shard.json")).unwrap(), "{}");
+}
