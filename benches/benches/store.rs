@@ -212,8 +212,8 @@ fn write_rows(path: &Path, rows: &[SampleRow]) {
         version: "0".to_owned(),
         license: "CC-BY-4.0".to_owned(),
     };
-    let mut writer = TableWriter::create(path, &metadata).expect("a table");
-    rows.iter().for_each(|row| writer.push(row).expect("a row"));
+    let mut writer = TableWriter::create(path, &SampleRow::TABLE, Some(&metadata)).expect("a table");
+    rows.iter().for_each(|row| writer.push(row.cells()).expect("a row"));
     writer.finish().expect("a file");
 }
 

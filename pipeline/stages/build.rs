@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-const ROOMS: [(&str, &str); 10] = [
+const ROOMS: [(&str, &str); 11] = [
     ("SCHEMAS", "../../schemas/src"),
     ("NUMERIC", "../numeric/src"),
     ("ROUGHNESS", "../roughness/src"),
@@ -12,6 +12,7 @@ const ROOMS: [(&str, &str); 10] = [
     ("MOBILITY", "../mobility/src"),
     ("STORE", "../store/src"),
     ("STATISTICS", "../../analysis/statistics/src"),
+    ("JOB", "src/job.rs"),
     ("JOBS", "src/jobs"),
     ("DEPENDENCIES", "../../Cargo.lock"),
 ];

@@ -1,4 +1,4 @@
-//! Nothing of a user's is lost: work areas that are none of ours, links, full disks, good releases.
+//! Nothing of a user's is lost: folders of other programs, links, full disks, good releases.
 
 use sastrugi_tests::{area, called, program, rows, sastrugi_in, small_study, sums, write};
 use std::fs;
@@ -26,7 +26,7 @@ fn val_a_folder_that_is_no_work_area_is_left_alone() {
     fs::create_dir_all(&mine).unwrap();
     fs::write(mine.join("a.jpg"), "a").unwrap();
     let call = run(folder.path(), &["--work", "photos"]);
-    assert!(call.code == 2 && call.stderr.contains("no work area of ours"), "{} {}", call.code, call.stderr);
+    assert!(call.code == 2 && call.stderr.contains("not a sastrugi work area"), "{} {}", call.code, call.stderr);
     assert!(mine.join("a.jpg").is_file() && !folder.path().join("photos/lock").exists());
 
     // In a work area of ours, only what has the name of a result is ever removed.
@@ -61,7 +61,12 @@ fn val_links_in_a_work_area_are_not_followed() {
     for lock in ["release.work/lock", ".sastrugi-lock-release"] {
         symlink(path.join("diary.txt"), path.join(lock)).unwrap();
         let call = run(path, &[]);
-        assert!(call.code == 1 && call.stderr.contains("plain file"), "{lock}: {} {}", call.code, call.stderr);
+        assert!(
+            call.code == 1 && call.stderr.contains("cannot be used as a lock"),
+            "{lock}: {} {}",
+            call.code,
+            call.stderr
+        );
         assert_eq!(fs::read_to_string(path.join("diary.txt")).unwrap(), "dear diary");
         fs::remove_file(path.join(lock)).unwrap();
     }
@@ -81,7 +86,7 @@ fn val_errors_of_the_machine_are_no_failed_items() {
     let limited = format!("trap '' XFSZ; ulimit -f 8; exec {} run study.toml -o release --quiet", program().display());
     let call = called(Command::new("bash").args(["-c", &limited]).current_dir(path));
     assert_eq!(call.code, 1, "{}", call.stderr);
-    let words = ["File too large", "release.work", "wrote no release"];
+    let words = ["File too large", "release.work", "no release was written"];
     assert!(words.iter().all(|word| call.stderr.contains(word)), "{}", call.stderr);
     assert_eq!(sums(&path.join("release")), before);
     assert_eq!(run(path, &[]).code, 0);

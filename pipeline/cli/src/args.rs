@@ -196,7 +196,7 @@ pub struct Run {
     /// Run one of N shards (I = 1..N) to a partial folder for `merge`.
     #[arg(long, value_name = "I/N")]
     pub shard: Option<String>,
-    /// Replace a release of the same study even where fewer of its items failed.
+    /// Replace an existing release of this study even if it has fewer failed items than the new one.
     #[arg(long)]
     pub replace: bool,
     /// Working memory of the items at once, GiB.
@@ -223,7 +223,7 @@ pub struct Merge {
     /// Release folder.
     #[arg(short, long, value_name = "DIR", default_value = "release")]
     pub output: PathBuf,
-    /// Replace a release of the same study even where fewer of its items failed.
+    /// Replace an existing release of this study even if it has fewer failed items than the new one.
     #[arg(long)]
     pub replace: bool,
 }
@@ -578,7 +578,7 @@ pub struct Traverse {
     /// Starts driven of each mission: the drawn one and perturbed ones, for a probability of success.
     #[arg(long, value_name = "N")]
     pub replicates: Option<u32>,
-    /// Replace a release of the same study even where fewer of its items failed.
+    /// Replace an existing release of this study even if it has fewer failed items than the new one.
     #[arg(long)]
     pub replace: bool,
     /// Seed of the random streams.

@@ -2,7 +2,7 @@
 
 use crate::output::warn;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use sastrugi_stages::jobs::ItemRef;
+use sastrugi_stages::job::ItemRef;
 use sastrugi_stages::runner::progress::{End, Progress};
 use std::io::IsTerminal;
 use std::sync::{Mutex, PoisonError};

@@ -1,12 +1,13 @@
 //! What a caller of this room can be told, sorted by what the caller should do about it.
 
-use crate::jobs::{Cause, JobError};
+use crate::builder::BuildError;
+use crate::job::{Cause, JobError};
 use crate::machine::{Fault, fault};
-use crate::registry::BuildError;
 use crate::runner::cache::CacheError;
 use crate::runner::execute::Stopped;
 use crate::study::StudyError;
 use sastrugi_schemas::ParameterError;
+use sastrugi_store::release::ReleaseError;
 use std::path::Path;
 
 /// An error, one sentence each.
@@ -73,7 +74,7 @@ impl From<JobError> for Error {
 impl From<Stopped> for Error {
     fn from(stopped: Stopped) -> Self {
         let Stopped { item, error } = stopped;
-        let advice = "the run ended there and wrote no release; what is finished stays in the work area";
+        let advice = "the run stopped and no release was written; finished items are kept in the work area, so run again once this is fixed";
         error.reworded(|words| format!("{item}: {words}; {advice}")).into()
     }
 }
@@ -84,6 +85,16 @@ impl From<CacheError> for Error {
             CacheError::Busy(_) => Self::Retry(error.to_string()),
             CacheError::NotOurs(_) | CacheError::Link(_) => Self::Usage(error.to_string()),
             CacheError::Io { .. } => Self::io(error),
+        }
+    }
+}
+
+impl From<ReleaseError> for Error {
+    fn from(error: ReleaseError) -> Self {
+        match error {
+            ReleaseError::Occupied { .. } => Self::Usage(error.to_string()),
+            _ if error.unusable_input() => Self::Input(error.to_string()),
+            _ => Self::io(error),
         }
     }
 }

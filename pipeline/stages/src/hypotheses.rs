@@ -1,8 +1,8 @@
 //! `[[hypothesis]]`: claims that are part of the study, and so of its hash, before anything runs. No item comes of them and no key
 //! holds them; the report tests them.
 
+use crate::builder::{BuildError, Builder};
 use crate::jobs::traverse;
-use crate::registry::{BuildError, Builder};
 use crate::study::keys::nearest;
 use crate::study::{Entry, StudyError};
 use sastrugi_schemas::ParameterError;
@@ -52,7 +52,7 @@ fn groups<'b>(builder: &'b Builder<'_>) -> BTreeSet<&'b str> {
 
 /// Run and group of everything that is driven.
 fn driven<'b>(builder: &'b Builder<'_>) -> impl Iterator<Item = (&'b str, &'b str)> {
-    let items = builder.nodes().iter().map(|node| &node.item).filter(|item| item.stage == traverse::STAGE);
+    let items = builder.graph.nodes().iter().map(|node| &node.item).filter(|item| item.stage == traverse::STAGE);
     items.filter_map(|item| {
         let field = builder.heightfields.get(traverse::terrain_of(&item.id))?;
         Some((traverse::run_of(&item.id), field.group.as_deref().unwrap_or(&field.kind)))

@@ -1,8 +1,10 @@
 //! From a study to a release: one job per stage (glue between kernels and files), the study reader, the runner with its
 //! cache and shards, and the verbs that work on single files.
 
+mod builder;
 mod error;
 mod hypotheses;
+pub mod job;
 pub mod jobs;
 mod machine;
 pub mod packing;

@@ -1,9 +1,8 @@
 //! A release as one archive with reproducible bytes.
 
 use crate::error::Error;
-use crate::jobs::ItemRef;
+use crate::job::ItemRef;
 use crate::registry;
-use crate::runner::assemble::release_error;
 use crate::runner::progress::{End, Progress};
 use crate::studies::resolved;
 use crate::study::Study;
@@ -37,13 +36,13 @@ pub struct Packing {
 pub fn pack(folder: &Path, output: &Path, progress: &dyn Progress) -> Result<Packing, Error> {
     check_output(folder, output)?;
     progress.phase("checking files");
-    let report = release::verify(folder).map_err(release_error)?;
+    let report = release::verify(folder)?;
     let mut packing =
         Packing { output: output.to_owned(), files: 0, bytes: 0, sha256: None, differences: differences(&report) };
     if !packing.differences.is_empty() {
         return Ok(packing);
     }
-    let release = Release::open(folder).map_err(release_error)?;
+    let release = Release::open(folder)?;
     let time_s = unix_seconds(&date_of(folder)?);
     let files = release.manifest().artifacts.len() + 2;
     progress.begin(files, 0, report.bytes as f64 / BYTES_PER_SECOND);
@@ -51,7 +50,7 @@ pub fn pack(folder: &Path, output: &Path, progress: &dyn Progress) -> Result<Pac
         let item = ItemRef::new(&release.manifest().name, path);
         progress.ended(&item, &End::Done(Vec::new()), bytes as f64 / BYTES_PER_SECOND);
     };
-    let Packed { files, bytes, sha256 } = release::pack(&release, output, time_s, &added).map_err(release_error)?;
+    let Packed { files, bytes, sha256 } = release::pack(&release, output, time_s, &added)?;
     (packing.files, packing.bytes, packing.sha256) = (files, bytes, Some(sha256));
     Ok(packing)
 }

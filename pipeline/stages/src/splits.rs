@@ -5,13 +5,15 @@
 //! drawn together with those of the same groups. A unit's place in the draw comes from its own random stream, so that more
 //! terrains move few others.
 
-use crate::jobs::terrain::common;
-use crate::jobs::{ItemRef, Rows};
-use crate::registry::Heightfield;
+use crate::builder::Heightfield;
+use crate::builder::common;
+use crate::job::ItemRef;
 use crate::runner::graph::Graph;
 use crate::study::{Study, StudyError};
 use sastrugi_numeric::Streams;
 use sastrugi_schemas::study::Pairing;
+use sastrugi_schemas::tables::CellType;
+use sastrugi_schemas::{Cell, Table};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Names of the parts, in the order of `[study] split`.
@@ -22,10 +24,15 @@ const STAGE: &str = "split";
 /// Part of each terrain, by id; terrains without a part are absent.
 pub type Splits = BTreeMap<String, String>;
 
-/// Writes the parts into rows that name a terrain.
-pub fn fill(rows: &mut Rows, splits: &Splits) {
-    rows.terrains.iter_mut().for_each(|row| row.split = splits.get(&row.terrain_id).cloned());
-    rows.missions.iter_mut().for_each(|row| row.split = splits.get(&row.terrain_id).cloned());
+/// Writes the part into a row that names a terrain and has the column `split`: items are made without it, so that another
+/// split makes nothing again.
+pub fn fill(table: &Table, cells: &mut [Cell], splits: &Splits) {
+    let (Some(split), Some(terrain)) = (table.position("split"), table.position("terrain_id")) else { return };
+    let part = match &cells[terrain] {
+        Cell::Text(id) => splits.get(id).cloned(),
+        _ => None,
+    };
+    cells[split] = part.to_cell();
 }
 
 /// Terrains that stay together.

@@ -1,7 +1,7 @@
 //! What a command does with a whole study: run, plan, merge. What it does with a release is in [`crate::verification`].
 
 use crate::error::{Error, of_build};
-use crate::jobs::{ItemRef, original};
+use crate::jobs::original;
 use crate::registry::{self, Plan};
 use crate::runner::assemble::{Contents, assemble};
 use crate::runner::cache::Cache;
@@ -137,16 +137,17 @@ pub fn run(loaded: &Loaded, request: &RunRequest<'_>, progress: &dyn Progress) -
     match request.part {
         Some(part) => shard::write(request.output, loaded, &cache, part, &execution.failures, request.replace)?,
         None => {
-            let items = (0..graph.len()).map(|p| located(graph, &cache, &execution, p)).collect();
+            let results =
+                execution.done.iter().map(|&p| cache.result_folder(&graph.node(p).item, graph.key(p))).collect();
             let contents = Contents {
                 study: &loaded.study,
                 text: &loaded.released,
                 splits: &loaded.splits,
-                items,
+                results,
                 failures: &execution.failures,
                 replace: request.replace,
             };
-            assemble(contents, request.output, progress)?;
+            assemble(&contents, request.output, progress)?;
         }
     }
     cache.drop_orphans(graph)?;
@@ -166,9 +167,7 @@ fn check_destination(request: &RunRequest<'_>) -> Result<(), Error> {
         Ok(true) if !request.output.join(ours).is_file() => {
             let what = if request.part.is_some() { "shard" } else { "release" };
             let path = request.output.display();
-            Err(Error::Usage(format!(
-                "{path}: the folder is not empty and no {what} of ours; name another one with -o"
-            )))
+            Err(Error::Usage(format!("{path}: not a sastrugi {what}, and not empty; choose another folder with -o")))
         }
         Err(e) if e.kind() == std::io::ErrorKind::NotADirectory => {
             Err(Error::Usage(format!("{}: is a file; -o names a folder", request.output.display())))
@@ -198,14 +197,6 @@ pub fn resolved(path: &Path) -> PathBuf {
         }
         at.canonicalize().unwrap_or(at)
     })
-}
-
-/// The item at a position with the folder of its result, where it has one.
-pub fn located(graph: &Graph, cache: &Cache, execution: &Execution, position: usize) -> (ItemRef, Option<PathBuf>) {
-    let item = graph.node(position).item.clone();
-    let done = execution.done.binary_search(&position).is_ok();
-    let folder = done.then(|| cache.result_folder(&item, graph.key(position)));
-    (item, folder)
 }
 
 fn all_failed(failures: &[Failure]) -> Error {
@@ -244,16 +235,16 @@ pub fn plan_of(loaded: &Loaded, output: &Path, work: Option<&Path>) -> Result<Pl
 pub fn merge(shards: &[PathBuf], output: &Path, replace: bool, progress: &dyn Progress) -> Result<RunSummary, Error> {
     let joined = shard::join(shards)?;
     let study = Study::parse(&joined.study, Path::new(""), &registry::section_names()).map_err(Error::failed)?;
-    let items = joined.items.len();
+    let items = joined.results.len() + joined.failures.len();
     let contents = Contents {
         study: &study,
         text: &joined.study,
         splits: &joined.splits,
-        items: joined.items,
+        results: joined.results,
         failures: &joined.failures,
         replace,
     };
-    assemble(contents, output, progress)?;
+    assemble(&contents, output, progress)?;
     Ok(RunSummary { output: output.to_owned(), items, computed: 0, failures: joined.failures })
 }
 

@@ -1,18 +1,18 @@
 //! What a release says of itself, held against its bytes and against what its study gives here and now.
 
 use crate::error::Error;
-use crate::jobs::{ItemRef, Rows, traverse};
-use crate::runner::assemble::{Contents, artifacts, notes, release_error};
+use crate::job::ItemRef;
+use crate::runner::assemble::{artifacts, head, notes_of};
 use crate::runner::cache::{Cache, Record};
 use crate::runner::execute::{Limits, execute};
 use crate::runner::progress::Progress;
 use crate::runner::sources::Sources;
-use crate::splits;
-use crate::studies::{Loaded, RunRequest, load, located, run};
-use sastrugi_schemas::Record as Row;
+use crate::splits::{self, Splits};
+use crate::studies::{Loaded, RunRequest, load, run};
 use sastrugi_schemas::manifest::{Artifact, ItemNote, Manifest};
-use sastrugi_schemas::tables::SampleRow;
-use sastrugi_store::release::{self, Head, MANIFEST, Problem, ProblemKind, Release, VerifyReport};
+use sastrugi_schemas::{Table, tables};
+use sastrugi_store::parquet::TableReader;
+use sastrugi_store::release::{self, Head, MANIFEST, Problem, ProblemKind, Release, ReleaseError, VerifyReport};
 use serde::Serialize;
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
@@ -66,7 +66,7 @@ pub fn verify(
     progress: &dyn Progress,
 ) -> Result<Verification, Error> {
     progress.phase("checking files");
-    let report = release::verify(folder).map_err(release_error)?;
+    let report = release::verify(folder)?;
     let mut verification = Verification {
         files: report.files,
         bytes: report.bytes,
@@ -75,7 +75,7 @@ pub fn verify(
         not_comparable: None,
     };
     let Some(recompute) = recompute.filter(|_| verification.differences.is_empty()) else { return Ok(verification) };
-    let release = Release::open(folder).map_err(release_error)?;
+    let release = Release::open(folder)?;
     let ours = env!("CARGO_PKG_VERSION");
     if release.manifest().version != ours {
         let theirs = &release.manifest().version;
@@ -223,20 +223,19 @@ fn recompute_some(
             problem: format!("cannot be computed again: {}", f.message),
         }),
     );
-    let items = (0..graph.len()).map(|p| located(graph, &cache, &execution, p)).collect();
-    let Loaded { study, released: text, splits, .. } = loaded;
-    let contents = Contents { study, text, splits, items, failures: &execution.failures, replace: false };
-    let mut again = Again { sources: Sources::of(&contents)?, ..Again::default() };
-    for position in chosen {
-        let item = &graph.node(position).item;
-        let Some(mut record) = cache.load(item, graph.key(position)) else { continue };
-        again.add(&record);
-        splits::fill(&mut record.rows, splits);
-        verification.recomputed.push(item.to_string());
-        let samples = cache.result_folder(item, &record.key).join(traverse::SAMPLES);
-        verification.differences.extend(compare_tables(release, record.rows, &samples)?);
+    let Loaded { study, released, splits, .. } = loaded;
+    let mut again = Again { sources: Sources::of(study)?, ..Again::default() };
+    for (position, node) in graph.nodes().iter().enumerate() {
+        let Some(record) = cache.load(&node.item, graph.key(position)) else { continue };
+        again.sources.trace(&record);
+        if chosen.contains(&position) {
+            again.add(&record);
+            verification.recomputed.push(node.item.to_string());
+            let folder = cache.result_folder(&node.item, &record.key);
+            verification.differences.extend(compare_fragments(release, &record, &folder, splits)?);
+        }
     }
-    verification.differences.extend(again.compare(release.manifest(), contents.head())?);
+    verification.differences.extend(again.compare(release.manifest(), head(study, released))?);
     Ok(())
 }
 
@@ -253,7 +252,7 @@ impl Again {
     fn add(&mut self, record: &Record) {
         self.items.insert(record.item.clone());
         self.artifacts.extend(artifacts(record, &self.sources));
-        self.notes.extend(notes(record));
+        self.notes.extend(notes_of(record));
     }
 
     /// Compares the release's manifest with itself after its lines on these items are replaced.
@@ -277,45 +276,37 @@ impl Again {
     }
 }
 
-/// Compares an item's rows with the tables; `samples` is the file of its samples, where it has one.
-fn compare_tables(release: &Release, rows: Rows, samples: &Path) -> Result<Vec<Difference>, Error> {
-    let samples: Vec<SampleRow> = match samples.is_file() {
-        true => sastrugi_store::parquet::read_table(samples).map_err(Error::failed)?,
-        false => Vec::new(),
-    };
-    let differences = [
-        compare_rows(release, &rows.terrains)?,
-        compare_rows(release, &rows.fits)?,
-        compare_rows(release, &rows.covariance)?,
-        compare_rows(release, &rows.candidates)?,
-        compare_rows(release, &rows.candidate_curves)?,
-        compare_rows(release, &rows.likelihood_profile)?,
-        compare_rows(release, &rows.surfaces)?,
-        compare_rows(release, &rows.structure)?,
-        compare_rows(release, &rows.profile_psd)?,
-        compare_rows(release, &rows.psd)?,
-        compare_rows(release, &rows.height_distribution)?,
-        compare_rows(release, &rows.scoreboard)?,
-        compare_rows(release, &rows.scoreboard_covariance)?,
-        compare_rows(release, &rows.missions)?,
-        compare_rows(release, &rows.replicates)?,
-        compare_rows(release, &rows.parameters)?,
-        compare_rows(release, &samples)?,
-    ];
-    Ok(differences.into_iter().flatten().collect())
+/// Compares an item's rows with those of the release.
+fn compare_fragments(
+    release: &Release,
+    record: &Record,
+    folder: &Path,
+    splits: &Splits,
+) -> Result<Vec<Difference>, Error> {
+    let mut differences = Vec::new();
+    for file in &record.files {
+        let Some(table) = file.product.fragment.as_ref().and_then(|rows| tables::by_name(&rows.table)) else {
+            continue;
+        };
+        let mut missing = BTreeSet::new();
+        for row in TableReader::open(&folder.join(&file.product.file), table).map_err(Error::io)? {
+            let mut cells = row.map_err(Error::io)?;
+            splits::fill(table, &mut cells, splits);
+            missing.insert(format!("{cells:?}"));
+        }
+        differences.extend(compare_rows(release, table, missing)?);
+    }
+    Ok(differences)
 }
 
 /// A difference when the release's table lacks one of these rows.
-fn compare_rows<R: Row>(release: &Release, rows: &[R]) -> Result<Option<Difference>, Error> {
-    let text = |row: &R| format!("{:?}", row.cells());
-    let mut missing: BTreeSet<String> = rows.iter().map(text).collect();
-    if missing.is_empty() {
-        return Ok(None);
+fn compare_rows(release: &Release, table: &Table, rows: BTreeSet<String>) -> Result<Option<Difference>, Error> {
+    let mut missing = rows.clone();
+    for file in release.sealed_parts(table.name) {
+        for row in TableReader::open(&file?, table).map_err(ReleaseError::from)? {
+            missing.remove(&format!("{:?}", row.map_err(ReleaseError::from)?));
+        }
     }
-    let found = |row: R| {
-        missing.remove(&text(&row));
-    };
-    release.for_each_row(found).map_err(release_error)?;
     let problem = format!("computed again, {} of {} rows differ", missing.len(), rows.len());
-    Ok((!missing.is_empty()).then(|| Difference { path: format!("tables/{}", R::TABLE.name), problem }))
+    Ok((!missing.is_empty()).then(|| Difference { path: format!("tables/{}", table.name), problem }))
 }

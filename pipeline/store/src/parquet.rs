@@ -23,11 +23,11 @@ use parquet::errors::ParquetError;
 use parquet::file::metadata::{KeyValue, SortingColumn};
 use parquet::file::properties::WriterProperties;
 use parquet::schema::types::ColumnPath;
+use sastrugi_schemas::tables::compare_keys;
 use sastrugi_schemas::{Cell, Column, ColumnType, Record, Table};
 use std::cmp::Ordering;
 use std::fs::File;
 use std::io;
-use std::marker::PhantomData;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -126,10 +126,12 @@ impl TableMetadata {
 }
 
 /// What was written.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct TableSummary {
     /// Number of rows.
     pub rows: u64,
+    /// Keys of the first and the last row.
+    pub ends: [Vec<Cell>; 2],
     /// Hash of the decoded rows: names of table and columns, then every value in order.
     pub content_sha256: String,
 }
@@ -171,15 +173,14 @@ fn float_path(column: &Column) -> Option<ColumnPath> {
     }
 }
 
-fn properties(table: &Table, metadata: &TableMetadata) -> Result<WriterProperties, ParquetError> {
+fn properties(table: &Table, metadata: Option<&TableMetadata>) -> Result<WriterProperties, ParquetError> {
     let sorting = |index: usize| SortingColumn { column_idx: index as i32, descending: false, nulls_first: false };
-    let keys = table.columns.iter().take_while(|c| c.key).count();
     let mut builder = WriterProperties::builder()
         .set_created_by(PROGRAM.to_owned())
         .set_compression(Compression::ZSTD(ZstdLevel::try_new(ZSTD_LEVEL)?))
         .set_max_row_group_row_count(Some(ROW_GROUP_ROWS))
-        .set_sorting_columns(Some((0..keys).map(sorting).collect()))
-        .set_key_value_metadata(Some(metadata.pairs(table.name)));
+        .set_sorting_columns(Some((0..table.key_count()).map(sorting).collect()))
+        .set_key_value_metadata(metadata.map(|m| m.pairs(table.name)));
     // Measured floats seldom repeat: byte planes compress better than a dictionary.
     for path in table.columns.iter().filter_map(float_path) {
         builder = builder
@@ -190,61 +191,68 @@ fn properties(table: &Table, metadata: &TableMetadata) -> Result<WriterPropertie
 }
 
 /// Writes one table row by row. The file appears when [`TableWriter::finish`] has succeeded.
-pub struct TableWriter<R: Record> {
+pub struct TableWriter {
     path: PathBuf,
+    table: &'static Table,
     writer: ArrowWriter<AtomicFile>,
     schema: SchemaRef,
     columns: Vec<ColumnBuilder>,
     waiting: usize,
     rows: u64,
-    previous: Vec<Cell>,
+    /// Keys of the first row, and of the last one so far.
+    ends: Option<[Vec<Cell>; 2]>,
     content: ContentHash,
-    record: PhantomData<R>,
 }
 
-impl<R: Record> TableWriter<R> {
-    /// Starts the table `R::TABLE` in a file.
+impl TableWriter {
+    /// Starts a table in a file; without metadata for a file that is none of a release.
     ///
     /// # Errors
     /// The file cannot be made.
-    pub fn create<'a>(target: impl Into<Target<'a>>, metadata: &TableMetadata) -> Result<Self, TableError> {
+    pub fn create<'a>(
+        target: impl Into<Target<'a>>,
+        table: &'static Table,
+        metadata: Option<&TableMetadata>,
+    ) -> Result<Self, TableError> {
         let target = target.into();
         let path = target.path;
         let encoding = |source| TableError::Encoding { path: path.to_owned(), source };
-        let table = R::TABLE;
-        let schema = schema(&table);
+        let schema = schema(table);
         let file = AtomicFile::create(target).map_err(|e| TableError::io(path, e))?;
-        let properties = properties(&table, metadata).map_err(encoding)?;
+        let properties = properties(table, metadata).map_err(encoding)?;
         let writer = ArrowWriter::try_new(file, schema.clone(), Some(properties)).map_err(encoding)?;
         Ok(Self {
             path: path.to_owned(),
+            table,
             writer,
             schema,
             columns: table.columns.iter().map(|c| ColumnBuilder::new(c.column_type)).collect(),
             waiting: 0,
             rows: 0,
-            previous: vec![],
-            content: content_hash(&table),
-            record: PhantomData,
+            ends: None,
+            content: content_hash(table),
         })
     }
 
-    /// Appends a row, which must come after the previous one in the order of the keys.
+    /// Appends a row, its values in column order, which must come after the previous one in the order of the keys.
     ///
     /// # Errors
     /// [`TableError::Order`], or the file cannot be written.
-    pub fn push(&mut self, row: &R) -> Result<(), TableError> {
-        let mut cells = row.cells();
-        let keys = R::TABLE.columns.iter().take_while(|c| c.key).count();
-        if keys > 0 && self.rows > 0 && compare(&self.previous, &cells[..keys]) != Ordering::Less {
-            return Err(TableError::Order { path: self.path.clone(), table: R::TABLE.name, row: self.rows });
+    pub fn push(&mut self, mut cells: Vec<Cell>) -> Result<(), TableError> {
+        let keys = self.table.key_count();
+        let last = self.ends.as_ref().map(|[_, last]| last).filter(|_| keys > 0);
+        if last.is_some_and(|last| compare_keys(last, &cells[..keys]) != Ordering::Less) {
+            return Err(TableError::Order { path: self.path.clone(), table: self.table.name, row: self.rows });
         }
         for (column, cell) in self.columns.iter_mut().zip(&cells) {
             column.push(cell);
             hash_cell(&mut self.content, cell);
         }
         cells.truncate(keys);
-        self.previous = cells;
+        match &mut self.ends {
+            Some([_, last]) => *last = cells,
+            None => self.ends = Some([cells.clone(), cells]),
+        }
         self.rows += 1;
         self.waiting += 1;
         if self.waiting == BATCH_ROWS { self.encode() } else { Ok(()) }
@@ -266,22 +274,11 @@ impl<R: Record> TableWriter<R> {
         if self.waiting > 0 {
             self.encode()?;
         }
-        let Self { path, writer, rows, content, .. } = self;
+        let Self { path, writer, rows, ends, content, .. } = self;
         let file = writer.into_inner().map_err(|source| TableError::Encoding { path: path.clone(), source })?;
         file.commit().map_err(|e| TableError::io(&path, e))?;
-        Ok(TableSummary { rows, content_sha256: content.finish() })
+        Ok(TableSummary { rows, ends: ends.unwrap_or_default(), content_sha256: content.finish() })
     }
-}
-
-fn compare(a: &[Cell], b: &[Cell]) -> Ordering {
-    let pairs = a.iter().zip(b).map(|(a, b)| match (a, b) {
-        (Cell::Text(a), Cell::Text(b)) => a.cmp(b),
-        (Cell::I64(a), Cell::I64(b)) => a.cmp(b),
-        (Cell::Bool(a), Cell::Bool(b)) => a.cmp(b),
-        (Cell::F64(a), Cell::F64(b)) => a.total_cmp(b),
-        _ => Ordering::Equal,
-    });
-    pairs.fold(Ordering::Equal, Ordering::then)
 }
 
 fn content_hash(table: &Table) -> ContentHash {
@@ -380,26 +377,25 @@ impl ColumnBuilder {
     }
 }
 
-/// Rows of a table, read one batch at a time.
-pub struct TableReader<R: Record> {
+/// Rows of a table, their values in column order, read one batch at a time.
+pub struct TableReader {
     path: PathBuf,
     batches: ParquetRecordBatchReader,
     batch: Vec<ColumnValues>,
     row: usize,
     rows: usize,
     broken: bool,
-    record: PhantomData<R>,
 }
 
-impl<R: Record> TableReader<R> {
-    /// Opens a file of the table `R::TABLE`.
+impl TableReader {
+    /// Opens a file of a table.
     ///
     /// # Errors
     /// The file is missing, no Parquet file, or has other columns than the table.
-    pub fn open(path: &Path) -> Result<Self, TableError> {
-        let builder = open(path, &R::TABLE)?;
+    pub fn open(path: &Path, table: &Table) -> Result<Self, TableError> {
+        let builder = open(path, table)?;
         let batches = decoding(path, || builder.with_batch_size(BATCH_ROWS).build())?;
-        Ok(Self { path: path.to_owned(), batches, batch: vec![], row: 0, rows: 0, broken: false, record: PhantomData })
+        Ok(Self { path: path.to_owned(), batches, batch: vec![], row: 0, rows: 0, broken: false })
     }
 
     /// Loads the next batch that has rows; false at the end.
@@ -414,23 +410,22 @@ impl<R: Record> TableReader<R> {
         Ok(true)
     }
 
-    fn read(&mut self) -> Result<R, TableError> {
+    fn read(&mut self) -> Vec<Cell> {
         let cells = self.batch.iter().map(|column| column.cell(self.row)).collect();
         self.row += 1;
-        R::from_cells(cells).ok_or_else(|| TableError::unusable(&self.path, "holds a null where a value is required"))
+        cells
     }
 }
 
-impl<R: Record> Iterator for TableReader<R> {
-    type Item = Result<R, TableError>;
+impl Iterator for TableReader {
+    type Item = Result<Vec<Cell>, TableError>;
 
     fn next(&mut self) -> Option<Self::Item> {
         if self.broken {
             return None;
         }
         match self.advance() {
-            Ok(true) => Some(self.read()),
-            Ok(false) => None,
+            Ok(more) => more.then(|| Ok(self.read())),
             Err(error) => {
                 self.broken = true;
                 Some(Err(error))
@@ -542,21 +537,40 @@ fn nullability(field: &Field) -> &'static str {
     if field.is_nullable() { "nullable" } else { "never null" }
 }
 
+/// Writes a table of rows sorted by key to a file.
+///
+/// # Errors
+/// As [`TableWriter::push`] and [`TableWriter::finish`].
+pub fn write_table<'a, R: Record>(
+    target: impl Into<Target<'a>>,
+    rows: impl IntoIterator<Item = R>,
+    metadata: Option<&TableMetadata>,
+) -> Result<TableSummary, TableError> {
+    let mut writer = TableWriter::create(target, &R::TABLE, metadata)?;
+    rows.into_iter().try_for_each(|row| writer.push(row.cells()))?;
+    writer.finish()
+}
+
 /// All rows of a file.
 ///
 /// # Errors
 /// As [`TableReader::open`]; also when the rows cannot be decoded.
 pub fn read_table<R: Record>(path: &Path) -> Result<Vec<R>, TableError> {
-    TableReader::open(path)?.collect()
+    let mut rows = Vec::new();
+    for_each_row(path, |row| rows.push(row))?;
+    Ok(rows)
 }
 
 /// Calls `f` with every row of a file.
 ///
 /// # Errors
 /// As [`read_table`].
-pub fn for_each_row<R: Record>(path: &Path, f: impl FnMut(R)) -> Result<(), TableError> {
-    let mut f = f;
-    TableReader::open(path)?.try_for_each(|row| row.map(&mut f))
+pub fn for_each_row<R: Record>(path: &Path, mut f: impl FnMut(R)) -> Result<(), TableError> {
+    let lacking = || TableError::unusable(path, "holds a null where a value is required");
+    TableReader::open(path, &R::TABLE)?.try_for_each(|cells| {
+        f(R::from_cells(cells?).ok_or_else(lacking)?);
+        Ok(())
+    })
 }
 
 /// What a Parquet file of ours is, for people.

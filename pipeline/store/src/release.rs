@@ -7,12 +7,12 @@ mod verify;
 #[cfg(test)]
 mod tests;
 
-pub use builder::{GrowingTable, Head, Incoming, ReleaseBuilder, beside, put_in_place};
+pub use builder::{Head, Incoming, PartWriter, ReleaseBuilder, Staging, TablePart, beside};
 pub use pack::{Packed, pack};
 pub use verify::{Problem, ProblemKind, VerifyReport, verify};
 
 use crate::digest;
-use crate::parquet::{TableError, TableReader};
+use crate::parquet::{self, TableError};
 use sastrugi_schemas::Record;
 use sastrugi_schemas::manifest::{Artifact, FORMAT, Manifest, PROGRAM};
 use std::fs;
@@ -40,7 +40,7 @@ pub enum ReleaseError {
         reason: String,
     },
     /// The folder to write holds files that are not of a release, and is left alone.
-    #[error("{}: the folder is not empty and no release; it is left alone", path.display())]
+    #[error("{}: not a sastrugi release, and not empty; choose another folder with -o", path.display())]
     Occupied {
         /// The folder.
         path: PathBuf,
@@ -165,15 +165,19 @@ impl Release {
     /// # Errors
     /// As [`Release::rows`].
     pub fn for_each_row<R: Record>(&self, mut f: impl FnMut(R)) -> Result<(), ReleaseError> {
-        for part in self.parts(R::TABLE.name) {
+        self.sealed_parts(R::TABLE.name).try_for_each(|file| Ok(parquet::for_each_row(&file?, &mut f)?))
+    }
+
+    /// The files of a table, sorted, each checked when it is its turn.
+    ///
+    /// # Errors
+    /// A file cannot be read, or is not the one that was sealed.
+    pub fn sealed_parts(&self, table: &str) -> impl Iterator<Item = Result<PathBuf, ReleaseError>> {
+        self.parts(table).map(|part| {
             let file = self.path(&part.path);
             let (_, sha256) = digest::of_file(&file).map_err(ReleaseError::io(&file))?;
-            if sha256 != part.sha256 {
-                return Err(ReleaseError::Changed { path: file });
-            }
-            TableReader::open(&file)?.try_for_each(|row| row.map(&mut f))?;
-        }
-        Ok(())
+            if sha256 == part.sha256 { Ok(file) } else { Err(ReleaseError::Changed { path: file }) }
+        })
     }
 }
 

@@ -1,7 +1,7 @@
 //! Table `dem_fits`: what `sastrugi fit A B C --table` writes.
 
 use super::{Cell, CellType, Column, FitRow, Record, Table};
-use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
 
 super::table! {
     /// Columns of `dem_fits` that `fits` does not have.
@@ -27,14 +27,13 @@ super::table! {
 
 /// One row per DEM fitted with the same settings: the file, the columns of `fits`, the co-registration where a DEM was
 /// subtracted, what the fit is good for, and what went wrong.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct DemFitRow {
     /// DEM as it was named in the call.
     pub file: String,
     /// The fit; without one its figures are unknown.
     pub fit: FitRow,
     /// Co-registration, verdict and what a texture carries; a co-registration is known without a fit too.
-    #[serde(flatten)]
     pub beside: BesideFit,
     /// Why there is no fit.
     pub error: Option<String>,
@@ -80,11 +79,21 @@ impl Record for DemFitRow {
         name: "dem_fits",
         description: "One row per DEM fitted by one call of `fit`: file, columns of `fits`, co-registration, why there is no fit.",
         columns: &COLUMNS,
+        file_per: None,
     };
 
     fn cells(&self) -> Vec<Cell> {
         let inner = self.fit.cells().into_iter().chain(self.beside.cells());
         [self.file.to_cell()].into_iter().chain(inner).chain([self.error.to_cell()]).collect()
+    }
+
+    /// The fit's own columns stand apart.
+    fn to_json(&self) -> Value {
+        let mut object = self.beside.to_json();
+        object["file"] = json!(self.file);
+        object["fit"] = self.fit.to_json();
+        object["error"] = json!(self.error);
+        object
     }
 
     fn from_cells(cells: Vec<Cell>) -> Option<Self> {

@@ -40,7 +40,9 @@ pub use structure::StructureRow;
 pub use surfaces::SurfaceRow;
 pub use terrains::TerrainRow;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value, json};
+use std::cmp::Ordering;
 
 /// Storage type of a column. Every column may hold nulls except key columns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -84,6 +86,21 @@ pub struct Table {
     pub description: &'static str,
     /// Columns in order.
     pub columns: &'static [Column],
+    /// The key of which every value has a file of its own in a release; without one all rows are in one file.
+    #[serde(skip)]
+    pub file_per: Option<&'static str>,
+}
+
+impl Table {
+    /// Number of key columns.
+    pub fn key_count(&self) -> usize {
+        self.columns.iter().take_while(|c| c.key).count()
+    }
+
+    /// Position of a column.
+    pub fn position(&self, column: &str) -> Option<usize> {
+        self.columns.iter().position(|c| c.name == column)
+    }
 }
 
 /// All tables, in the order of the report and of `schema`.
@@ -114,31 +131,49 @@ pub fn by_name(name: &str) -> Option<&'static Table> {
     ALL.into_iter().find(|t| t.name == name)
 }
 
-/// One value of a row.
-#[derive(Clone, Debug, PartialEq)]
+/// One value of a row. As JSON it is the bare value.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
 pub enum Cell {
     /// No value.
     Null,
-    /// Text.
-    Text(String),
-    /// Float. NaN is stored as null: a figure is known or it is not.
-    F64(f64),
-    /// Integer.
-    I64(i64),
     /// Boolean.
     Bool(bool),
+    /// Integer.
+    I64(i64),
+    /// Float. NaN is stored as null: a figure is known or it is not.
+    F64(f64),
+    /// Text.
+    Text(String),
     /// List of 32-bit floats. An element that is NaN is stored as null.
     F32List(Vec<f32>),
     /// List of 64-bit floats. An element that is NaN is stored as null.
     F64List(Vec<f64>),
 }
 
+/// The order of two rows by their keys, which stand in the same columns.
+pub fn compare_keys(a: &[Cell], b: &[Cell]) -> Ordering {
+    let pairs = a.iter().zip(b).map(|(a, b)| match (a, b) {
+        (Cell::Text(a), Cell::Text(b)) => a.cmp(b),
+        (Cell::I64(a), Cell::I64(b)) => a.cmp(b),
+        (Cell::Bool(a), Cell::Bool(b)) => a.cmp(b),
+        (Cell::F64(a), Cell::F64(b)) => a.total_cmp(b),
+        _ => Ordering::Equal,
+    });
+    pairs.fold(Ordering::Equal, Ordering::then)
+}
+
 /// A row type.
-pub trait Record: Serialize + serde::de::DeserializeOwned + Clone + Send {
+pub trait Record: Clone + Send {
     /// Its table.
     const TABLE: Table;
     /// The row's values in column order.
     fn cells(&self) -> Vec<Cell>;
+    /// The row as a JSON object, by column.
+    fn to_json(&self) -> Value {
+        let value = |(column, cell): (&Column, Cell)| (column.name.to_owned(), json!(cell));
+        Self::TABLE.columns.iter().zip(self.cells()).map(value).collect::<Map<String, Value>>().into()
+    }
     /// A row from its values in column order; `None` when a value has the wrong type or a key is null.
     fn from_cells(cells: Vec<Cell>) -> Option<Self>;
 }
@@ -221,68 +256,31 @@ impl<T: CellType> CellType for Option<T> {
     }
 }
 
-/// Floats of rows pass through JSON records of the work area, which has no NaN: null stands for it.
-pub(crate) mod nan_as_null {
-    use serde::{Deserialize, Deserializer, Serialize, Serializer};
-
-    pub fn serialize<T: AsField, S: Serializer>(value: &T, s: S) -> Result<S::Ok, S::Error> {
-        value.as_field().serialize(s)
-    }
-    pub fn deserialize<'de, T: AsField, D: Deserializer<'de>>(d: D) -> Result<T, D::Error> {
-        T::Field::deserialize(d).map(T::from_field)
-    }
-
-    /// The form a field takes in JSON.
-    pub trait AsField: Sized {
-        type Field: Serialize + for<'de> Deserialize<'de>;
-        fn as_field(&self) -> Self::Field;
-        fn from_field(field: Self::Field) -> Self;
-    }
-    impl AsField for f64 {
-        type Field = Option<f64>;
-        fn as_field(&self) -> Option<f64> {
-            (!self.is_nan()).then_some(*self)
-        }
-        fn from_field(field: Option<f64>) -> Self {
-            field.unwrap_or(f64::NAN)
-        }
-    }
-    macro_rules! as_list {
-        ($($t:ty),*) => {$(impl AsField for Vec<$t> {
-            type Field = Vec<Option<$t>>;
-            fn as_field(&self) -> Vec<Option<$t>> {
-                self.iter().map(|v| (!v.is_nan()).then_some(*v)).collect()
-            }
-            fn from_field(field: Vec<Option<$t>>) -> Self {
-                field.into_iter().map(|v| v.unwrap_or(<$t>::NAN)).collect()
-            }
-        })*};
-    }
-    as_list!(f32, f64);
-    macro_rules! as_itself {
-        ($($t:ty),*) => {$(impl AsField for $t {
-            type Field = $t;
-            fn as_field(&self) -> $t { self.clone() }
-            fn from_field(field: $t) -> Self { field }
-        })*};
-    }
-    as_itself!(String, i64, bool, Option<String>, Option<f64>, Option<i64>, Option<bool>);
+/// The name of a column, where one is given.
+macro_rules! name_of {
+    () => {
+        None
+    };
+    ($column:ident) => {
+        Some(stringify!($column))
+    };
 }
+pub(crate) use name_of;
 
 /// Declares a row type and its table together.
 macro_rules! table {
     (
         $(#[doc = $table_doc:literal])+
-        $table:literal $row:ident {
+        $table:literal $row:ident $(file per $file_per:ident)? {
             $(keys { $($(#[doc = $key_doc:literal])+ $key:ident: $key_type:ty,)+ })?
             $($(#[doc = $doc:literal])+ $field:ident: $type:ty [$unit:literal],)+
         }
     ) => {
         $(#[doc = $table_doc])+
-        #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+        #[derive(Clone, Debug, PartialEq)]
         pub struct $row {
-            $($($(#[doc = $key_doc])+ #[serde(with = "crate::tables::nan_as_null")] pub $key: $key_type,)+)?
-            $($(#[doc = $doc])+ #[serde(with = "crate::tables::nan_as_null")] pub $field: $type,)+
+            $($($(#[doc = $key_doc])+ pub $key: $key_type,)+)?
+            $($(#[doc = $doc])+ pub $field: $type,)+
         }
 
         impl $crate::tables::Record for $row {
@@ -305,6 +303,7 @@ macro_rules! table {
                         description: concat!($($doc),+).trim_ascii(),
                     },)+
                 ],
+                file_per: $crate::tables::name_of!($($file_per)?),
             };
 
             fn cells(&self) -> Vec<$crate::tables::Cell> {

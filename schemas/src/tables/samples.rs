@@ -6,7 +6,7 @@
 super::table! {
     /// One row per recorded instant of a mission: base_link in the map frame, the commands, the wheels. A list has one value
     /// per wheel, in the order of the vehicle's wheels: axle by axle from the front, left before right.
-    "samples" SampleRow {
+    "samples" SampleRow file per terrain_id {
         keys {
             /// Id of the terrain.
             terrain_id: String,

@@ -2,15 +2,22 @@
 
 use super::{assert_sound, made_up};
 use crate::{Companions, ReportError, Summary, render, render_with};
+use sastrugi_schemas::Record;
 use sastrugi_schemas::manifest::{FailedItem, Origin};
 use sastrugi_store::dem::{self, Crs};
-use sastrugi_store::release::{Head, ReleaseBuilder};
+use sastrugi_store::release::{Head, PartWriter, ReleaseBuilder, TablePart};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
 const STUDY: &str =
     "[study]\nname = \"made-up\"\ntitle = \"A <title>\"\nseed = 7\ndate = \"2026-11-21\"\ncreators = [\"A\", \"B\"]\n";
+
+fn write_table<R: Record + Sync>(builder: &mut ReleaseBuilder, name: &str, rows: Vec<R>) {
+    let part = TablePart { table: &R::TABLE, name: name.to_owned(), origin: Origin::default() };
+    let fill = |_: &TablePart, writer: &mut PartWriter<'_>| rows.iter().try_for_each(|row| writer.push(row.cells()));
+    builder.write_tables(vec![part], fill).unwrap();
+}
 
 /// A release that will be `dest`, not sealed.
 fn assembled(dest: &Path) -> ReleaseBuilder {
@@ -35,21 +42,21 @@ fn assembled(dest: &Path) -> ReleaseBuilder {
         builder.write_text(path, &serde_json::to_string(fit).unwrap(), Origin::default()).unwrap();
     }
     builder.write_text("study.toml", STUDY, Origin::default()).unwrap();
-    builder.write_table("0000", data.terrains, Origin::default()).unwrap();
-    builder.write_table("0000", data.fits, Origin::default()).unwrap();
-    builder.write_table("0000", data.covariance, Origin::default()).unwrap();
-    builder.write_table("0000", data.candidates, Origin::default()).unwrap();
-    builder.write_table("0000", data.candidate_curves, Origin::default()).unwrap();
-    builder.write_table("0000", data.likelihood_profile, Origin::default()).unwrap();
-    builder.write_table("0000", data.surfaces, Origin::default()).unwrap();
-    builder.write_table("0000", data.structure, Origin::default()).unwrap();
-    builder.write_table("0000", data.profile_psd, Origin::default()).unwrap();
-    builder.write_table("0000", data.psd, Origin::default()).unwrap();
-    builder.write_table("0000", data.heights, Origin::default()).unwrap();
-    builder.write_table("0000", data.missions, Origin::default()).unwrap();
-    builder.write_table("0000", data.replicates, Origin::default()).unwrap();
+    write_table(&mut builder, TablePart::WHOLE, data.terrains);
+    write_table(&mut builder, TablePart::WHOLE, data.fits);
+    write_table(&mut builder, TablePart::WHOLE, data.covariance);
+    write_table(&mut builder, TablePart::WHOLE, data.candidates);
+    write_table(&mut builder, TablePart::WHOLE, data.candidate_curves);
+    write_table(&mut builder, TablePart::WHOLE, data.likelihood_profile);
+    write_table(&mut builder, TablePart::WHOLE, data.surfaces);
+    write_table(&mut builder, TablePart::WHOLE, data.structure);
+    write_table(&mut builder, TablePart::WHOLE, data.profile_psd);
+    write_table(&mut builder, TablePart::WHOLE, data.psd);
+    write_table(&mut builder, TablePart::WHOLE, data.heights);
+    write_table(&mut builder, TablePart::WHOLE, data.missions);
+    write_table(&mut builder, TablePart::WHOLE, data.replicates);
     for (terrain, samples) in shelf.samples {
-        builder.write_table(&terrain, samples, Origin::default()).unwrap();
+        write_table(&mut builder, &terrain, samples);
     }
     builder
 }

@@ -4,6 +4,7 @@ use crate::Verdict;
 use crate::args::{Analyze, Common};
 use crate::failure::{Code, Failure};
 use crate::output::{columns, print, warn};
+use sastrugi_schemas::Record;
 use sastrugi_schemas::tables::LogRow;
 use sastrugi_stages::Error;
 use sastrugi_stages::verbs::analyze::{Judged, Request, write};
@@ -47,7 +48,7 @@ pub fn analyze(args: &Analyze, common: &Common) -> Verdict {
     refused.iter().for_each(|error| warn(&format!("sastrugi: {error}")));
     let rows: Vec<LogRow> = judged.iter().map(|one| one.row.clone()).collect();
     args.output.as_ref().map(|path| write(path, &rows)).transpose()?;
-    let record: Vec<_> = judged.iter().map(|one| json!({ "log": one.row, "notes": one.notes })).collect();
+    let record: Vec<_> = judged.iter().map(|one| json!({ "log": one.row.to_json(), "notes": one.notes })).collect();
     let text: Vec<String> = judged.iter().map(text).collect();
     print(common.json, &json!(record), &text.join("\n\n"))?;
     let whole = refused.is_empty() && rows.iter().all(|row| row.broken.is_none());

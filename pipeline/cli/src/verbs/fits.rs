@@ -6,10 +6,10 @@ use crate::Verdict;
 use crate::args::{Common, Fit};
 use crate::failure::{Code, Failure};
 use crate::output::{columns, print, significant, warn};
+use sastrugi_schemas::Record;
 use sastrugi_schemas::fit::{FitFile, Intervals, Quoted, SILL_OVER_RANGE};
 use sastrugi_schemas::tables::DemFitRow;
 use sastrugi_stages::verbs::fits::{self, Request};
-use serde_json::json;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -37,7 +37,7 @@ pub fn fits(args: &Fit, common: &Common) -> Verdict {
         }
         Ok(Err(error)) | Err(error) => warn(&failure(dem, &error.to_string())),
     })?;
-    print(common.json, &json!(rows), &text(&rows, &fitted))?;
+    print(common.json, &rows.iter().map(Record::to_json).collect(), &text(&rows, &fitted))?;
     Ok(match rows.iter().filter(|row| row.error.is_some()).count() {
         0 => Code::Done,
         failed if failed == rows.len() => Code::Failed,

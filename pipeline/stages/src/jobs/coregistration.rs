@@ -1,6 +1,6 @@
 //! Co-registration of two DEMs that were read, and what is said of it.
 
-use super::JobError;
+use crate::job::JobError;
 use sastrugi_schemas::coregistration::{Coregistration, Minus};
 use sastrugi_store::dem::Dem;
 use sastrugi_texture::coregister::{Coregistered, SIGNIFICANCE, coregister};

@@ -1,8 +1,9 @@
 //! Stage `dem`: a measured DEM into metres, window applied.
 
 use super::original::{self, Original};
-use super::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work, raster_options, raster_packing};
-use crate::registry::{BuildError, Builder, Heightfield, InputPlace};
+use super::rasters::{raster_options, raster_packing};
+use crate::builder::{BuildError, Builder, Heightfield, InputPlace};
+use crate::job::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work};
 use crate::revision::Room;
 use crate::runner::graph::Node;
 use crate::study::terms::{self, Objection};
@@ -129,9 +130,9 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
         let job = DemJob { item, original: original.item.clone(), release_path, bytes, claimed, geotiff };
         let parents = vec![original.item.clone()];
         let node = Node { item: field.item.clone(), parents, inputs, stream: None, job: Box::new(job) };
-        builder.node(&entry, original)?;
-        builder.node(&entry, node)?;
-        builder.heightfield(&entry, &id, field)?;
+        builder.node(original)?;
+        builder.node(node)?;
+        builder.heightfields.insert(id.clone(), field);
         builder.name_family(&entry, &id, vec![id.clone()])?;
     }
     Ok(())

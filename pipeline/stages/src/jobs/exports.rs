@@ -1,6 +1,6 @@
 //! Folders of a terrain to import into simulators: `export/<id>/<simulator>/` of the release.
 
-use super::{JobError, Outcome, Product, Work};
+use crate::job::{JobError, Outcome, Product, Work};
 use sastrugi_numeric::{Geometry, Grid};
 use sastrugi_schemas::study::Simulator;
 use sastrugi_store::dem::DemError;

@@ -1,10 +1,11 @@
 //! Stage `fit`: the covariance of a measured DEM.
 
+use super::coregistration;
 use super::dem::{HEIGHTS, PLACE, Place, input_error};
 use super::mask::{self, Mask};
-use super::surface::{Surface, describe_residual};
-use super::{Estimate, ItemRef, Job, JobError, Outcome, Product, Rows, Work, coregistration};
-use crate::registry::{BuildError, Builder, unknown_id};
+use super::surface::{Surface, SurfaceRows};
+use crate::builder::{BuildError, Builder, unknown_id};
+use crate::job::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work};
 use crate::revision::Room;
 use crate::runner::graph::Node;
 use crate::study::Entry;
@@ -139,7 +140,7 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
                 stream: Some(job.streams.label()),
                 job: Box::new(job),
             };
-            builder.node(&entry, node)?;
+            builder.node(node)?;
             builder.fits.push(one.id);
         }
     }
@@ -219,15 +220,15 @@ impl Job for FitJob {
         dem::write_classes(&work.output(MASK), &mask, &read.info.crs).map_err(JobError::io)?;
         products.push(Product::released(MASK, format!("fit/{id}.{MASK}"), Some(digest::classes(&mask))));
         let surface = Surface { id, stage: STAGE, fit_id: Some(id), grid: &residual };
-        let rows = Rows {
-            fits: vec![fit_row(id, &self.dem_id, &fit)],
-            covariance: covariance_rows(id, &fit, &band),
-            candidates: candidate_rows(id, &fit),
-            candidate_curves: curve_rows(id, &fit),
-            likelihood_profile: profile_rows(id, &fit),
-            ..describe_residual(&surface, &fit)
-        };
-        Ok(Outcome { products, rows, notes: notes.into_iter().chain(fit.warnings).collect() })
+        let mut outcome = Outcome { products, notes };
+        outcome.write_rows(work, [fit_row(id, &self.dem_id, &fit)])?;
+        outcome.write_rows(work, covariance_rows(id, &fit, &band))?;
+        outcome.write_rows(work, candidate_rows(id, &fit))?;
+        outcome.write_rows(work, curve_rows(id, &fit))?;
+        outcome.write_rows(work, profile_rows(id, &fit))?;
+        SurfaceRows::of_residual(&surface, &fit).write(work, &mut outcome)?;
+        outcome.notes.extend(fit.warnings);
+        Ok(outcome)
     }
 }
 

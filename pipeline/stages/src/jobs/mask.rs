@@ -2,8 +2,8 @@
 
 use super::dem::{PLACE, Place};
 use super::original::Original;
-use super::{ItemRef, JobError, Work};
-use crate::registry::{BuildError, Builder, InputPlace};
+use crate::builder::{BuildError, Builder, InputPlace};
+use crate::job::{ItemRef, JobError, Work};
 use crate::study::Entry;
 use sastrugi_numeric::Grid;
 use sastrugi_schemas::fit::MaskSource;
@@ -41,7 +41,7 @@ pub fn add(builder: &mut Builder<'_>, entry: &Entry<'_>, item: &FitItem) -> Resu
     };
     let files = named(&item.mask, "mask", false).into_iter().chain(named(&item.exclude, "exclude", true));
     let copy = |(number, (key, file, excludes))| {
-        Mask::copied(builder, entry, &format!("{}-{}", item.id, number + 1), key, (file, excludes))
+        Mask::copied(builder, &format!("{}-{}", item.id, number + 1), key, (file, excludes))
     };
     (0usize..).zip(files).map(copy).collect()
 }
@@ -57,13 +57,12 @@ pub fn add_noise_reference(
 ) -> Result<Option<Mask>, BuildError> {
     let Some(file) = item.noise_reference.clone() else { return Ok(None) };
     let key = entry.path_of("noise_reference");
-    Mask::copied(builder, entry, &format!("{}-noise", item.id), key, (file, false)).map(Some)
+    Mask::copied(builder, &format!("{}-noise", item.id), key, (file, false)).map(Some)
 }
 
 impl Mask {
     fn copied(
         builder: &mut Builder<'_>,
-        entry: &Entry<'_>,
         id: &str,
         key: Vec<String>,
         (file, excludes): (String, bool),
@@ -74,7 +73,7 @@ impl Mask {
         let source = MaskSource { file: super::original::name(&release_path).to_owned(), sha256, excludes };
         let mask = Self { item: node.item.clone(), release_path: release_path.clone(), source };
         builder.inputs.push(InputPlace { key, release_path });
-        builder.node(entry, node)?;
+        builder.node(node)?;
         Ok(mask)
     }
 

@@ -1,8 +1,9 @@
 //! Stage `missions`: straight missions drawn on the closed class map of each heightfield.
 
 use super::dem::input_error;
-use super::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work, roughness, terrain};
-use crate::registry::{BuildError, Builder};
+use super::roughness;
+use crate::builder::{BuildError, Builder, Drawn, Lines, common};
+use crate::job::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work};
 use crate::revision::Room;
 use crate::runner::graph::Node;
 use crate::study::Entry;
@@ -30,49 +31,6 @@ pub fn kinds() -> Vec<Kind> {
         source: "Majhor and Bos, section 2.3",
         parameters: schema_of::<MissionParameters>(),
     }]
-}
-
-/// Missions that a traverse can refer to.
-#[derive(Clone, Debug)]
-pub struct Drawn {
-    /// What is drawn on each heightfield.
-    pub lines: Vec<Lines>,
-    /// Missions on each.
-    pub count: usize,
-    /// Length, m.
-    pub length_m: f64,
-}
-
-/// The missions of one heightfield.
-#[derive(Clone, Debug)]
-pub struct Lines {
-    /// Heightfield.
-    pub heightfield: String,
-    /// Item that draws them.
-    pub item: ItemRef,
-    /// Random streams are named by this: the heightfield, or what it shares with others.
-    pub word: String,
-    /// Rules of the draw.
-    pub settings: MissionSettings,
-    /// Number of the replicates that share draws with this one, from 0.
-    shared: Option<u64>,
-}
-
-impl Lines {
-    /// Name of a mission's start and goal, for one-by-one comparison.
-    pub fn pair_id(&self, mission: &Mission) -> String {
-        match self.shared {
-            None => format!("{}-{:04}", self.item.id, mission.index + 1),
-            // The same draw is the same line on all that share it.
-            Some(_) => format!("{}-{:04}.{}", self.block(), mission.index + 1, mission.draws),
-        }
-    }
-
-    /// Name of what shares draws: `<missions>-<replicate>`.
-    fn block(&self) -> String {
-        let missions = self.item.id.split_once('@').map_or("", |(missions, _)| missions);
-        format!("{missions}-{:04}", self.shared.unwrap_or(0) + 1)
-    }
 }
 
 struct MissionsJob {
@@ -118,7 +76,7 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
             };
             let parents = vec![roughness::item(&one.heightfield)];
             let item = one.item.clone();
-            builder.node(&entry, Node { item, parents, inputs: Vec::new(), stream, job: Box::new(job) })?;
+            builder.node(Node { item, parents, inputs: Vec::new(), stream, job: Box::new(job) })?;
         }
         let drawn = Drawn { lines, count: settings.count(), length_m: settings.length_m() };
         builder.missions.insert(envelope.id, drawn);
@@ -133,7 +91,7 @@ fn lines(builder: &Builder<'_>, missions: &str, settings: &MissionSettings, heig
     let shared = known.and_then(|field| field.replicate);
     Lines {
         item: ItemRef::new(STAGE, &format!("{missions}@{heightfield}")),
-        word: shared.map_or_else(|| heightfield.clone(), terrain::common),
+        word: shared.map_or_else(|| heightfield.clone(), common),
         settings: settings.clone(),
         shared,
         heightfield,

@@ -3,8 +3,8 @@
 //! An item of its own, so that a release whose import failed still holds what it was made from. Masks are copied in the same
 //! way (stage `mask`).
 
-use super::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work};
-use crate::registry::{BuildError, input_file};
+use crate::builder::{BuildError, input_file};
+use crate::job::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work};
 use crate::revision::Room;
 use crate::runner::graph::{InputFile, Node};
 use sastrugi_store::{atomic, digest};

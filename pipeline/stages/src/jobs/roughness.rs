@@ -1,17 +1,15 @@
 //! Stage `roughness`: every heightfield of a study described and classified.
 
 use super::dem::{HEIGHTS, input_error};
-use super::surface::{self, Surface};
-use super::{Estimate, ItemRef, Job, JobError, Outcome, Product, Rows, Work};
-use crate::registry::Heightfield;
+use super::surface::{Surface, SurfaceRows};
+use crate::builder::{BuildError, Builder, Heightfield};
+use crate::job::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work};
 use crate::revision::Room;
+use crate::runner::graph::Node;
 use sastrugi_numeric::Grid;
-use sastrugi_roughness::{
-    ClassThresholds, DescribeSettings, HistogramBin, SpectrumBin, Summary, classify, close_disk, describe,
-    moore_gradient,
-};
+use sastrugi_roughness::{ClassThresholds, DescribeSettings, Summary, classify, close_disk, describe, moore_gradient};
 use sastrugi_schemas::study::RoughnessSection;
-use sastrugi_schemas::tables::{HeightDistributionRow, PsdRow, TerrainRow};
+use sastrugi_schemas::tables::TerrainRow;
 use sastrugi_store::{dem, digest};
 use serde_json::{Value, json};
 
@@ -22,19 +20,30 @@ pub const CLASSES: &str = "classes.tif";
 /// Class map before closing.
 pub const CLASSES_RAW: &str = "classes.raw.tif";
 
+/// Adds one item for every heightfield of the study, which describes and classifies it.
+///
+/// # Errors
+/// None of a study's own.
+pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
+    let node = |(id, field): (&String, &Heightfield)| Node {
+        item: item(id),
+        parents: vec![field.item.clone()],
+        inputs: Vec::new(),
+        stream: None,
+        job: Box::new(RoughnessJob { id: id.clone(), field: field.clone(), section: builder.study.roughness.clone() }),
+    };
+    let nodes: Vec<Node> = builder.heightfields.iter().map(node).collect();
+    Ok(nodes.into_iter().try_for_each(|node| builder.node(node))?)
+}
+
 /// Describes one heightfield.
-pub struct RoughnessJob {
+struct RoughnessJob {
     id: String,
     field: Heightfield,
     section: RoughnessSection,
 }
 
 impl RoughnessJob {
-    /// The job for the heightfield `id`.
-    pub fn new(id: &str, field: &Heightfield, section: &RoughnessSection) -> Self {
-        Self { id: id.to_owned(), field: field.clone(), section: section.clone() }
-    }
-
     fn terrain_row(&self, grid: &Grid, summary: &Summary) -> TerrainRow {
         let heights = &summary.heights;
         TerrainRow {
@@ -69,31 +78,6 @@ impl RoughnessJob {
             path: self.field.release_path.clone(),
         }
     }
-}
-
-/// Rows of the table `psd`.
-pub fn psd_rows(id: &str, spectrum: &[SpectrumBin]) -> Vec<PsdRow> {
-    let row = |(bin, b): (usize, &SpectrumBin)| PsdRow {
-        terrain_id: id.to_owned(),
-        bin: bin as i64,
-        frequency_cycles_m: b.frequency_cycles_m,
-        psd_m4: b.psd_m4,
-        modes: b.modes as i64,
-    };
-    spectrum.iter().enumerate().map(row).collect()
-}
-
-/// Rows of the table `height_distribution`.
-pub fn height_rows(id: &str, histogram: &[HistogramBin]) -> Vec<HeightDistributionRow> {
-    let row = |(bin, b): (usize, &HistogramBin)| HeightDistributionRow {
-        terrain_id: id.to_owned(),
-        bin: bin as i64,
-        low_m: b.low_m,
-        high_m: b.high_m,
-        cells: b.cells as i64,
-        density_per_m: b.density_per_m,
-    };
-    histogram.iter().enumerate().map(row).collect()
 }
 
 /// Settings of the kernel.
@@ -148,15 +132,11 @@ impl Job for RoughnessJob {
             Product::released(CLASSES, format!("classes/{id}.tif"), Some(digest::classes(&closed))),
             Product::released(CLASSES_RAW, format!("classes/{id}.raw.tif"), Some(digest::classes(&raw))),
         ];
-        let mut rows = Rows {
-            terrains: vec![self.terrain_row(&read.grid, &summary)],
-            psd: psd_rows(id, &summary.spectrum),
-            height_distribution: height_rows(id, &summary.histogram),
-            ..Rows::default()
-        };
+        let mut outcome = Outcome { products, notes: Vec::new() };
+        outcome.write_rows(work, [self.terrain_row(&read.grid, &summary)])?;
         let surface = Surface { id, stage: &self.field.item.stage, fit_id: None, grid: &read.grid };
-        surface::add(&mut rows, &surface, &summary.areal);
-        Ok(Outcome { products, rows, notes: Vec::new() })
+        SurfaceRows::of(&surface, &summary.spectrum, &summary.histogram, &summary.areal).write(work, &mut outcome)?;
+        Ok(outcome)
     }
 }
 

@@ -1,7 +1,7 @@
 //! Stage `scoreboard`: all methods of a texture side by side.
 
 use super::texture::Matched;
-use super::{Estimate, Job, JobError, Outcome, Rows, Work};
+use crate::job::{Estimate, Job, JobError, Outcome, Work};
 use crate::revision::Room;
 use sastrugi_numeric::Streams;
 use sastrugi_schemas::tables::{ScoreCovarianceRow, ScoreRow};
@@ -120,14 +120,17 @@ impl Job for ScoreboardJob {
     }
 
     fn run(&self, work: &Work<'_>) -> Result<Outcome, JobError> {
-        let mut rows = Rows::default();
+        let (mut scores, mut curves) = (Vec::new(), Vec::new());
         let mut entrants: Vec<&Entrant> = self.entrants.iter().collect();
         entrants.sort_by(|a, b| a.method.cmp(&b.method));
         for entrant in entrants {
             let (row, curve) = self.rows(entrant, work)?;
-            rows.scoreboard.push(row);
-            rows.scoreboard_covariance.extend(curve);
+            scores.push(row);
+            curves.extend(curve);
         }
-        Ok(Outcome { rows, ..Outcome::default() })
+        let mut outcome = Outcome::default();
+        outcome.write_rows(work, scores)?;
+        outcome.write_rows(work, curves)?;
+        Ok(outcome)
     }
 }

@@ -1,14 +1,14 @@
 //! Rows that describe a surface, whichever stage made it.
 
-use super::Rows;
-use super::roughness::{height_rows, psd_rows};
+use crate::job::{JobError, Outcome, Work};
 use sastrugi_numeric::Grid;
 use sastrugi_roughness::multifractality::ScalingExponent;
 use sastrugi_roughness::{
-    ArealFigures, Direction, ProfileBin, SpectralMap, StructureBin, areal_figures, default_slope_band, histogram,
+    ArealFigures, Direction, HistogramBin, ProfileBin, SpectralMap, SpectrumBin, StructureBin, areal_figures,
+    default_slope_band, histogram,
 };
 use sastrugi_schemas::fit::FitFile;
-use sastrugi_schemas::tables::{ProfilePsdRow, StructureRow, SurfaceRow};
+use sastrugi_schemas::tables::{HeightDistributionRow, ProfilePsdRow, PsdRow, StructureRow, SurfaceRow};
 
 /// Bins of the height distribution of a residual, as many as a heightfield's.
 const HISTOGRAM_BINS: usize = 64;
@@ -27,31 +27,57 @@ pub struct Surface<'a> {
     pub grid: &'a Grid,
 }
 
-/// Rows of the tables `psd`, `height_distribution`, `surfaces`, `structure` and `profile_psd` for what a fit leaves of a
-/// surface: the residual of its DEM, or a texture treated alike. Both share the lags of the Hurst exponent.
-pub fn describe_residual(surface: &Surface<'_>, fit: &FitFile) -> Rows {
-    let map = SpectralMap::of(surface.grid);
-    let band = default_slope_band(&surface.grid.geometry);
-    let lags = fit
-        .cell_m
-        .zip(fit.window_m)
-        .map(|(cell, window)| [cell[0].max(cell[1]), HURST_WINDOWS * window[0].min(window[1])]);
-    let areal = areal_figures(surface.grid, map.as_ref(), band, lags);
-    let spectrum = map.as_ref().map_or_else(Vec::new, SpectralMap::rings);
-    let mut rows = Rows {
-        psd: psd_rows(surface.id, &spectrum),
-        height_distribution: height_rows(surface.id, &histogram(surface.grid, HISTOGRAM_BINS)),
-        ..Rows::default()
-    };
-    add(&mut rows, surface, &areal);
-    rows
+/// Rows of the tables `surfaces`, `structure`, `profile_psd`, `psd` and `height_distribution`.
+pub struct SurfaceRows {
+    surface: SurfaceRow,
+    structure: Vec<StructureRow>,
+    profile_psd: Vec<ProfilePsdRow>,
+    psd: Vec<PsdRow>,
+    height_distribution: Vec<HeightDistributionRow>,
 }
 
-/// Adds the rows of the tables `surfaces`, `structure` and `profile_psd`.
-pub fn add(rows: &mut Rows, surface: &Surface<'_>, areal: &ArealFigures) {
-    rows.surfaces.push(row(surface, areal));
-    rows.structure.extend(structure_rows(surface.id, &areal.structure));
-    rows.profile_psd.extend(profile_rows(surface.id, &areal.profiles));
+impl SurfaceRows {
+    /// What is known of a surface, as rows.
+    pub fn of(
+        surface: &Surface<'_>,
+        spectrum: &[SpectrumBin],
+        histogram: &[HistogramBin],
+        areal: &ArealFigures,
+    ) -> Self {
+        Self {
+            surface: row(surface, areal),
+            structure: structure_rows(surface.id, &areal.structure),
+            profile_psd: profile_rows(surface.id, &areal.profiles),
+            psd: psd_rows(surface.id, spectrum),
+            height_distribution: height_rows(surface.id, histogram),
+        }
+    }
+
+    /// What a fit leaves of a surface: the residual of its DEM, or a texture treated alike. Both share the lags of the Hurst
+    /// exponent.
+    pub fn of_residual(surface: &Surface<'_>, fit: &FitFile) -> Self {
+        let map = SpectralMap::of(surface.grid);
+        let band = default_slope_band(&surface.grid.geometry);
+        let lags = fit
+            .cell_m
+            .zip(fit.window_m)
+            .map(|(cell, window)| [cell[0].max(cell[1]), HURST_WINDOWS * window[0].min(window[1])]);
+        let areal = areal_figures(surface.grid, map.as_ref(), band, lags);
+        let spectrum = map.as_ref().map_or_else(Vec::new, SpectralMap::rings);
+        Self::of(surface, &spectrum, &histogram(surface.grid, HISTOGRAM_BINS), &areal)
+    }
+
+    /// Writes them as an item's.
+    ///
+    /// # Errors
+    /// When a file cannot be written.
+    pub fn write(self, work: &Work<'_>, outcome: &mut Outcome) -> Result<(), JobError> {
+        outcome.write_rows(work, [self.surface])?;
+        outcome.write_rows(work, self.structure)?;
+        outcome.write_rows(work, self.profile_psd)?;
+        outcome.write_rows(work, self.psd)?;
+        outcome.write_rows(work, self.height_distribution)
+    }
 }
 
 fn row(surface: &Surface<'_>, areal: &ArealFigures) -> SurfaceRow {
@@ -118,6 +144,29 @@ fn profile_rows(id: &str, bins: &[ProfileBin]) -> Vec<ProfilePsdRow> {
         modes: b.modes as i64,
     };
     numbered(bins, |b| b.direction).map(row).collect()
+}
+
+fn psd_rows(id: &str, spectrum: &[SpectrumBin]) -> Vec<PsdRow> {
+    let row = |(bin, b): (usize, &SpectrumBin)| PsdRow {
+        terrain_id: id.to_owned(),
+        bin: bin as i64,
+        frequency_cycles_m: b.frequency_cycles_m,
+        psd_m4: b.psd_m4,
+        modes: b.modes as i64,
+    };
+    spectrum.iter().enumerate().map(row).collect()
+}
+
+fn height_rows(id: &str, histogram: &[HistogramBin]) -> Vec<HeightDistributionRow> {
+    let row = |(bin, b): (usize, &HistogramBin)| HeightDistributionRow {
+        terrain_id: id.to_owned(),
+        bin: bin as i64,
+        low_m: b.low_m,
+        high_m: b.high_m,
+        cells: b.cells as i64,
+        density_per_m: b.density_per_m,
+    };
+    histogram.iter().enumerate().map(row).collect()
 }
 
 /// Bins with their numbers, from 0 in each direction.

@@ -2,8 +2,9 @@
 
 use super::dem::{HEIGHTS, input_error};
 use super::exports::Exports;
-use super::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work, raster_options, raster_packing};
-use crate::registry::{BuildError, Builder, Heightfield};
+use super::rasters::{raster_options, raster_packing};
+use crate::builder::{BuildError, Builder, Heightfield, common};
+use crate::job::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work};
 use crate::revision::Room;
 use crate::runner::graph::Node;
 use crate::study::entry::Expanded;
@@ -77,8 +78,8 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
                 stream: field.stream.clone(),
                 job: Box::new(job),
             };
-            builder.node(&entry, node)?;
-            builder.heightfield(&entry, &one.id, field)?;
+            builder.node(node)?;
+            builder.heightfields.insert(one.id, field);
         }
     }
     Ok(())
@@ -98,11 +99,6 @@ fn bases(
         items.push(field.item.clone());
     }
     Ok((items, cells))
-}
-
-/// Word of the random streams that replicate `replicate` (from 0) shares with that of other items when they are paired.
-pub fn common(replicate: u64) -> String {
-    format!("common-{:04}", replicate + 1)
 }
 
 /// An item's id stands for all that it expands to, and the id of each of its swept parts for the replicates.

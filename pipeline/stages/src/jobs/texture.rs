@@ -1,10 +1,12 @@
 //! Stage `texture`: a field that matches a fit, alone or on a base heightfield.
 
 use super::dem::{self as dem_job, HEIGHTS, input_error};
+use super::fit;
+use super::rasters::{raster_options, raster_packing};
 use super::scoreboard::{self, Entrant, ScoreboardJob};
-use super::surface::{Surface, describe_residual};
-use super::{Estimate, ItemRef, Job, JobError, Outcome, Product, Rows, Work, fit, raster_options, raster_packing};
-use crate::registry::{BuildError, Builder, Heightfield, unknown_id};
+use super::surface::{Surface, SurfaceRows};
+use crate::builder::{BuildError, Builder, Heightfield, unknown_id};
+use crate::job::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work};
 use crate::revision::Room;
 use crate::runner::graph::Node;
 use crate::study::{Entry, Expanded, StudyError};
@@ -138,7 +140,7 @@ impl Base {
 
 /// The DEM of a fit: the first of its parents.
 fn fitted_dem<'b>(builder: &'b Builder<'_>, fit: &ItemRef) -> Option<&'b ItemRef> {
-    builder.nodes().iter().find(|node| node.item == *fit).and_then(|node| node.parents.first())
+    builder.graph.find(fit).and_then(|p| builder.graph.node(p).parents.first())
 }
 
 struct TextureJob {
@@ -239,8 +241,8 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
                 };
                 let stream = field.stream.clone();
                 let node = Node { item: field.item.clone(), parents, inputs: Vec::new(), stream, job: Box::new(job) };
-                builder.node(&entry, node)?;
-                builder.heightfield(&entry, &id, field)?;
+                builder.node(node)?;
+                builder.heightfields.insert(id.clone(), field);
                 ids.push(id);
             }
             if let Some(error) = refusal.filter(|_| entrants.iter().all(|e| e.cost.is_none())) {
@@ -254,7 +256,7 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
                 let parents = matched.parent().into_iter().collect();
                 let job = ScoreboardJob { id: one.id.clone(), matched, entrants, realisations, streams };
                 let item = ItemRef::new(scoreboard::STAGE, &one.id);
-                builder.node(&entry, Node { item, parents, inputs: Vec::new(), stream, job: Box::new(job) })?;
+                builder.node(Node { item, parents, inputs: Vec::new(), stream, job: Box::new(job) })?;
             }
         }
         builder.name_family(&entry, &item.id, ids)?;
@@ -484,7 +486,7 @@ impl Job for TextureJob {
         if self.base.as_ref().is_some_and(|base| base.was_fitted) {
             notes.push(has_its_texture("onto = { background = \"<fit id>\" }"));
         }
-        let rows = self.alike(&grid, &fit);
+        let residual = self.residual(&grid, &fit);
         let (heights, crs) = match &self.base {
             None => (grid, Crs::default()),
             Some(base) => {
@@ -493,18 +495,22 @@ impl Job for TextureJob {
                 (lay_onto(&base.grid, &grid, synthesis.is_periodic(), factors.as_ref())?, base.info.crs)
             }
         };
-        self.released(work, &heights, &crs, rows, notes)
+        let mut outcome = self.released(work, &heights, &crs, notes)?;
+        if let Some(rows) = residual {
+            rows.write(work, &mut outcome)?;
+        }
+        Ok(outcome)
     }
 }
 
 impl TextureJob {
     /// The texture, without its base, detrended and trimmed as the fit's residual was: what that residual is compared with.
-    fn alike(&self, texture: &Grid, fit: &FitFile) -> Rows {
-        let Matched::Item(item) = &self.matched else { return Rows::default() };
-        let Some(residual) = sastrugi_texture::shown::alike(texture, fit) else { return Rows::default() };
+    fn residual(&self, texture: &Grid, fit: &FitFile) -> Option<SurfaceRows> {
+        let Matched::Item(item) = &self.matched else { return None };
+        let residual = sastrugi_texture::shown::alike(texture, fit)?;
         let id = format!("{}.residual", self.id);
         let surface = Surface { id: &id, stage: "alike", fit_id: Some(&item.id), grid: &residual };
-        describe_residual(&surface, fit)
+        Some(SurfaceRows::of_residual(&surface, fit))
     }
 
     /// The DEM with its holes filled.
@@ -513,7 +519,7 @@ impl TextureJob {
         let covariance = Covariance::of_fit(fit).map_err(JobError::new)?;
         let filled = conditional::fill(&dem.grid, &covariance, &self.streams).map_err(JobError::new)?;
         let notes = [filled.to_string()].into_iter().chain(fill_note(fit)).collect();
-        self.released(work, &filled.grid, &dem.info.crs, Rows::default(), notes)
+        self.released(work, &filled.grid, &dem.info.crs, notes)
     }
 
     /// Factors of the texture on its base.
@@ -528,17 +534,10 @@ impl TextureJob {
         })
     }
 
-    fn released(
-        &self,
-        work: &Work<'_>,
-        heights: &Grid,
-        crs: &Crs,
-        rows: Rows,
-        notes: Vec<String>,
-    ) -> Result<Outcome, JobError> {
+    fn released(&self, work: &Work<'_>, heights: &Grid, crs: &Crs, notes: Vec<String>) -> Result<Outcome, JobError> {
         dem::write(&work.output(HEIGHTS), heights, crs, &raster_options(self.geotiff)).map_err(JobError::io)?;
         let content = digest::heights(heights);
         let products = vec![Product::released(HEIGHTS, format!("texture/{}.tif", self.id), Some(content))];
-        Ok(Outcome { products, rows, notes })
+        Ok(Outcome { products, notes })
     }
 }

@@ -1,9 +1,9 @@
 //! Stage `traverse`: all missions of one terrain driven and recorded.
 
 use super::dem::{self as measured, HEIGHTS, input_error};
-use super::missions::{self, Lines};
-use super::{Estimate, ItemRef, Job, JobError, Outcome, Product, Rows, Work, roughness};
-use crate::registry::{BuildError, Builder, Heightfield, unknown_id};
+use super::{missions, roughness};
+use crate::builder::{BuildError, Builder, Heightfield, Lines, unknown_id};
+use crate::job::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work};
 use crate::revision::Room;
 use crate::runner::graph::Node;
 use crate::study::entry::joined;
@@ -23,7 +23,6 @@ use sastrugi_schemas::tables::{MissionRow, ParameterRow, ReplicateRow, SampleRow
 use sastrugi_schemas::topics::{EventKind, Recording};
 use sastrugi_schemas::{Kind, ParameterError};
 use sastrugi_store::mcap::{MissionMcap, TerrainView, bag_metadata, write_mission};
-use sastrugi_store::parquet::{TableMetadata, TableWriter};
 use sastrugi_store::{dem, digest};
 use serde_json::{Map, Value, json};
 use std::borrow::Cow;
@@ -32,8 +31,6 @@ use std::sync::Arc;
 
 /// Name of the stage.
 pub const STAGE: &str = "traverse";
-/// Samples of all missions.
-pub const SAMPLES: &str = "samples.parquet";
 
 /// The one kind of run.
 pub fn kinds() -> Vec<Kind> {
@@ -197,7 +194,7 @@ fn add_one(
         streams,
         terrain,
     };
-    builder.node(entry, Node { item, parents, inputs: Vec::new(), stream, job: Box::new(job) })
+    builder.node(Node { item, parents, inputs: Vec::new(), stream, job: Box::new(job) })
 }
 
 /// One mission driven: its rows, and its recording, which is on disk.
@@ -365,7 +362,7 @@ impl TraverseJob {
         .into()
     }
 
-    /// Every number of the run.
+    /// Every number of the run, by name.
     fn parameters(&self) -> Vec<ParameterRow> {
         let row = |number: Number| ParameterRow {
             traverse_id: self.drive.id.clone(),
@@ -376,23 +373,10 @@ impl TraverseJob {
         let Drive { vehicle, settings, starts, rasters, .. } = &*self.drive;
         let rasters = json!({ "wheel_friction_raster": rasters[0], "rolling_resistance_raster": rasters[1] });
         let more = json!({ "starts": starts, "surface": rasters, "missions": self.lines.settings });
-        numbers(vehicle, settings).into_iter().chain(stated("", &more)).map(row).collect()
-    }
-
-    /// Samples for the assembly, which writes them again with the study's metadata.
-    fn write_samples(&self, work: &Work<'_>, driven: &mut [Driven]) -> Result<(), JobError> {
-        let head = &self.drive.head;
-        let metadata = TableMetadata {
-            study_sha256: String::new(),
-            seed: head.seed,
-            version: env!("CARGO_PKG_VERSION").to_owned(),
-            license: head.license.clone(),
-        };
-        let mut writer = TableWriter::<SampleRow>::create(&work.output(SAMPLES), &metadata).map_err(JobError::io)?;
-        for samples in driven.iter_mut().map(|d| std::mem::take(&mut d.samples)) {
-            samples.iter().try_for_each(|row| writer.push(row)).map_err(JobError::io)?;
-        }
-        writer.finish().map(drop).map_err(JobError::io)
+        let mut rows: Vec<ParameterRow> =
+            numbers(vehicle, settings).into_iter().chain(stated("", &more)).map(row).collect();
+        rows.sort_by(|a, b| a.parameter.cmp(&b.parameter));
+        rows
     }
 }
 
@@ -452,16 +436,16 @@ impl Job for TraverseJob {
         let driven: Result<Vec<Driven>, JobError> =
             missions.par_iter().map(|mission| self.drive(work, &site, &view, mission)).collect();
         let mut driven = driven?;
-        self.write_samples(work, &mut driven)?;
+        // Ids are texts: 10000 comes before 9999.
+        driven.sort_by(|a, b| a.row.mission_id.cmp(&b.row.mission_id));
         let notes = site.ground.warnings().iter().cloned().chain(nowhere_note(&driven)).collect();
-        let mut products = vec![Product::internal(SAMPLES)];
-        let mut rows = Rows { parameters: self.parameters(), ..Rows::default() };
-        for d in driven {
-            products.extend(d.products);
-            rows.missions.push(d.row);
-            rows.replicates.extend(d.replicates);
-        }
-        Ok(Outcome { products, rows, notes })
+        let products = driven.iter_mut().flat_map(|d| std::mem::take(&mut d.products)).collect();
+        let mut outcome = Outcome { products, notes };
+        outcome.write_rows(work, self.parameters())?;
+        outcome.write_rows(work, driven.iter_mut().flat_map(|d| std::mem::take(&mut d.samples)))?;
+        outcome.write_rows(work, driven.iter_mut().flat_map(|d| std::mem::take(&mut d.replicates)))?;
+        outcome.write_rows(work, driven.into_iter().map(|d| d.row))?;
+        Ok(outcome)
     }
 }
 

@@ -1,7 +1,7 @@
 //! From results to a sealed release: artifacts, tables, documents, report, checksums, one rename.
 //!
-//! Records are read one at a time, in order of their ids, and tables are written in row groups: of what an item made, only
-//! the manifest's lines on its files stay in memory.
+//! Records are read one at a time, parents first, and tables are written in row groups: of what an item made, only the manifest's
+//! lines on its files and the keys of its rows stay in memory.
 
 use super::cache::{Record, StoredFile, load_record};
 use super::documents::{self, Described};
@@ -9,21 +9,16 @@ use super::execute::Failure;
 use super::lock;
 use super::progress::Progress;
 use super::sources::Sources;
+use super::tables::Fragments;
 use crate::error::Error;
-use crate::jobs::{ItemRef, Rows, fit, roughness, scoreboard, texture, traverse};
-use crate::splits::{self, Splits};
+use crate::job::ItemRef;
+use crate::splits::Splits;
 use crate::study::Study;
-use sastrugi_schemas::Record as Row;
 use sastrugi_schemas::manifest::{Artifact, FailedItem, ItemNote, Origin};
 use sastrugi_schemas::study::McapFlavour;
-use sastrugi_schemas::tables::{
-    HeightDistributionRow, MissionRow, ParameterRow, ProfilePsdRow, PsdRow, ReplicateRow, SampleRow, StructureRow,
-    SurfaceRow,
-};
 use sastrugi_store::mcap::VIEWER_LAYOUT;
-use sastrugi_store::release::{self, Head, Incoming, Release, ReleaseBuilder, ReleaseError};
+use sastrugi_store::release::{self, Head, Incoming, Release, ReleaseBuilder};
 use serde_json::Value;
-use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
@@ -35,8 +30,8 @@ pub struct Contents<'a> {
     pub text: &'a str,
     /// Which terrains are for training, validation and test.
     pub splits: &'a Splits,
-    /// Every item, parents before children, with the folder of its result.
-    pub items: Vec<(ItemRef, Option<PathBuf>)>,
+    /// Folders of the results, parents before children.
+    pub results: Vec<PathBuf>,
     /// Items without a result.
     pub failures: &'a [Failure],
     /// Whether a release of the same study may be replaced by this one where it has fewer failed items.
@@ -47,14 +42,13 @@ pub struct Contents<'a> {
 ///
 /// # Errors
 /// A destination that is not ours or holds more of the study, results that cannot be read, or a file system that refuses.
-pub fn assemble(mut contents: Contents<'_>, dest: &Path, progress: &dyn Progress) -> Result<Release, Error> {
-    let sources = Sources::of(&contents)?;
-    contents.items.sort();
+pub fn assemble(contents: &Contents<'_>, dest: &Path, progress: &dyn Progress) -> Result<Release, Error> {
+    let mut sources = Sources::of(contents.study)?;
     let _lock = DestinationLock::take(dest)?;
     contents.check_replaced(dest)?;
-    let mut builder = ReleaseBuilder::beside(dest, contents.head()).map_err(release_error)?;
+    let mut builder = ReleaseBuilder::beside(dest, head(contents.study, contents.text))?;
     progress.phase("assembling artifacts");
-    add_artifacts(&mut builder, &contents, &sources)?;
+    let fragments = add_results(&mut builder, contents, &mut sources)?;
     builder.name_sources(sources.list.clone());
     for note in &sources.notes {
         progress.phase(&format!("{}/{}: {}", note.stage, note.item, note.note));
@@ -67,12 +61,12 @@ pub fn assemble(mut contents: Contents<'_>, dest: &Path, progress: &dyn Progress
         ));
     }
     progress.phase("writing tables");
-    add_tables(&mut builder, &contents)?;
-    add_documents(&mut builder, &contents, &sources)?;
+    fragments.write(&mut builder, contents.splits)?;
+    add_documents(&mut builder, contents, &sources)?;
     progress.phase("writing the report");
     add_report(&mut builder, progress)?;
     progress.phase("writing checksums");
-    builder.seal(dest).map_err(release_error)
+    builder.seal(dest).map_err(Error::from)
 }
 
 /// One writer per destination: a lock file beside it, removed when the writer ends. The operating system frees the lock of
@@ -106,28 +100,7 @@ impl Drop for DestinationLock {
     }
 }
 
-/// A store error as the caller should see it.
-pub fn release_error(error: ReleaseError) -> Error {
-    match error {
-        ReleaseError::Occupied { .. } => Error::Usage(error.to_string()),
-        _ if error.unusable_input() => Error::Input(error.to_string()),
-        _ => Error::io(error),
-    }
-}
-
 impl Contents<'_> {
-    /// What the release says of itself.
-    pub fn head(&self) -> Head {
-        let study = &self.study.head;
-        Head {
-            name: study.name.clone(),
-            study_sha256: sastrugi_store::digest::of_text(self.text),
-            seed: study.seed,
-            version: env!("CARGO_PKG_VERSION").to_owned(),
-            license: study.license.clone(),
-        }
-    }
-
     /// Refuses to replace a release of the same study by one with more failed items.
     fn check_replaced(&self, dest: &Path) -> Result<(), Error> {
         let Ok(there) = Release::open(dest) else { return Ok(()) };
@@ -138,21 +111,23 @@ impl Contents<'_> {
             false => Ok(()),
         }
     }
+}
 
-    /// Results of these stages, in order of their ids.
-    fn results(&self, stages: &[&str]) -> Vec<(&ItemRef, &PathBuf)> {
-        let of_stages = |(item, _): &&(ItemRef, Option<PathBuf>)| stages.contains(&item.stage.as_str());
-        let found = self.items.iter().filter(of_stages).filter_map(|(item, folder)| Some((item, folder.as_ref()?)));
-        let mut results: Vec<_> = found.collect();
-        results.sort_by(|a, b| a.0.id.cmp(&b.0.id));
-        results
+/// What the release of a study says of itself; `text` is the study as it is released.
+pub fn head(study: &Study, text: &str) -> Head {
+    Head {
+        name: study.head.name.clone(),
+        study_sha256: sastrugi_store::digest::of_text(text),
+        seed: study.head.seed,
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        license: study.head.license.clone(),
     }
 }
 
 /// The error for a run that would replace one of the same study with fewer failed items.
 pub fn fewer_items(dest: &Path, before: usize, now: usize) -> Error {
     Error::Failed(format!(
-        "{}: is left as it is: {before} items of the study failed in it, {now} in this run; `--replace` replaces it",
+        "{}: not replaced: it has {before} failed items of this study and this run has {now}; add --replace to replace it anyway",
         dest.display()
     ))
 }
@@ -161,13 +136,6 @@ pub fn fewer_items(dest: &Path, before: usize, now: usize) -> Error {
 pub(super) fn record(folder: &Path) -> Result<Record, Error> {
     load_record(folder)
         .ok_or_else(|| Error::Failed(format!("{}: the result was changed while it was used", folder.display())))
-}
-
-/// The rows of a result as they are released.
-fn rows_of(contents: &Contents<'_>, folder: &Path) -> Result<Rows, Error> {
-    let mut rows = record(folder)?.rows;
-    splits::fill(&mut rows, contents.splits);
-    Ok(rows)
 }
 
 /// What the manifest says of the files that an item brings into the release.
@@ -189,29 +157,29 @@ pub fn artifacts(record: &Record, sources: &Sources) -> Vec<Artifact> {
 }
 
 /// What a reader must know of an item.
-pub fn notes(record: &Record) -> Vec<ItemNote> {
+pub fn notes_of(record: &Record) -> Vec<ItemNote> {
     let ItemRef { stage, id } = &record.item;
     let note = |note: &String| ItemNote { stage: stage.clone(), item: id.clone(), note: note.clone() };
     record.notes.iter().map(note).collect()
 }
 
-fn add_artifacts(builder: &mut ReleaseBuilder, contents: &Contents<'_>, sources: &Sources) -> Result<(), Error> {
-    for (_, folder) in contents.items.iter() {
-        let Some(folder) = folder else { continue };
+/// Copies the files of all results, reading each record once; gives the fragments of the tables.
+fn add_results(
+    builder: &mut ReleaseBuilder,
+    contents: &Contents<'_>,
+    sources: &mut Sources,
+) -> Result<Fragments, Error> {
+    let mut fragments = Fragments::default();
+    let mut notes = Vec::new();
+    for folder in &contents.results {
         let record = record(folder)?;
-        let released = record.files.iter().filter(|file| file.product.release_path.is_some());
-        let files: Vec<(&StoredFile, Artifact)> = released.zip(artifacts(&record, sources)).collect();
-        let incoming = files.iter().map(|(file, artifact)| Incoming {
-            path: artifact.path.clone(),
-            source: folder.join(&file.product.file),
-            origin: artifact.origin.clone(),
-        });
-        let copied = builder.add_files(incoming.collect()).map_err(release_error)?;
-        if let Some(((file, _), _)) = files.iter().zip(&copied).find(|((file, _), sha256)| file.sha256 != **sha256) {
-            return Err(damaged(folder, &record.item, &file.product.file));
-        }
-        notes(&record).into_iter().for_each(|note| builder.note(note));
+        sources.trace(&record);
+        add_artifacts(builder, &record, folder, sources)?;
+        fragments.add(&record, folder);
+        notes.extend(notes_of(&record));
     }
+    notes.sort_by(|a, b| (&a.stage, &a.item).cmp(&(&b.stage, &b.item)));
+    notes.into_iter().for_each(|note| builder.note(note));
     for failure in contents.failures {
         builder.failed(FailedItem {
             stage: failure.item.stage.clone(),
@@ -220,7 +188,22 @@ fn add_artifacts(builder: &mut ReleaseBuilder, contents: &Contents<'_>, sources:
             parameters: failure.parameters.clone(),
         });
     }
-    Ok(())
+    Ok(fragments)
+}
+
+fn add_artifacts(builder: &mut ReleaseBuilder, record: &Record, folder: &Path, sources: &Sources) -> Result<(), Error> {
+    let released = record.files.iter().filter(|file| file.product.release_path.is_some());
+    let files: Vec<(&StoredFile, Artifact)> = released.zip(artifacts(record, sources)).collect();
+    let incoming = files.iter().map(|(file, artifact)| Incoming {
+        path: artifact.path.clone(),
+        source: folder.join(&file.product.file),
+        origin: artifact.origin.clone(),
+    });
+    let copied = builder.add_files(incoming.collect())?;
+    match files.iter().zip(&copied).find(|((file, _), sha256)| file.sha256 != **sha256) {
+        Some(((file, _), _)) => Err(damaged(folder, &record.item, &file.product.file)),
+        None => Ok(()),
+    }
 }
 
 /// A result that is not what it was when it was made is dropped, so that the next run makes it again.
@@ -228,152 +211,6 @@ fn damaged(folder: &Path, item: &ItemRef, file: &str) -> Error {
     let dropped = std::fs::remove_dir_all(folder).is_ok();
     let advice = if dropped { "it was dropped; run again" } else { "remove it and run again" };
     Error::Failed(format!("{item}: {file} was changed in the work area {}; {advice}", folder.display()))
-}
-
-fn add_tables(builder: &mut ReleaseBuilder, contents: &Contents<'_>) -> Result<(), Error> {
-    add_table(builder, contents, made_by(roughness::STAGE), |rows| rows.terrains)?;
-    add_table(builder, contents, made_by(fit::STAGE), |rows| rows.fits)?;
-    add_table(builder, contents, made_by(fit::STAGE), |rows| rows.covariance)?;
-    add_table(builder, contents, made_by(fit::STAGE), |rows| rows.candidates)?;
-    add_table(builder, contents, made_by(fit::STAGE), |rows| rows.candidate_curves)?;
-    add_table(builder, contents, made_by(fit::STAGE), |rows| rows.likelihood_profile)?;
-    add_described(builder, contents)?;
-    add_scoreboard(builder, contents)?;
-    add_missions(builder, contents)?;
-    add_parameters(builder, contents)
-}
-
-/// The tables of the scoreboard. Its stage leaves no other file that could say what the items were made from.
-fn add_scoreboard(builder: &mut ReleaseBuilder, contents: &Contents<'_>) -> Result<(), Error> {
-    let mut parents = BTreeSet::new();
-    for (_, folder) in contents.results(&[scoreboard::STAGE]) {
-        parents.extend(record(folder)?.ingredients.parents.into_keys());
-    }
-    let origin = Origin { parents: parents.into_iter().collect(), ..made_by(scoreboard::STAGE) };
-    add_table(builder, contents, origin.clone(), |rows| rows.scoreboard)?;
-    add_table(builder, contents, origin, |rows| rows.scoreboard_covariance)
-}
-
-/// One table, its rows taken item by item of the origin's stage; the ids of items are the rows' first key.
-fn add_table<R: Row>(
-    builder: &mut ReleaseBuilder,
-    contents: &Contents<'_>,
-    origin: Origin,
-    take: impl Fn(Rows) -> Vec<R>,
-) -> Result<(), Error> {
-    let results = contents.results(&[origin.stage.as_str()]);
-    let parts = results.into_iter().map(|(_, folder)| Ok(take(rows_of(contents, folder)?)));
-    write_parts(builder, parts, origin)
-}
-
-/// One table, written as its parts are read; the first part that cannot be read is the error.
-fn write_parts<R: Row>(
-    builder: &mut ReleaseBuilder,
-    mut parts: impl Iterator<Item = Result<Vec<R>, Error>>,
-    origin: Origin,
-) -> Result<(), Error> {
-    let mut trouble = None;
-    let rows = std::iter::from_fn(|| parts.next()?.map_err(|error| trouble = Some(error)).ok());
-    let written = builder.write_table("0000", rows.flatten(), origin);
-    match trouble {
-        Some(error) => Err(error),
-        None => written.map_err(release_error),
-    }
-}
-
-/// The tables that describe surfaces, all at once, surface by surface. An item may describe surfaces under ids of their own
-/// (`<texture>.residual`), which are looked up first.
-fn add_described(builder: &mut ReleaseBuilder, contents: &Contents<'_>) -> Result<(), Error> {
-    let stages = [roughness::STAGE, fit::STAGE, texture::STAGE];
-    let mut described: BTreeMap<String, Vec<&PathBuf>> = BTreeMap::new();
-    for (_, folder) in contents.results(&stages) {
-        for surface in record(folder)?.rows.surfaces {
-            described.entry(surface.surface_id).or_default().push(folder);
-        }
-    }
-    let (mut psd, mut heights) = (builder.table::<PsdRow>("0000"), builder.table::<HeightDistributionRow>("0000"));
-    let (mut surfaces, mut structure) = (builder.table::<SurfaceRow>("0000"), builder.table::<StructureRow>("0000"));
-    let mut profiles = builder.table::<ProfilePsdRow>("0000");
-    for (id, folders) in &described {
-        for folder in folders {
-            let rows = record(folder)?.rows;
-            psd.extend(rows.psd.into_iter().filter(|row| row.terrain_id == *id)).map_err(release_error)?;
-            let of_surface = rows.height_distribution.into_iter().filter(|row| row.terrain_id == *id);
-            heights.extend(of_surface).map_err(release_error)?;
-            surfaces.extend(rows.surfaces.into_iter().filter(|r| r.surface_id == *id)).map_err(release_error)?;
-            structure.extend(rows.structure.into_iter().filter(|r| r.surface_id == *id)).map_err(release_error)?;
-            profiles.extend(rows.profile_psd.into_iter().filter(|r| r.surface_id == *id)).map_err(release_error)?;
-        }
-    }
-    let made_by = || made_by(&stages.join("+"));
-    builder.close(psd, made_by()).map_err(release_error)?;
-    builder.close(heights, made_by()).map_err(release_error)?;
-    builder.close(surfaces, made_by()).map_err(release_error)?;
-    builder.close(structure, made_by()).map_err(release_error)?;
-    builder.close(profiles, made_by()).map_err(release_error)
-}
-
-fn made_by(stage: &str) -> Origin {
-    Origin { stage: stage.to_owned(), ..Origin::default() }
-}
-
-/// `missions`, `replicates` and `samples`: all runs on one terrain together, sorted by key. Only as many terrains' rows
-/// are held as there are threads.
-fn add_missions(builder: &mut ReleaseBuilder, contents: &Contents<'_>) -> Result<(), Error> {
-    let mut terrains: BTreeMap<&str, Vec<&PathBuf>> = BTreeMap::new();
-    for (item, folder) in contents.results(&[traverse::STAGE]) {
-        terrains.entry(traverse::terrain_of(&item.id)).or_default().push(folder);
-    }
-    let samples = |terrain: &str| -> Result<Vec<SampleRow>, Failed> {
-        let mut samples: Vec<SampleRow> = Vec::new();
-        for folder in terrains.get(terrain).into_iter().flatten() {
-            let path = folder.join(traverse::SAMPLES);
-            let read = sastrugi_store::parquet::read_table::<SampleRow>(&path);
-            samples.extend(read.map_err(|e| Failed(Error::failed(e)))?);
-        }
-        samples.sort_by(|a, b| (&a.mission_id, a.sample).cmp(&(&b.mission_id, b.sample)));
-        Ok(samples)
-    };
-    let parts: Vec<&str> = terrains.keys().copied().collect();
-    builder.write_parts(&parts, samples, &made_by(traverse::STAGE)).map_err(|Failed(error)| error)?;
-    let (mut missions, mut replicates) = (builder.table::<MissionRow>("0000"), builder.table::<ReplicateRow>("0000"));
-    for folders in terrains.values() {
-        let mut rows = Rows::default();
-        for folder in folders {
-            let of_run = rows_of(contents, folder)?;
-            rows.missions.extend(of_run.missions);
-            rows.replicates.extend(of_run.replicates);
-        }
-        rows.missions.sort_by(|a, b| a.mission_id.cmp(&b.mission_id));
-        rows.replicates.sort_by(|a, b| (&a.mission_id, a.replicate).cmp(&(&b.mission_id, b.replicate)));
-        missions.extend(rows.missions).map_err(release_error)?;
-        replicates.extend(rows.replicates).map_err(release_error)?;
-    }
-    builder.close(missions, made_by(traverse::STAGE)).map_err(release_error)?;
-    builder.close(replicates, made_by(traverse::STAGE)).map_err(release_error)
-}
-
-/// `parameters`: every run once, whatever the number of its terrains.
-fn add_parameters(builder: &mut ReleaseBuilder, contents: &Contents<'_>) -> Result<(), Error> {
-    let mut runs: BTreeMap<&str, &PathBuf> = BTreeMap::new();
-    for (item, folder) in contents.results(&[traverse::STAGE]) {
-        runs.entry(traverse::run_of(&item.id)).or_insert(folder);
-    }
-    let sorted = |folder: &PathBuf| -> Result<Vec<ParameterRow>, Error> {
-        let mut rows = record(folder)?.rows.parameters;
-        rows.sort_by(|a, b| a.parameter.cmp(&b.parameter));
-        Ok(rows)
-    };
-    write_parts(builder, runs.into_values().map(sorted), made_by(traverse::STAGE))
-}
-
-/// An error of a part of a table.
-struct Failed(Error);
-
-impl From<ReleaseError> for Failed {
-    fn from(error: ReleaseError) -> Self {
-        Self(release_error(error))
-    }
 }
 
 fn add_documents(builder: &mut ReleaseBuilder, contents: &Contents<'_>, sources: &Sources) -> Result<(), Error> {
@@ -390,7 +227,7 @@ fn add_documents(builder: &mut ReleaseBuilder, contents: &Contents<'_>, sources:
     let viewer = head.mcap == McapFlavour::Viewer && described.artifacts.iter().any(|a| a.path.ends_with(".mcap"));
     let layout = viewer.then(|| ("mcap/foxglove-layout.json", VIEWER_LAYOUT.to_owned()));
     for (path, text) in documents.into_iter().chain(layout) {
-        builder.write_text(path, &text, Origin::default()).map_err(release_error)?;
+        builder.write_text(path, &text, Origin::default())?;
     }
     Ok(())
 }
@@ -400,12 +237,11 @@ fn json_text(value: &Value) -> Result<String, Error> {
 }
 
 fn add_report(builder: &mut ReleaseBuilder, progress: &dyn Progress) -> Result<(), Error> {
-    builder.write_draft().map_err(release_error)?;
+    builder.write_draft()?;
     let staging = builder.staging().to_owned();
-    sastrugi_report::render(&staging, &staging.join("report"), &|phase| progress.phase(phase))
-        .map_err(Error::failed)?;
+    sastrugi_report::render(&staging, &staging.join("report"), &|phase| progress.phase(phase)).map_err(Error::io)?;
     for path in files_below(&staging, Path::new("report"))? {
-        builder.adopt(&path, Origin { stage: "report".to_owned(), ..Origin::default() }).map_err(release_error)?;
+        builder.adopt(&path, Origin { stage: "report".to_owned(), ..Origin::default() })?;
     }
     Ok(())
 }
@@ -413,8 +249,9 @@ fn add_report(builder: &mut ReleaseBuilder, progress: &dyn Progress) -> Result<(
 /// Paths of all files below a folder of `root`, sorted, relative to it.
 fn files_below(root: &Path, folder: &Path) -> Result<Vec<String>, Error> {
     let mut paths = Vec::new();
-    for entry in std::fs::read_dir(root.join(folder)).map_err(Error::failed)? {
-        let entry = entry.map_err(Error::failed)?;
+    let whole = root.join(folder);
+    for entry in std::fs::read_dir(&whole).map_err(|e| Error::at(&whole, e))? {
+        let entry = entry.map_err(|e| Error::at(&whole, e))?;
         let path = folder.join(entry.file_name());
         if entry.path().is_dir() {
             paths.extend(files_below(root, &path)?);

@@ -6,7 +6,7 @@
 
 use super::graph::{Graph, Ingredients};
 use super::lock;
-use crate::jobs::{ItemRef, Outcome, Product, Rows};
+use crate::job::{ItemRef, Outcome, Product};
 use sastrugi_store::atomic::{self, Draft};
 use sastrugi_store::digest;
 use serde::de::DeserializeOwned;
@@ -38,8 +38,6 @@ pub struct Record {
     pub ingredients: Ingredients,
     /// Its files.
     pub files: Vec<StoredFile>,
-    /// Rows for the tables.
-    pub rows: Rows,
     /// Sentences that a reader must know.
     pub notes: Vec<String>,
 }
@@ -67,13 +65,13 @@ pub struct StoredFile {
 #[derive(Debug, thiserror::Error)]
 pub enum CacheError {
     /// Another run holds it.
-    #[error("another run is using {0}; wait for it, or name another work area with --work")]
+    #[error("another run is using {0}; wait for it or choose another folder with --work")]
     Busy(PathBuf),
     /// The folder holds something else.
-    #[error("{0}: the folder is not empty and no work area of ours; name another one with --work")]
+    #[error("{0}: not a sastrugi work area, and not empty; choose another folder with --work")]
     NotOurs(PathBuf),
     /// A symbolic link where the work area has folders of its own.
-    #[error("{0}: a symbolic link in a work area; remove it, or name another work area with --work")]
+    #[error("{0} is a symbolic link, which a work area cannot contain; remove it or choose another folder with --work")]
     Link(PathBuf),
     /// The file system refused.
     #[error("{action} {path}: {source}")]
@@ -139,10 +137,9 @@ impl Cache {
         load_record(&self.result_folder(item, key))
     }
 
-    /// True when [`Self::load`] would find a result; its rows are not read.
+    /// True when [`Self::load`] finds a result.
     pub fn holds(&self, item: &ItemRef, key: &str) -> bool {
-        let folder = self.result_folder(item, key);
-        read_json(&folder.join(RECORD)).is_some_and(|Files { files }| are_whole(&folder, &files))
+        self.load(item, key).is_some()
     }
 
     /// True when the item was tried before, with whatever key.
@@ -203,7 +200,7 @@ impl Cache {
         let key = graph.key(position).to_owned();
         let files = outcome.products.into_iter().map(|p| stored(folder, p)).collect::<Result<Vec<_>, _>>()?;
         let ingredients = graph.ingredients(position);
-        let record = Record { item, key, ingredients, files, rows: outcome.rows, notes: outcome.notes };
+        let record = Record { item, key, ingredients, files, notes: outcome.notes };
         let path = folder.join(RECORD);
         let text = serde_json::to_vec(&record).map_err(|e| io_error("cannot encode", &path)(e.into()))?;
         atomic::write(&Draft(folder).file(RECORD), &text).map_err(io_error("cannot write", &path))?;
@@ -304,12 +301,6 @@ fn children(folder: &Path) -> Result<Vec<PathBuf>, CacheError> {
 pub fn load_record(folder: &Path) -> Option<Record> {
     let record: Record = read_json(&folder.join(RECORD))?;
     are_whole(folder, &record.files).then_some(record)
-}
-
-/// The part of a record that says whether its result is there.
-#[derive(Deserialize)]
-struct Files {
-    files: Vec<StoredFile>,
 }
 
 fn read_json<T: DeserializeOwned>(path: &Path) -> Option<T> {

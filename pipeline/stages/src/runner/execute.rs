@@ -3,7 +3,7 @@
 use super::cache::Cache;
 use super::graph::Graph;
 use super::progress::{End, Progress};
-use crate::jobs::{Cause, ItemRef, JobError, Work};
+use crate::job::{Cause, ItemRef, JobError, Work};
 use sastrugi_store::atomic::Draft;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;

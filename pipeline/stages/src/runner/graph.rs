@@ -1,6 +1,6 @@
 //! The graph of items: what depends on what, and the key of each.
 
-use crate::jobs::{ItemRef, Job};
+use crate::job::{ItemRef, Job};
 use crate::revision::revision;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;

@@ -10,7 +10,9 @@ use std::path::Path;
 /// The path leads to anything but a plain file, a symbolic link included; the file system refuses.
 pub fn take(path: &Path) -> io::Result<Option<File>> {
     match fs::symlink_metadata(path) {
-        Ok(there) if !there.is_file() => return Err(io::Error::other("is in the way: a lock is a plain file")),
+        Ok(there) if !there.is_file() => {
+            return Err(io::Error::other("not a regular file, so it cannot be used as a lock"));
+        }
         _ => {}
     }
     let file = File::options().write(true).create(true).truncate(false).open(path)?;

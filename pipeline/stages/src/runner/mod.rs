@@ -10,3 +10,4 @@ pub mod plan;
 pub mod progress;
 pub mod shard;
 pub mod sources;
+pub mod tables;

@@ -1,6 +1,6 @@
 //! What a run tells while it goes on. The runner prints nothing itself.
 
-use crate::jobs::ItemRef;
+use crate::job::ItemRef;
 
 /// Listener of a run; called from several threads.
 pub trait Progress: Sync {

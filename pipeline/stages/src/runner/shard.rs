@@ -3,15 +3,16 @@
 //! An item belongs to shard `1 + (key modulo N)`. A shard computes the parents that its items need, whether they are its
 //! own or not, and keeps its own items only.
 
-use super::assemble::{DestinationLock, fewer_items, release_error};
+use super::assemble::{DestinationLock, fewer_items};
 use super::cache::{Cache, Record, StoredFile, load_record};
 use super::execute::Failure;
 use super::graph::Graph;
 use crate::error::Error;
-use crate::jobs::ItemRef;
+use crate::job::ItemRef;
 use crate::splits::Splits;
 use crate::studies::Loaded;
-use sastrugi_store::{atomic, digest, release};
+use sastrugi_store::release::Staging;
+use sastrugi_store::{atomic, digest};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fs::{self, File};
@@ -84,14 +85,12 @@ pub fn write(
     let (graph, study) = (&loaded.graph, loaded.released.as_str());
     let replaced = occupant(target)?;
     let _lock = DestinationLock::take(target)?;
-    let staging = release::beside(target, "assembling");
-    remove(&staging)?;
-    fs::create_dir_all(&staging).map_err(|e| Error::at(&staging, e))?;
+    let staging = Staging::beside(target)?;
     let own: Vec<usize> = (0..graph.len()).filter(|&p| part.owns(graph.key(p))).collect();
     for &position in &own {
         let (item, key) = (&graph.node(position).item, graph.key(position));
         if let Some(record) = cache.load(item, key) {
-            copy_result(&record, &cache.result_folder(item, key), &item_folder(&staging, item))?;
+            copy_result(&record, &cache.result_folder(item, key), &item_folder(staging.path(), item))?;
         }
     }
     let owned = |f: &&Failure| graph.find(&f.item).is_some_and(|p| own.contains(&p));
@@ -108,10 +107,10 @@ pub fn write(
     }
     let text = serde_json::to_vec_pretty(&description).map_err(Error::failed)?;
     for (name, bytes) in [(STUDY, study.as_bytes()), (DESCRIPTION, &text)] {
-        let path = staging.join(name);
+        let path = staging.path().join(name);
         atomic::write(&path, bytes).map_err(|e| Error::at(&path, e))?;
     }
-    release::put_in_place(&staging, target).map_err(release_error)
+    staging.put_in_place(target).map_err(Error::from)
 }
 
 impl Description {
@@ -125,17 +124,11 @@ impl Description {
 /// The shard that is there already.
 fn occupant(target: &Path) -> Result<Option<Description>, Error> {
     if fs::read_dir(target).is_ok_and(|mut d| d.next().is_some()) {
-        let refused = || format!("{}: the folder is not empty and no shard; name another one", target.display());
+        let refused =
+            || format!("{}: not a sastrugi shard, and not empty; choose another folder with -o", target.display());
         return read(target).map(Some).map_err(|_| Error::Usage(refused()));
     }
     Ok(None)
-}
-
-fn remove(folder: &Path) -> Result<(), Error> {
-    match fs::remove_dir_all(folder) {
-        Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(Error::failed(format!("{}: {e}", folder.display()))),
-        _ => Ok(()),
-    }
 }
 
 fn item_folder(shard: &Path, item: &ItemRef) -> PathBuf {
@@ -158,8 +151,8 @@ fn copy_result(record: &Record, from: &Path, to: &Path) -> Result<(), Error> {
 pub struct Joined {
     /// The study's text.
     pub study: String,
-    /// All items in graph order, with the folder of the result.
-    pub items: Vec<(ItemRef, Option<PathBuf>)>,
+    /// Folders of the results, parents before children.
+    pub results: Vec<PathBuf>,
     /// Items without a result.
     pub failures: Vec<Failure>,
     /// Which terrains are for training, validation and test.
@@ -182,7 +175,7 @@ pub fn join(folders: &[PathBuf]) -> Result<Joined, Error> {
     let failures: BTreeMap<ItemRef, Failure> =
         shards.iter().flat_map(|s| &s.failures).map(|f| (f.item.clone(), f.clone())).collect();
     let by_part: BTreeMap<u32, &PathBuf> = shards.iter().map(|s| s.part.index).zip(folders).collect();
-    let mut items = Vec::new();
+    let mut results = Vec::new();
     for (item, key) in &first.items {
         let owner = (1..=first.part.count).find(|&index| Part { index, ..first.part }.owns(key));
         let folder = owner.and_then(|o| by_part.get(&o)).map(|f| item_folder(f, item));
@@ -190,9 +183,9 @@ pub fn join(folders: &[PathBuf]) -> Result<Joined, Error> {
         if result.is_none() && !failures.contains_key(item) {
             return Err(Error::Input(format!("{item} is missing or damaged in its shard; run that shard again")));
         }
-        items.push((item.clone(), result));
+        results.extend(result);
     }
-    Ok(Joined { study, items, failures: failures.into_values().collect(), splits: first.splits.clone() })
+    Ok(Joined { study, results, failures: failures.into_values().collect(), splits: first.splits.clone() })
 }
 
 /// True when every file has the bytes that it was made with.

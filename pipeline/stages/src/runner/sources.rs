@@ -1,8 +1,10 @@
 //! Measured data behind the files of a release: what its makers ask for goes with everything that comes from it.
 
-use super::assemble::{Contents, record};
+use super::cache::Record;
 use crate::error::Error;
-use crate::jobs::{ItemRef, dem, original};
+use crate::job::ItemRef;
+use crate::jobs::{dem, original};
+use crate::study::Study;
 use crate::study::terms::{self, Objection};
 use sastrugi_schemas::manifest::{ItemNote, Source};
 use sastrugi_schemas::study::DemItem;
@@ -21,41 +23,32 @@ pub struct Sources {
 }
 
 impl Sources {
-    /// Measured data of a study, and what comes from it; `contents.items` has parents before children.
+    /// Measured data of a study.
     ///
     /// # Errors
-    /// A result that cannot be read.
-    pub fn of(contents: &Contents<'_>) -> Result<Self, Error> {
-        let mut sources = Self { list: Vec::new(), notes: Vec::new(), behind: BTreeMap::new() };
-        for entry in contents.study.entries(dem::STAGE).map_err(Error::failed)? {
+    /// A section that cannot be read.
+    pub fn of(study: &Study) -> Result<Self, Error> {
+        let mut sources = Self::default();
+        for entry in study.entries(dem::STAGE).map_err(Error::failed)? {
             let (item, _): (DemItem, Value) = entry.read().map_err(Error::failed)?;
-            if let Some(Objection::Unknown(note)) = terms::objection(&item, &contents.study.head.license) {
+            if let Some(Objection::Unknown(note)) = terms::objection(&item, &study.head.license) {
                 sources.notes.push(ItemNote { stage: dem::STAGE.to_owned(), item: item.id.clone(), note });
             }
             let DemItem { id, license, attribution, citation, .. } = item;
             sources.list.push(Source { id, license, attribution, citation });
         }
-        if !sources.list.is_empty() {
-            sources.trace(contents)?;
-        }
         Ok(sources)
     }
 
-    fn trace(&mut self, contents: &Contents<'_>) -> Result<(), Error> {
-        for (item, folder) in &contents.items {
-            let mut ids = BTreeSet::new();
-            if item.stage == original::STAGE {
-                ids.insert(item.id.clone());
-            }
-            if let Some(folder) = folder {
-                let parents = record(folder)?.ingredients.parents;
-                ids.extend(parents.keys().filter_map(|parent| self.behind.get(parent)).flatten().cloned());
-            }
-            if !ids.is_empty() {
-                self.behind.insert(item.to_string(), ids);
-            }
+    /// Traces an item to the data behind it, after its parents.
+    pub fn trace(&mut self, record: &Record) {
+        let Record { item, ingredients, .. } = record;
+        let of_parents = ingredients.parents.keys().filter_map(|parent| self.behind.get(parent)).flatten().cloned();
+        let own = (item.stage == original::STAGE).then(|| item.id.clone());
+        let ids: BTreeSet<String> = of_parents.chain(own).collect();
+        if !ids.is_empty() {
+            self.behind.insert(item.to_string(), ids);
         }
-        Ok(())
     }
 
     /// Ids of the data that an item comes from.

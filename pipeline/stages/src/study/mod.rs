@@ -65,7 +65,7 @@ impl Study {
     }
 
     fn check_sections(&self, sections: &[&'static str]) -> Result<(), StudyError> {
-        let known = || ["study", "roughness"].into_iter().chain(sections.iter().copied());
+        let known = || ["study"].into_iter().chain(sections.iter().copied());
         let Some(unknown) = self.root.keys().find(|k| !known().any(|s| s == *k)) else { return Ok(()) };
         let names: Vec<&str> = known().collect();
         let message = format!("unknown section `{unknown}`; a study has {}", names.join(", "));

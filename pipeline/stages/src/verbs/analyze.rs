@@ -12,7 +12,7 @@ use sastrugi_schemas::tables::LogRow;
 use sastrugi_schemas::topics::EventKind;
 use sastrugi_store::PROGRAM;
 use sastrugi_store::mcap::{McapError, read_log};
-use sastrugi_store::parquet::{TableMetadata, TableWriter};
+use sastrugi_store::parquet::{TableMetadata, write_table};
 use std::path::Path;
 
 /// Rates that are accepted, Hz.
@@ -160,8 +160,5 @@ pub fn write(path: &Path, rows: &[LogRow]) -> Result<(), Error> {
         TableMetadata { study_sha256: String::new(), seed: 0, version: PROGRAM.to_owned(), license: String::new() };
     let mut sorted: Vec<&LogRow> = rows.iter().collect();
     sorted.sort_by(|a, b| a.log_id.cmp(&b.log_id));
-    let mut writer = TableWriter::create(path, &metadata).map_err(Error::failed)?;
-    sorted.into_iter().try_for_each(|row| writer.push(row)).map_err(Error::failed)?;
-    writer.finish().map_err(Error::failed)?;
-    Ok(())
+    write_table(path, sorted.into_iter().cloned(), Some(&metadata)).map(drop).map_err(Error::io)
 }

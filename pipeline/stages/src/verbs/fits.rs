@@ -7,7 +7,7 @@ use crate::error::Error;
 use crate::jobs::fit::fit_row;
 use sastrugi_schemas::fit::{FitFile, Source};
 use sastrugi_schemas::tables::{BesideFit, DemFitRow, FitRow};
-use sastrugi_store::parquet::{TableMetadata, TableWriter};
+use sastrugi_store::parquet::{TableMetadata, write_table};
 use sastrugi_store::{PROGRAM, csv};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -145,8 +145,5 @@ fn write(path: &Path, rows: &[DemFitRow]) -> Result<(), Error> {
     }
     let metadata =
         TableMetadata { study_sha256: String::new(), seed: 0, version: PROGRAM.to_owned(), license: String::new() };
-    let mut writer = TableWriter::create(path, &metadata).map_err(Error::failed)?;
-    rows.iter().try_for_each(|row| writer.push(row)).map_err(Error::failed)?;
-    writer.finish().map_err(Error::failed)?;
-    Ok(())
+    write_table(path, rows.iter().cloned(), Some(&metadata)).map(drop).map_err(Error::io)
 }

@@ -4,7 +4,6 @@
 
 use super::parameters;
 use crate::error::Error;
-use crate::runner::assemble::release_error;
 use sastrugi_numeric::Streams;
 pub use sastrugi_report::releases::Quantity;
 use sastrugi_report::releases::{self, Figures, Settings};
@@ -176,7 +175,7 @@ pub fn compare(a: &Path, b: &Path, parameters: &Value, seed: u64) -> Result<Comp
 }
 
 fn open(folder: &Path) -> Result<Release, Error> {
-    Release::open(folder).map_err(release_error)
+    Release::open(folder).map_err(Error::from)
 }
 
 impl Side {
@@ -199,8 +198,7 @@ fn figures(release: &Release) -> Result<Figures, Error> {
     let content = |path: &str| contents.get(path).copied().flatten();
     release
         .for_each_row(|row: TerrainRow| figures.add_terrain(&row, content(&row.path)))
-        .and_then(|()| release.for_each_row(|row: MissionRow| figures.add_mission(&row)))
-        .map_err(release_error)?;
+        .and_then(|()| release.for_each_row(|row: MissionRow| figures.add_mission(&row)))?;
     Ok(figures)
 }
 

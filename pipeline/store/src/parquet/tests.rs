@@ -56,9 +56,7 @@ fn lists(floats: impl Strategy<Value = f64>) -> impl Strategy<Value = Vec<Vec<f6
 }
 
 fn write<R: Record>(path: &Path, rows: &[R]) -> TableSummary {
-    let mut writer = TableWriter::create(path, &metadata()).unwrap();
-    rows.iter().for_each(|row| writer.push(row).unwrap());
-    writer.finish().unwrap()
+    write_table(path, rows.iter().cloned(), Some(&metadata())).unwrap()
 }
 
 fn same(a: &CovarianceRow, b: &CovarianceRow) -> bool {
@@ -96,14 +94,6 @@ proptest! {
         prop_assert_eq!(shown(&back), shown(&rows));
         prop_assert_eq!(write(&folder.path().join("u.parquet"), &back), summary);
         prop_assert_eq!(fs::read(path).unwrap(), fs::read(folder.path().join("u.parquet")).unwrap());
-    }
-
-    /// JSON has no infinities: the floats are such that single precision has them.
-    #[test]
-    fn prop_lists_pass_through_json(lists in lists(-1e38..1e38)) {
-        let rows = rows_of_lists(&lists);
-        let back: Vec<SampleRow> = serde_json::from_str(&serde_json::to_string(&rows).unwrap()).unwrap();
-        prop_assert_eq!(shown(&back), shown(&rows));
     }
 }
 
@@ -182,12 +172,12 @@ fn written<R: Record>(rows: &[R]) -> Vec<u8> {
 fn val_rows_out_of_order_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("t.parquet");
-    let mut writer = TableWriter::create(&path, &metadata()).unwrap();
-    writer.push(&row(0, 1, 0.0)).unwrap();
+    let mut writer = TableWriter::create(&path, &CovarianceRow::TABLE, None).unwrap();
+    writer.push(row(0, 1, 0.0).cells()).unwrap();
     for bin in [1, 0] {
-        assert!(matches!(writer.push(&row(0, bin, 0.0)), Err(TableError::Order { row: 1, .. })));
+        assert!(matches!(writer.push(row(0, bin, 0.0).cells()), Err(TableError::Order { row: 1, .. })));
     }
-    writer.push(&row(1, 0, 0.0)).unwrap();
+    writer.push(row(1, 0, 0.0).cells()).unwrap();
     assert!(!path.exists());
     drop(writer);
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
@@ -199,9 +189,9 @@ fn val_many_rows_stream_through() {
     let path = folder.path().join("t.parquet");
     let psd =
         |bin: i64| PsdRow { terrain_id: "a".to_owned(), bin, frequency_cycles_m: bin as f64, psd_m4: 1.0, modes: bin };
-    let mut writer = TableWriter::create(&path, &metadata()).unwrap();
+    let mut writer = TableWriter::create(&path, &PsdRow::TABLE, None).unwrap();
     let count = 2 * ROW_GROUP_ROWS as i64 + 17;
-    (0..count).for_each(|bin| writer.push(&psd(bin)).unwrap());
+    (0..count).for_each(|bin| writer.push(psd(bin).cells()).unwrap());
     // What is not yet in the file is less than a row group, so that memory does not grow with the number of rows.
     assert!(writer.writer.in_progress_rows() < ROW_GROUP_ROWS);
     assert_eq!(writer.writer.flushed_row_groups().len(), 2);
@@ -233,10 +223,10 @@ fn val_what_is_no_table_is_refused() {
 #[test]
 fn prop_every_table_has_keys_first_and_a_schema() {
     for table in tables::ALL {
-        let keys = table.columns.iter().take_while(|c| c.key).count();
+        let keys = table.key_count();
         assert!(keys > 0 && table.columns.iter().skip(keys).all(|c| !c.key), "{}", table.name);
         assert_eq!(schema(table).fields().len(), table.columns.len());
-        assert!(properties(table, &metadata()).is_ok());
+        assert!(properties(table, Some(&metadata())).is_ok());
     }
 }
 

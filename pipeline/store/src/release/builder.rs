@@ -5,8 +5,8 @@ use crate::atomic::sync_folder;
 use crate::digest::{self, Hashed};
 use crate::parquet::{TableMetadata, TableWriter};
 use rayon::prelude::*;
-use sastrugi_schemas::Record;
 use sastrugi_schemas::manifest::{Artifact, FORMAT, FailedItem, ItemNote, Manifest, Origin, PROGRAM, Source};
+use sastrugi_schemas::{Cell, Table};
 use std::collections::BTreeSet;
 use std::ffi::OsString;
 use std::fmt::Write as _;
@@ -44,32 +44,50 @@ impl Head {
 /// A release under construction. What grows with it in memory is the manifest, whose list of files has one line for each.
 #[derive(Debug)]
 pub struct ReleaseBuilder {
-    staging: PathBuf,
+    staging: Staging,
     metadata: TableMetadata,
     manifest: Manifest,
     paths: BTreeSet<String>,
 }
 
-/// A file of a table under construction, to be written row by row beside others. It appears with its first row.
-pub struct GrowingTable<R: Record> {
-    path: String,
-    target: PathBuf,
-    metadata: TableMetadata,
-    writer: Option<TableWriter<R>>,
+/// One file of a table.
+#[derive(Clone, Debug)]
+pub struct TablePart {
+    /// The table.
+    pub table: &'static Table,
+    /// Its name: the file is `part-<name>.parquet`.
+    pub name: String,
+    /// Where it comes from.
+    pub origin: Origin,
 }
 
-impl<R: Record> GrowingTable<R> {
-    /// Appends rows, each after the one before it in the order of the keys.
+impl TablePart {
+    /// The one file of a table that is not parted.
+    pub const WHOLE: &str = "0000";
+
+    fn path(&self) -> String {
+        format!("{TABLES}/{}/part-{}.parquet", self.table.name, self.name)
+    }
+}
+
+/// Writes the rows of a part. Its file appears with the first of them.
+pub struct PartWriter<'a> {
+    table: &'static Table,
+    target: &'a Path,
+    metadata: &'a TableMetadata,
+    writer: Option<TableWriter>,
+}
+
+impl PartWriter<'_> {
+    /// Appends a row, which must come after the one before it in the order of the keys.
     ///
     /// # Errors
     /// The rows are not sorted, or the file cannot be written.
-    pub fn extend(&mut self, rows: impl IntoIterator<Item = R>) -> Result<(), ReleaseError> {
-        for row in rows {
-            if self.writer.is_none() {
-                self.writer = Some(TableWriter::create(&self.target, &self.metadata)?);
-            }
-            self.writer.as_mut().map_or(Ok(()), |writer| writer.push(&row))?;
+    pub fn push(&mut self, cells: Vec<Cell>) -> Result<(), ReleaseError> {
+        if self.writer.is_none() {
+            self.writer = Some(TableWriter::create(self.target, self.table, Some(self.metadata))?);
         }
+        self.writer.as_mut().map_or(Ok(()), |writer| writer.push(cells))?;
         Ok(())
     }
 }
@@ -98,13 +116,7 @@ impl ReleaseBuilder {
     /// [`ReleaseError::Occupied`] when `dest` holds something that is no release; the folder cannot be made.
     pub fn beside(dest: &Path, head: Head) -> Result<Self, ReleaseError> {
         check_dest(dest)?;
-        Self::create(&beside(dest, "assembling"), head)
-    }
-
-    /// Starts a release in a folder, which is emptied.
-    pub(super) fn create(staging: &Path, head: Head) -> Result<Self, ReleaseError> {
-        remove_folder(staging)?;
-        fs::create_dir_all(staging).map_err(ReleaseError::io(staging))?;
+        let staging = Staging::beside(dest)?;
         let metadata = head.table_metadata();
         let Head { name, study_sha256, seed, version, license } = head;
         let manifest = Manifest {
@@ -120,12 +132,12 @@ impl ReleaseBuilder {
             failed: vec![],
             notes: vec![],
         };
-        Ok(Self { staging: staging.to_owned(), metadata, manifest, paths: BTreeSet::new() })
+        Ok(Self { staging, metadata, manifest, paths: BTreeSet::new() })
     }
 
     /// The folder under construction.
     pub fn staging(&self) -> &Path {
-        &self.staging
+        self.staging.path()
     }
 
     /// The files listed so far, by path.
@@ -177,64 +189,27 @@ impl ReleaseBuilder {
         Ok(())
     }
 
-    /// Writes one file `part-<part>.parquet` of a table from rows sorted by key; nothing when there is no row.
+    /// Writes files of tables, several at a time; `fill` pushes the rows of a part, sorted by key. A part without rows has no
+    /// file.
     ///
     /// # Errors
-    /// The rows are not sorted, or the file cannot be written.
-    pub fn write_table<R: Record>(
+    /// Those of `fill`; a file cannot be written, or its path is taken.
+    pub fn write_tables<E: From<ReleaseError> + Send>(
         &mut self,
-        part: &str,
-        rows: impl IntoIterator<Item = R>,
-        origin: Origin,
-    ) -> Result<(), ReleaseError> {
-        let mut table = self.table(part);
-        table.extend(rows)?;
-        self.close(table, origin)
-    }
-
-    /// A file `part-<part>.parquet` of a table, to be written bit by bit; [`Self::close`] lists it.
-    pub fn table<R: Record>(&self, part: &str) -> GrowingTable<R> {
-        let path = part_path::<R>(part);
-        GrowingTable { target: self.staging.join(&path), path, metadata: self.metadata.clone(), writer: None }
-    }
-
-    /// Completes and lists a table's file, if it has a row.
-    ///
-    /// # Errors
-    /// The file cannot be written, or its path is taken.
-    pub fn close<R: Record>(&mut self, table: GrowingTable<R>, origin: Origin) -> Result<(), ReleaseError> {
-        let Some(writer) = table.writer else { return Ok(()) };
-        let summary = writer.finish()?;
-        let content_sha256 = Some(summary.content_sha256);
-        self.adopt(&table.path, Origin { content_sha256, records: Some(summary.rows), ..origin })
-    }
-
-    /// Writes one file `part-<part>.parquet` of a table for each part, several at a time; `rows` makes the rows of a part,
-    /// sorted by key. A part without rows has no file.
-    ///
-    /// # Errors
-    /// Those of `rows`; the rows are not sorted, or a file cannot be written.
-    pub fn write_parts<R: Record, E: From<ReleaseError> + Send>(
-        &mut self,
-        parts: &[&str],
-        rows: impl Fn(&str) -> Result<Vec<R>, E> + Sync,
-        origin: &Origin,
+        parts: Vec<TablePart>,
+        fill: impl Fn(&TablePart, &mut PartWriter<'_>) -> Result<(), E> + Sync,
     ) -> Result<(), E> {
-        let targets =
-            parts.iter().map(|part| self.claim(&part_path::<R>(part))).collect::<Result<Vec<PathBuf>, _>>()?;
+        let targets = parts.iter().map(|part| self.claim(&part.path())).collect::<Result<Vec<PathBuf>, _>>()?;
         let metadata = &self.metadata;
-        let write = |(part, target): (&&str, &PathBuf)| {
-            let rows = rows(part)?;
-            if rows.is_empty() {
-                return Ok(None);
-            }
-            let mut writer = TableWriter::<R>::create(target, metadata).map_err(ReleaseError::from)?;
-            rows.iter().try_for_each(|row| writer.push(row)).map_err(ReleaseError::from)?;
+        let write = |(part, target): (&TablePart, &PathBuf)| {
+            let mut rows = PartWriter { table: part.table, target, metadata, writer: None };
+            fill(part, &mut rows)?;
+            let Some(writer) = rows.writer else { return Ok(None) };
             let summary = writer.finish().map_err(ReleaseError::from)?;
             let (bytes, sha256) = digest::of_file(target).map_err(ReleaseError::io(target))?;
             let content_sha256 = Some(summary.content_sha256);
-            let origin = Origin { content_sha256, records: Some(summary.rows), ..origin.clone() };
-            Ok(Some(Artifact { path: part_path::<R>(part), bytes, sha256, origin }))
+            let origin = Origin { content_sha256, records: Some(summary.rows), ..part.origin.clone() };
+            Ok(Some(Artifact { path: part.path(), bytes, sha256, origin }))
         };
         let written: Result<Vec<Option<Artifact>>, E> = parts.par_iter().zip(&targets).map(write).collect();
         self.manifest.artifacts.extend(written?.into_iter().flatten());
@@ -281,7 +256,7 @@ impl ReleaseBuilder {
     fn write_manifest(&mut self) -> Result<String, ReleaseError> {
         self.manifest.artifacts.sort_by(|a, b| a.path.cmp(&b.path));
         self.manifest.failed.sort_by(|a, b| (&a.stage, &a.item).cmp(&(&b.stage, &b.item)));
-        let path = self.staging.join(MANIFEST);
+        let path = self.staging().join(MANIFEST);
         let file = File::create(&path).map_err(ReleaseError::io(&path))?;
         let mut writer = BufWriter::new(Hashed::new(file));
         serde_json::to_writer_pretty(&mut writer, &self.manifest)?;
@@ -296,7 +271,7 @@ impl ReleaseBuilder {
         if self.paths.contains(path) {
             return Err(ReleaseError::Path { path: path.to_owned(), reason: "it is there twice" });
         }
-        let target = self.staging.join(path);
+        let target = self.staging().join(path);
         if let Some(folder) = target.parent() {
             fs::create_dir_all(folder).map_err(ReleaseError::io(folder))?;
         }
@@ -311,17 +286,12 @@ impl ReleaseBuilder {
     pub fn seal(mut self, dest: &Path) -> Result<Release, ReleaseError> {
         check_dest(dest)?;
         let sha256 = self.write_manifest()?;
-        let path = self.staging.join(SUMS);
+        let path = self.staging().join(SUMS);
         fs::write(&path, sums(&self.manifest, &sha256)).map_err(ReleaseError::io(&path))?;
-        sync_tree(&self.staging)?;
-        put_in_place(&self.staging, dest)?;
+        sync_tree(self.staging())?;
+        self.staging.put_in_place(dest)?;
         Ok(Release { folder: dest.to_owned(), manifest: self.manifest })
     }
-}
-
-/// Path of a part of a table in a release.
-fn part_path<R: Record>(part: &str) -> String {
-    format!("{TABLES}/{}/part-{part}.parquet", R::TABLE.name)
 }
 
 /// The text of `SHA256SUMS`: every file of the manifest and the manifest itself, by path.
@@ -363,23 +333,56 @@ fn remove_folder(folder: &Path) -> Result<(), ReleaseError> {
     }
 }
 
-/// Gives a finished folder its name; what has the name is replaced, and is there until then.
-///
-/// # Errors
-/// The file system refused.
-pub fn put_in_place(staging: &Path, dest: &Path) -> Result<(), ReleaseError> {
-    let aside = beside(dest, "replaced");
-    remove_folder(&aside)?;
-    if dest.exists() {
-        fs::rename(dest, &aside).map_err(ReleaseError::io(dest))?;
+/// A folder under construction, `.sastrugi-assembling-<dest>`. Unless it is put in place, it is removed with this value.
+#[derive(Debug)]
+pub struct Staging(PathBuf);
+
+impl Staging {
+    /// An empty folder beside its place; what a killed run left there is removed.
+    ///
+    /// # Errors
+    /// The file system refused.
+    pub fn beside(dest: &Path) -> Result<Self, ReleaseError> {
+        let staging = Self(beside(dest, "assembling"));
+        remove_folder(staging.path())?;
+        fs::create_dir_all(staging.path()).map_err(ReleaseError::io(staging.path()))?;
+        Ok(staging)
     }
-    fs::rename(staging, dest).map_err(ReleaseError::io(dest))?;
-    let parent = match dest.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent,
-        _ => Path::new("."),
-    };
-    sync_folder(parent).map_err(ReleaseError::io(parent))?;
-    remove_folder(&aside)
+
+    /// The folder.
+    pub fn path(&self) -> &Path {
+        &self.0
+    }
+
+    /// Gives the finished folder its name; what has the name is replaced, and is there until then.
+    ///
+    /// # Errors
+    /// The file system refused.
+    pub fn put_in_place(&self, dest: &Path) -> Result<(), ReleaseError> {
+        let aside = beside(dest, "replaced");
+        remove_folder(&aside)?;
+        if dest.exists() {
+            fs::rename(dest, &aside).map_err(ReleaseError::io(dest))?;
+        }
+        fs::rename(self.path(), dest).map_err(|e| {
+            // Where this fails as well, the release that was there keeps the other name.
+            let _ = fs::rename(&aside, dest);
+            ReleaseError::io(dest)(e)
+        })?;
+        let parent = match dest.parent() {
+            Some(parent) if !parent.as_os_str().is_empty() => parent,
+            _ => Path::new("."),
+        };
+        sync_folder(parent).map_err(ReleaseError::io(parent))?;
+        remove_folder(&aside)
+    }
+}
+
+impl Drop for Staging {
+    fn drop(&mut self) {
+        // What cannot be removed is removed when the next run begins.
+        let _ = fs::remove_dir_all(&self.0);
+    }
 }
 
 /// Brings every file and folder of a tree to disk.

@@ -29,8 +29,12 @@ fn sealed(dest: &Path) -> Release {
     let mut builder = ReleaseBuilder::beside(dest, head()).unwrap();
     builder.write_text("README.md", "# Demo\n", Origin::default()).unwrap();
     builder.write_text("fit/a.json", "{}\n", Origin { stage: "fit".to_owned(), ..Origin::default() }).unwrap();
-    builder.write_table("0000", rows(9000), Origin::default()).unwrap();
-    builder.write_table::<CovarianceRow>("0000", vec![], Origin::default()).unwrap();
+    let whole = |table| TablePart { table, name: TablePart::WHOLE.to_owned(), origin: Origin::default() };
+    let fill = |part: &TablePart, writer: &mut PartWriter<'_>| {
+        let rows = if part.table.name == PsdRow::TABLE.name { rows(9000) } else { Vec::new() };
+        rows.iter().try_for_each(|row| writer.push(row.cells()))
+    };
+    builder.write_tables(vec![whole(&PsdRow::TABLE), whole(&CovarianceRow::TABLE)], fill).unwrap();
     builder.seal(dest).unwrap()
 }
 
@@ -143,7 +147,7 @@ fn val_rows_of_a_changed_table_are_not_read() {
 #[test]
 fn val_paths_stay_inside() {
     let folder = tempfile::tempdir().unwrap();
-    let mut builder = ReleaseBuilder::create(&folder.path().join("s"), head()).unwrap();
+    let mut builder = ReleaseBuilder::beside(&folder.path().join("s"), head()).unwrap();
     for path in ["../x", "/x", "a//b", ".hidden", MANIFEST, "a/../b", "a\nb", ""] {
         let result = builder.write_text(path, "", Origin::default());
         assert!(matches!(result, Err(ReleaseError::Path { .. })), "{path:?}");

@@ -143,17 +143,17 @@ fn poorly_known(fit: &FitRow, file: Option<&FitFile>) -> Option<String> {
     let spread = file.and_then(|f| f.diagnostics.get("sigma2_over_range_spread")?.as_f64()).unwrap_or(1.0);
     let ratio_words = match spread > SPREAD {
         true => format!(
-            "σ²/b is better known at this window, but moves by a factor of {} between windows",
+            "σ²/b is better constrained at this window but varies by a factor of {} between windows",
             set::significant(spread, 2)
         ),
-        false => "σ²/b is better known".to_owned(),
+        false => "σ²/b is better constrained".to_owned(),
     };
     (wide(range.3) && known(ratio.3) && !wide(ratio.3)).then(|| match range.3 {
         [low, high] if low > 0.0 && high.is_finite() => {
             let factor = set::significant(high / low, 2);
-            format!("b is known only to a factor of {factor}; {ratio_words}.")
+            format!("b is known only to within a factor of {factor}; {ratio_words}.")
         }
-        _ => format!("The data sets no upper limit to b; {ratio_words}."),
+        _ => format!("The data set no upper limit on b; {ratio_words}."),
     })
 }
 

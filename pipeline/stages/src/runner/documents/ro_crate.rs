@@ -4,7 +4,8 @@
 //! has the parents, stream and hash of each.
 
 use super::{Described, FOLDERS, add_terms, citation_line, license, page};
-use crate::jobs::{ItemRef, original};
+use crate::job::ItemRef;
+use crate::jobs::original;
 use sastrugi_schemas::manifest::{Artifact, PROGRAM as PROGRAM_NAME, Source};
 use sastrugi_schemas::tables;
 use serde_json::{Value, json};

@@ -1,0 +1,257 @@
+//! A study's graph under construction: what is there so far, and what later sections refer to.
+
+use crate::job::ItemRef;
+use crate::runner::graph::{Graph, InputFile, Node};
+use crate::study::{Entry, Study, StudyError};
+use sastrugi_mobility::missions::{Mission, MissionSettings};
+use sastrugi_numeric::{Geometry, Streams};
+use sastrugi_schemas::fit::Source;
+use sastrugi_schemas::study::Pairing;
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+/// Endings that files of the release have beside an id.
+const RESERVED: [&str; 5] = ["raw", "metric", "background", "residual", "mask"];
+
+/// Why a study has no graph.
+#[derive(Debug, thiserror::Error)]
+pub enum BuildError {
+    /// The study is wrong.
+    #[error(transparent)]
+    Study(#[from] StudyError),
+    /// An input file is missing or cannot be read.
+    #[error("{0}")]
+    Input(String),
+}
+
+/// A heightfield that other items can refer to.
+#[derive(Clone, Debug)]
+pub struct Heightfield {
+    /// The item that makes it; its file is `heights.tif`.
+    pub item: ItemRef,
+    /// Label for statistics.
+    pub group: Option<String>,
+    /// What differs from other heightfields of the group.
+    pub variant: Option<String>,
+    /// Position among the replicates of its item, from 0; measured DEMs have none.
+    pub replicate: Option<u64>,
+    /// Generator, method or file format.
+    pub kind: String,
+    /// Full parameters.
+    pub parameters: Value,
+    /// Words of its random streams.
+    pub stream: Option<String>,
+    /// Its path in the release.
+    pub release_path: String,
+    /// Number of cells; for a measured DEM whose file does not state it, as many as it may hold.
+    pub cells: u64,
+    /// Smaller side of a cell, m, where it is known before the run.
+    pub cell_m: Option<f64>,
+    /// Shape and place, where they are known before the run.
+    pub geometry: Option<Geometry>,
+}
+
+/// Missions that a traverse can refer to.
+#[derive(Clone, Debug)]
+pub struct Drawn {
+    /// What is drawn on each heightfield.
+    pub lines: Vec<Lines>,
+    /// Missions on each.
+    pub count: usize,
+    /// Length, m.
+    pub length_m: f64,
+}
+
+/// The missions of one heightfield.
+#[derive(Clone, Debug)]
+pub struct Lines {
+    /// Heightfield.
+    pub heightfield: String,
+    /// Item that draws them.
+    pub item: ItemRef,
+    /// Random streams are named by this: the heightfield, or what it shares with others.
+    pub word: String,
+    /// Rules of the draw.
+    pub settings: MissionSettings,
+    /// Number of the replicates that share draws with this one, from 0.
+    pub shared: Option<u64>,
+}
+
+impl Lines {
+    /// Name of a mission's start and goal, for one-by-one comparison.
+    pub fn pair_id(&self, mission: &Mission) -> String {
+        match self.shared {
+            None => format!("{}-{:04}", self.item.id, mission.index + 1),
+            // The same draw is the same line on all that share it.
+            Some(_) => format!("{}-{:04}.{}", self.block(), mission.index + 1, mission.draws),
+        }
+    }
+
+    /// Name of what shares draws: `<missions>-<replicate>`.
+    fn block(&self) -> String {
+        let missions = self.item.id.split_once('@').map_or("", |(missions, _)| missions);
+        format!("{missions}-{:04}", self.shared.unwrap_or(0) + 1)
+    }
+}
+
+/// A graph under construction, with what later sections refer to.
+pub struct Builder<'a> {
+    /// The study.
+    pub study: &'a Study,
+    /// Heightfields by id.
+    pub heightfields: BTreeMap<String, Heightfield>,
+    /// Ids that an id in the study stands for (its replicates and sweeps).
+    pub families: BTreeMap<String, Vec<String>>,
+    /// Ids of fits.
+    pub fits: Vec<String>,
+    /// Missions by id: what is drawn on which heightfields.
+    pub missions: BTreeMap<String, Drawn>,
+    /// Where each input file goes in the release.
+    pub inputs: Vec<InputPlace>,
+    /// The items so far.
+    pub graph: Graph,
+    ids: BTreeMap<String, &'static str>,
+}
+
+/// An input file and its place in the release.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct InputPlace {
+    /// Path of the key that names it in the study.
+    pub key: Vec<String>,
+    /// Path in the release.
+    pub release_path: String,
+}
+
+impl<'a> Builder<'a> {
+    /// Begins the graph of a study.
+    pub fn new(study: &'a Study) -> Self {
+        Self {
+            study,
+            heightfields: BTreeMap::new(),
+            families: BTreeMap::new(),
+            fits: Vec::new(),
+            missions: BTreeMap::new(),
+            inputs: Vec::new(),
+            graph: Graph::default(),
+            ids: BTreeMap::new(),
+        }
+    }
+
+    /// Takes an id; ids are unique in a study, across sections.
+    ///
+    /// # Errors
+    /// When it is taken.
+    pub fn claim(&mut self, entry: &Entry<'_>, section: &'static str, id: &str) -> Result<(), StudyError> {
+        let ending = id.rsplit_once('.').map_or("", |(_, ending)| ending);
+        if RESERVED.contains(&ending) || sastrugi_terrain::MAPS.iter().any(|map| map.name == ending) {
+            return Err(
+                entry.error("id", format!("the id \"{id}\" ends in .{ending}, which names files of the release"))
+            );
+        }
+        match self.ids.insert(id.to_owned(), section) {
+            None => Ok(()),
+            Some(other) => {
+                let message = format!("the id \"{id}\" is taken by an item of [[{other}]]; ids are unique in a study");
+                Err(entry.error("id", message))
+            }
+        }
+    }
+
+    /// Streams of an item: the study's, or those of its explicit seed.
+    pub fn streams(&self, stage: &str, id: &str, seed: Option<u64>, replicate: u64) -> Streams {
+        match seed {
+            Some(seed) => Streams::for_seed(seed.wrapping_add(replicate), stage),
+            None => Streams::for_item(self.study.head.seed, stage, id),
+        }
+    }
+
+    /// True when replicates with the same number share their random draws.
+    pub fn is_paired(&self) -> bool {
+        self.study.head.pairing == Pairing::Common
+    }
+
+    /// Names a family of ids, to which references resolve.
+    ///
+    /// # Errors
+    /// When another family has that name.
+    pub fn name_family(&mut self, entry: &Entry<'_>, name: &str, ids: Vec<String>) -> Result<(), StudyError> {
+        match self.families.insert(name.to_owned(), ids) {
+            None => Ok(()),
+            Some(_) => Err(entry.error("id", format!("the id \"{name}\" is taken; ids are unique in a study"))),
+        }
+    }
+
+    /// Adds an item to the graph.
+    ///
+    /// # Errors
+    /// When its name is taken or a parent is missing: a stage registered out of order.
+    pub fn node(&mut self, node: Node) -> Result<(), StudyError> {
+        let name = node.item.to_string();
+        let placed = self.graph.add(node);
+        placed.then_some(()).ok_or_else(|| StudyError::at(None, format!("{name} cannot be placed in the graph")))
+    }
+
+    /// The heightfield that a key names.
+    ///
+    /// # Errors
+    /// An id that no earlier heightfield has.
+    pub fn surface(&self, entry: &Entry<'_>, key: &str, id: &str) -> Result<&Heightfield, StudyError> {
+        self.heightfields.get(id).ok_or_else(|| unknown_id(entry, key, id, self.heightfields.keys()))
+    }
+
+    /// What a fit file says of its source: the measured file, or the generated heightfield's path in the release.
+    pub fn source_of(&self, id: &str, field: &Heightfield) -> Source {
+        let input = self.graph.find(&field.item).and_then(|p| self.graph.node(p).inputs.first());
+        let window = field.parameters.get("window").and_then(|w| serde_json::from_value(w.clone()).ok());
+        match input {
+            Some(input) => Source {
+                file: format!("{id}.{}", field.kind),
+                sha256: input.sha256.clone(),
+                window,
+                ..Source::default()
+            },
+            None => Source { file: field.release_path.clone(), ..Source::default() },
+        }
+    }
+
+    /// The ids that a reference stands for.
+    ///
+    /// # Errors
+    /// An id that no earlier item has.
+    pub fn family(&self, entry: &Entry<'_>, key: &str, id: &str) -> Result<Vec<String>, StudyError> {
+        if self.heightfields.contains_key(id) {
+            return Ok(vec![id.to_owned()]);
+        }
+        self.families.get(id).cloned().ok_or_else(|| unknown_id(entry, key, id, self.families.keys()))
+    }
+}
+
+/// The error for a reference to nothing.
+pub fn unknown_id<'s>(entry: &Entry<'_>, key: &str, id: &str, known: impl Iterator<Item = &'s String>) -> StudyError {
+    let known: Vec<&str> = known.map(String::as_str).collect();
+    let nearest = crate::study::keys::nearest(id, known.iter().copied()).map(|n| format!("did you mean \"{n}\"?"));
+    let list = if known.is_empty() { "there are none".to_owned() } else { format!("there are {}", known.join(", ")) };
+    entry
+        .error(key, format!("`{key}` names \"{id}\", which no item before it has"))
+        .with_help(Some(nearest.unwrap_or(list)))
+}
+
+/// Word of the random streams that replicate `replicate` (from 0) shares with that of other items when they are paired.
+pub fn common(replicate: u64) -> String {
+    format!("common-{:04}", replicate + 1)
+}
+
+/// An input file: its length in bytes, and its hash.
+///
+/// # Errors
+/// A file that is missing or cannot be read.
+pub fn input_file(path: PathBuf) -> Result<(u64, InputFile), BuildError> {
+    match sastrugi_store::digest::of_file(&path) {
+        Ok((bytes, sha256)) => Ok((bytes, InputFile { path, sha256 })),
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => {
+            Err(BuildError::Input(format!("{}: no such file", path.display())))
+        }
+        Err(e) => Err(BuildError::Input(format!("{}: {e}", path.display()))),
+    }
+}

@@ -1,0 +1,221 @@
+//! What an item of a study does: the trait of all jobs, what they are given and what they leave.
+
+use crate::machine::{Fault, fault};
+use crate::revision::Room;
+use sastrugi_schemas::{Cell, Record, Table};
+use sastrugi_store::atomic::{self, Draft, DraftFile};
+use sastrugi_store::parquet::{TableSummary, write_table};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+/// Name of an item: its stage and its id.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub struct ItemRef {
+    /// Stage, as `terrain`.
+    pub stage: String,
+    /// Id, unique within the stage.
+    pub id: String,
+}
+
+impl ItemRef {
+    /// The item `id` of `stage`.
+    pub fn new(stage: &str, id: &str) -> Self {
+        Self { stage: stage.to_owned(), id: id.to_owned() }
+    }
+}
+
+impl fmt::Display for ItemRef {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}/{}", self.stage, self.id)
+    }
+}
+
+/// What one item of a study does. A job is glue: it reads the artifacts of its parents, calls a kernel, and writes files.
+pub trait Job: Send + Sync {
+    /// Everything in the study that decides what the result holds, defaults filled in.
+    fn recipe(&self) -> Value;
+    /// What decides only how the same heights are packed: items made from them stay as they are. Null for the usual way.
+    fn packing(&self) -> Value {
+        Value::Null
+    }
+    /// Rooms whose code decides the result, besides the ones that every job stands on.
+    fn rooms(&self) -> &'static [Room];
+    /// Peak working memory, bytes.
+    fn memory_bytes(&self) -> u64;
+    /// Rough cost, for `plan` and the progress bar.
+    fn estimate(&self) -> Estimate;
+    /// Does the work.
+    ///
+    /// # Errors
+    /// Why this item has no result; the other items go on.
+    fn run(&self, work: &Work<'_>) -> Result<Outcome, JobError>;
+}
+
+/// Rough cost of an item on one core.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Estimate {
+    /// Time, s.
+    pub seconds: f64,
+    /// Bytes of its artifacts.
+    pub bytes: f64,
+}
+
+/// Where a job finds its inputs and leaves its outputs.
+pub struct Work<'a> {
+    /// Folder for the outputs.
+    pub folder: Draft<'a>,
+    /// Folders of the parents' artifacts.
+    pub parents: &'a BTreeMap<ItemRef, PathBuf>,
+}
+
+impl Work<'_> {
+    /// A file of a parent.
+    ///
+    /// # Errors
+    /// When the item is no parent (a bug in the stage's registration).
+    pub fn parent(&self, item: &ItemRef, file: &str) -> Result<PathBuf, JobError> {
+        let folder = self.parents.get(item).ok_or_else(|| JobError::new(format!("{item} is not a parent")))?;
+        Ok(folder.join(file))
+    }
+
+    /// An output.
+    pub fn output(&self, file: &str) -> DraftFile {
+        self.folder.file(file)
+    }
+
+    /// Writes an output of a few bytes.
+    ///
+    /// # Errors
+    /// When the file system refuses.
+    pub fn write(&self, file: &str, bytes: &[u8]) -> Result<(), JobError> {
+        atomic::write(&self.output(file), bytes).map_err(|e| JobError::at(&self.folder.0.join(file), e))
+    }
+}
+
+/// What a job leaves behind.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct Outcome {
+    /// Files in the item's folder.
+    pub products: Vec<Product>,
+    /// Sentences that a reader must know.
+    pub notes: Vec<String>,
+}
+
+impl Outcome {
+    /// Writes the item's rows of a table, sorted by key; nothing where there is none. A release has the rows of all items.
+    ///
+    /// # Errors
+    /// Rows that are not sorted, or a table that the item has written (bugs); the file cannot be written.
+    pub fn write_rows<R: Record>(
+        &mut self,
+        work: &Work<'_>,
+        rows: impl IntoIterator<Item = R>,
+    ) -> Result<(), JobError> {
+        let mut rows = rows.into_iter().peekable();
+        if rows.peek().is_none() {
+            return Ok(());
+        }
+        let file = format!("{}.parquet", R::TABLE.name);
+        if self.products.iter().any(|product| product.file == file) {
+            return Err(JobError::new(format!("{file} was written twice")));
+        }
+        let summary = write_table(&work.output(&file), rows, None).map_err(JobError::io)?;
+        self.products.push(Product::fragment(file, &R::TABLE, summary));
+        Ok(())
+    }
+}
+
+/// One file that a job made.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Product {
+    /// Name in the item's folder.
+    pub file: String,
+    /// Path in the release; absent for files that serve later stages only.
+    pub release_path: Option<String>,
+    /// Hash of the decoded content (heights, rows, messages), where there is one.
+    pub content: Option<String>,
+    /// Number of messages of a recording, or of rows.
+    pub records: Option<u64>,
+    /// The rows in it, where it holds some of a table of the release.
+    #[serde(default)]
+    pub fragment: Option<Fragment>,
+}
+
+/// Rows of a table that one item made.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Fragment {
+    /// The table.
+    pub table: String,
+    /// Keys of the first and the last row.
+    pub ends: [Vec<Cell>; 2],
+}
+
+impl Product {
+    /// A file that goes into the release.
+    pub fn released(file: &str, release_path: String, content: Option<String>) -> Self {
+        Self { release_path: Some(release_path), content, ..Self::internal(file) }
+    }
+
+    /// A file for later stages.
+    pub fn internal(file: &str) -> Self {
+        Self { file: file.to_owned(), release_path: None, content: None, records: None, fragment: None }
+    }
+
+    fn fragment(file: String, table: &Table, summary: TableSummary) -> Self {
+        let TableSummary { rows, ends, content_sha256 } = summary;
+        let fragment = Some(Fragment { table: table.name.to_owned(), ends });
+        Self { file, release_path: None, content: Some(content_sha256), records: Some(rows), fragment }
+    }
+}
+
+/// Why an item has no result.
+#[derive(Clone, Debug, thiserror::Error)]
+#[error("{message}")]
+pub struct JobError {
+    /// One sentence.
+    pub message: String,
+    /// Where the reason lies.
+    pub cause: Cause,
+}
+
+/// Where the reason for a failure lies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Cause {
+    /// In the item: other items are not concerned.
+    Item,
+    /// In the item's input data.
+    Input,
+    /// In the machine: every item would fail.
+    Machine(Fault),
+}
+
+impl JobError {
+    /// A failure of the item, with its reason.
+    pub fn new(message: impl fmt::Display) -> Self {
+        Self { message: message.to_string(), cause: Cause::Item }
+    }
+
+    /// A failure that lies in the input data.
+    pub fn input(message: impl fmt::Display) -> Self {
+        Self { message: message.to_string(), cause: Cause::Input }
+    }
+
+    /// A failure to read or write: the machine's where the error says so, else the item's.
+    pub fn io(error: impl std::error::Error + 'static) -> Self {
+        let cause = fault(&error).map_or(Cause::Item, Cause::Machine);
+        Self { message: error.to_string(), cause }
+    }
+
+    /// The same about a file.
+    pub fn at(path: &Path, error: std::io::Error) -> Self {
+        Self::io(error).reworded(|words| format!("{}: {words}", path.display()))
+    }
+
+    /// The same with other words.
+    pub fn reworded(self, words: impl FnOnce(&str) -> String) -> Self {
+        Self { message: words(&self.message), ..self }
+    }
+}
