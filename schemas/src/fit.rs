@@ -31,8 +31,8 @@ pub struct FitFile {
     pub model_m2: Vec<f64>,
     /// Fitted model in each bin before detrending and trimming, m2.
     pub surface_model_m2: Vec<f64>,
-    /// Named figures about the fit.
-    pub diagnostics: BTreeMap<String, Value>,
+    /// What was found about the fit.
+    pub diagnostics: Diagnostics,
     /// 95 % intervals by parametric bootstrap; absent when none were asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub intervals: Option<Intervals>,
@@ -81,7 +81,7 @@ impl FitFile {
         let blocks = self.block_intervals.as_ref();
         match (&self.intervals, blocks) {
             (Some(_), Some(blocks)) if self.misfits() => Some((blocks, "block bootstrap, as the model misfits")),
-            (Some(_), Some(blocks)) if self.rejects("stationarity_p") => {
+            (Some(_), Some(blocks)) if Self::rejects(self.diagnostics.stationarity_p) => {
                 Some((blocks, "block bootstrap, as the site is not stationary"))
             }
             (Some(own), _) if own.from_profile => Some((own, "profile likelihood")),
@@ -94,18 +94,18 @@ impl FitFile {
     /// Whether the model is not that of the data.
     fn misfits(&self) -> bool {
         let variance_m2 = self.covariance_m2.first().copied().unwrap_or(f64::NAN);
-        let misfit_m2 = self.diagnostics.get("misfit_m2").and_then(Value::as_f64).unwrap_or(f64::NAN);
-        self.rejects("misfit_p") || misfit_m2 > Self::MISFIT_MAX * variance_m2
+        let misfit_m2 = self.diagnostics.misfit_m2.unwrap_or(f64::NAN);
+        Self::rejects(self.diagnostics.misfit_p) || misfit_m2 > Self::MISFIT_MAX * variance_m2
     }
 
-    fn rejects(&self, p: &str) -> bool {
-        self.diagnostics.get(p).and_then(Value::as_f64).is_some_and(|p| p <= Self::TEST_LEVEL)
+    fn rejects(p: Option<f64>) -> bool {
+        p.is_some_and(|p| p <= Self::TEST_LEVEL)
     }
 
     /// A parameter, or `sigma2_over_range_m` (sigma^2 / b, m) of a model that has it; `None` where the fit has none.
     pub fn parameter(&self, name: &str) -> Option<f64> {
         match name {
-            SILL_OVER_RANGE => self.diagnostics.get(name).and_then(Value::as_f64),
+            SILL_OVER_RANGE => self.diagnostics.sigma2_over_range_m,
             _ => self.parameters.get(name).copied(),
         }
     }
@@ -124,8 +124,116 @@ impl FitFile {
 
     /// Whether the search for the range ended at its bound: then range and sigma are no estimates, only their lower limits are known.
     pub fn range_at_bound(&self) -> bool {
-        self.diagnostics.get("range_at_search_bound").and_then(Value::as_bool).unwrap_or(false)
+        self.diagnostics.range_at_search_bound
     }
+}
+
+/// What was found about a fit. A figure is absent where it was not looked for, or cannot be told.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Diagnostics {
+    /// Root mean square height of the residual that was used, m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub band_rms_m: Option<f64>,
+    /// Largest over smallest sigma of the blocks of the DEM.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub block_sigma_max_over_min: Option<f64>,
+    /// Rise of the sum of squares at three times the range, over the misfit that there is.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub chi2_rise_at_3b: Option<f64>,
+    /// Shortest lag at which the texture is told from the noise, m; absent where it is not at any lag.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub effective_resolution_m: Option<f64>,
+    /// Hurst exponent of the self-affine model, where fits at other windows disagree.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub hurst: Option<f64>,
+    /// Its root mean square increment over 1 m, m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub increment_1m_m: Option<f64>,
+    /// Direction of the longest range, degrees clockwise from north.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub isotropy_azimuth_deg: Option<f64>,
+    /// P-value of the test of isotropy.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub isotropy_p: Option<f64>,
+    /// Shortest range over the longest one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub isotropy_ratio: Option<f64>,
+    /// Steps of the search.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub iterations: Option<u64>,
+    /// Longest lag of the bins, m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lag_max_m: Option<f64>,
+    /// Least share of cells with data that a window needs.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub min_valid_share: Option<f64>,
+    /// Generalised sum of squares per degree of freedom.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub misfit_chi2_per_freedom: Option<f64>,
+    /// Root mean square difference between bins and model, m2.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub misfit_m2: Option<f64>,
+    /// P-value of the test of the model.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub misfit_p: Option<f64>,
+    /// Range of the fit without correction for detrending and trimming, m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub naive_range_m: Option<f64>,
+    /// The same in windows.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub naive_range_windows: Option<f64>,
+    /// Standard deviation of the fit without correction, m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub naive_sigma_m: Option<f64>,
+    /// Share of cells without data.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub no_data_share: Option<f64>,
+    /// P-value of the test of normal heights.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub normality_p: Option<f64>,
+    /// Share of cells taken for objects.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub object_share: Option<f64>,
+    /// Fits at half and twice the outer scale.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub other_windows: Vec<OtherWindow>,
+    /// Whether the search for the range ended at its bound.
+    pub range_at_search_bound: bool,
+    /// sigma^2 / b, m, of models that fall in a straight line from lag zero.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sigma2_over_range_m: Option<f64>,
+    /// Largest over smallest sigma^2 / b of all windows.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sigma2_over_range_spread: Option<f64>,
+    /// P-value of the test of a stationary site.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stationarity_p: Option<f64>,
+    /// Share of cells that were trimmed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub trimmed_share: Option<f64>,
+    /// Window of the background in cells, east-west and north-south.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub window_cells: Option<[usize; 2]>,
+    /// Largest disagreement of fits at other windows, standard errors.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub window_disagreement_z: Option<f64>,
+    /// Share of cells whose window holds too few data.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub window_lacks_data_share: Option<f64>,
+}
+
+/// A fit of the same DEM at another window.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct OtherWindow {
+    /// Root mean square height of the residual, on the cells that all windows have, m.
+    pub band_rms_m: f64,
+    /// Generalised sum of squares per degree of freedom.
+    pub misfit_chi2_per_freedom: Option<f64>,
+    /// Longest wave that is left, m.
+    pub outer_scale_m: f64,
+    /// Fitted parameters.
+    pub parameters: BTreeMap<String, f64>,
 }
 
 /// Name of sigma^2 / b among intervals.
@@ -336,7 +444,6 @@ pub struct GsTools {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use serde_json::json;
 
     fn intervals(range: [Option<f64>; 2], from_profile: bool) -> Option<Intervals> {
         let values = [("range_m".to_owned(), range), (SILL_OVER_RANGE.to_owned(), [Some(0.001), Some(0.002)])].into();
@@ -351,11 +458,11 @@ mod tests {
             parameters: [("sigma_m".to_owned(), 1.0), ("range_m".to_owned(), 420.0)].into(),
             intervals: intervals([Some(4.4), None], true),
             block_intervals: intervals([None, None], false),
-            diagnostics: [
-                ("range_at_search_bound".to_owned(), json!(true)),
-                (SILL_OVER_RANGE.to_owned(), json!(1.0 / 420.0)),
-            ]
-            .into(),
+            diagnostics: Diagnostics {
+                range_at_search_bound: true,
+                sigma2_over_range_m: Some(1.0 / 420.0),
+                ..Diagnostics::default()
+            },
             ..FitFile::default()
         };
         assert_eq!(fit.quoted("range_m"), Some(Quoted::AtLeast(4.4)));
@@ -364,9 +471,9 @@ mod tests {
         assert_eq!(fit.quoted(SILL_OVER_RANGE), Some(sill));
         assert_eq!(fit.quoted("nugget_m2"), None);
         let mut misfit = fit.clone();
-        misfit.diagnostics.insert("misfit_p".to_owned(), json!(0.001));
+        misfit.diagnostics.misfit_p = Some(0.001);
         assert_eq!(misfit.quoted("range_m"), Some(Quoted::NotIdentified { ended: 420.0 }));
-        let found = FitFile { diagnostics: BTreeMap::new(), ..fit };
+        let found = FitFile { diagnostics: Diagnostics::default(), ..fit };
         let estimate = Quoted::Estimate { value: 420.0, interval: Some([Some(4.4), None]) };
         assert_eq!(found.quoted("range_m"), Some(estimate));
     }

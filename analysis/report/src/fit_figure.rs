@@ -250,7 +250,7 @@ fn directions(fit: &FitFile, id: &str) -> Option<Plot> {
 mod tests {
     use super::*;
     use crate::tests::xml::assert_well_formed;
-    use sastrugi_schemas::fit::Intervals;
+    use sastrugi_schemas::fit::{Diagnostics, Intervals};
 
     fn fit() -> FitFile {
         let direction = |azimuth_deg: f64, lag_m: f64| DirectionBin {
@@ -303,7 +303,7 @@ mod tests {
     fn val_a_range_at_the_bound_is_not_drawn_as_an_estimate() {
         let ends = |low| [("range_m".to_owned(), [low, None])].into();
         let intervals = |low| Some(Intervals { level: 0.95, replicates: 99, from_profile: true, values: ends(low) });
-        let diagnostics = [("range_at_search_bound".to_owned(), true.into())].into();
+        let diagnostics = Diagnostics { range_at_search_bound: true, ..Diagnostics::default() };
         let bounded = FitFile { diagnostics, intervals: intervals(Some(4.553)), ..fit() };
         assert_eq!(parameters(&bounded), "σ not identified,  b at least 4.55 m (95 %)");
         let open = FitFile { intervals: intervals(None), ..bounded };

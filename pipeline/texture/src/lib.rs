@@ -29,5 +29,5 @@ mod gstools_tests;
 
 pub use fit::{FitError, FitOutcome, FitParameters, FitSettings, Heights, LocalMaps, Profiles, fit};
 pub use onto::{OntoError, SlopeFactors, amplitude, modulated_onto, onto};
-pub use registry::{kinds, prepare};
-pub use synth::{Synthesis, SynthesisError, TextureOutcome, fit_notes};
+pub use registry::{kinds, method, prepare};
+pub use synth::{Cost, Method, Synthesis, SynthesisError, TextureOutcome, fit_notes};

@@ -2,21 +2,25 @@
 
 use crate::covariance::MODELS;
 use crate::fit::FitParameters;
-use crate::synth::{Synthesis, Wanted, cholesky, fft_ma, gaussians, quasi_wavelets};
+use crate::synth::cholesky::CholeskyParameters;
+use crate::synth::fft_ma::FftMaParameters;
+use crate::synth::gaussians::GaussiansParameters;
+use crate::synth::quasi_wavelets::QuasiWaveletsParameters;
+use crate::synth::{self, Method, Synthesis, cholesky, fft_ma, gaussians, quasi_wavelets};
 use sastrugi_schemas::fit::FitFile;
 use sastrugi_schemas::kind::schema_of;
 use sastrugi_schemas::{Kind, ParameterError};
 use serde_json::Value;
 
-/// How a method is prepared.
-type Prepare = fn(&Value, Wanted) -> Result<Box<dyn Synthesis>, ParameterError>;
+/// How the parameters of a method are checked.
+type Check = fn(&Value) -> Result<Box<dyn Method>, ParameterError>;
 
 /// Every synthesis method.
-const METHODS: [(fn() -> Kind, Prepare); 4] = [
-    (fft_ma::kind, fft_ma::prepare),
-    (cholesky::kind, cholesky::prepare),
-    (gaussians::kind, gaussians::prepare),
-    (quasi_wavelets::kind, quasi_wavelets::prepare),
+const METHODS: [(fn() -> Kind, Check); 4] = [
+    (fft_ma::kind, synth::check::<FftMaParameters>),
+    (cholesky::kind, synth::check::<CholeskyParameters>),
+    (gaussians::kind, synth::check::<GaussiansParameters>),
+    (quasi_wavelets::kind, synth::check::<QuasiWaveletsParameters>),
 ];
 
 /// Every kind of this room: the fit, the covariance models, the synthesis methods.
@@ -32,22 +36,26 @@ pub fn kinds() -> Vec<Kind> {
     std::iter::once(fit).chain(models).chain(METHODS.map(|(kind, _)| kind())).collect()
 }
 
-/// A texture of `method` with raw `parameters`, matching `fit`.
+/// The synthesis method of that name with raw `parameters`.
 ///
 /// # Errors
-/// An unknown method (the known ones are listed); parameters or a fit that the method refuses.
-pub fn prepare(method: &str, parameters: &Value, fit: &FitFile) -> Result<Box<dyn Synthesis>, ParameterError> {
-    match METHODS.into_iter().find(|(kind, _)| kind().kind == method) {
-        Some((kind, _)) if fit.map.is_some() && kind().kind != fft_ma::kind().kind => {
-            let message = format!("is `{method}`; an empirical covariance is made by `fft_ma` only");
-            Err(ParameterError::new("method", message))
-        }
-        Some((_, prepare)) => prepare(parameters, Wanted::of_fit(fit)?),
+/// An unknown method (the known ones are listed); parameters that the method refuses whatever it is to match.
+pub fn method(name: &str, parameters: &Value) -> Result<Box<dyn Method>, ParameterError> {
+    match METHODS.into_iter().find(|(kind, _)| kind().kind == name) {
+        Some((_, check)) => check(parameters),
         None => {
             let known = METHODS.map(|(kind, _)| kind().kind).join(", ");
-            Err(ParameterError::new("method", format!("is `{method}`; known texture methods: {known}")))
+            Err(ParameterError::new("method", format!("is `{name}`; known texture methods: {known}")))
         }
     }
+}
+
+/// A texture of the method of that name with raw `parameters`, matching `fit`.
+///
+/// # Errors
+/// As [`method`]; a fit that the method refuses.
+pub fn prepare(name: &str, parameters: &Value, fit: &FitFile) -> Result<Box<dyn Synthesis>, ParameterError> {
+    method(name, parameters)?.bind(fit)
 }
 
 #[cfg(test)]

@@ -271,7 +271,8 @@ pub fn fit_row(id: &str, dem_id: &str, fit: &FitFile) -> FitRow {
     let of_one = |name: &str| if single { parameter(name) } else { f64::NAN };
     let (sigma, range) = (of_one("sigma_m"), of_one("range_m"));
     let or = |name: &str, otherwise: f64| fit.parameters.get(name).copied().unwrap_or(otherwise);
-    let finding = |name: &str| fit.diagnostics.get(name).and_then(Value::as_f64).unwrap_or(f64::NAN);
+    let found = &fit.diagnostics;
+    let known = |value: Option<f64>| value.unwrap_or(f64::NAN);
     let setting = |name: &str| fit.settings[name].as_f64().unwrap_or(f64::NAN);
     let ends = |intervals: &Option<Intervals>, name: &str| {
         let [low, high] = intervals.as_ref().and_then(|i| i.values.get(name).copied())?;
@@ -313,24 +314,24 @@ pub fn fit_row(id: &str, dem_id: &str, fit: &FitFile) -> FitRow {
         block_range_high_m: block("range_m")[1],
         block_sigma2_over_range_low_m: block("sigma2_over_range_m")[0],
         block_sigma2_over_range_high_m: block("sigma2_over_range_m")[1],
-        misfit_chi2_per_freedom: finding("misfit_chi2_per_freedom"),
-        misfit_p: finding("misfit_p"),
-        isotropy_p: finding("isotropy_p"),
-        isotropy_ratio: finding("isotropy_ratio"),
-        isotropy_azimuth_deg: finding("isotropy_azimuth_deg"),
-        stationarity_p: finding("stationarity_p"),
-        block_sigma_max_over_min: finding("block_sigma_max_over_min"),
-        normality_p: finding("normality_p"),
-        window_disagreement_z: finding("window_disagreement_z"),
-        naive_sigma_m: finding("naive_sigma_m"),
-        naive_range_m: finding("naive_range_m"),
-        band_rms_m: finding("band_rms_m"),
-        increment_1m_m: finding("increment_1m_m"),
-        hurst: finding("hurst"),
+        misfit_chi2_per_freedom: known(found.misfit_chi2_per_freedom),
+        misfit_p: known(found.misfit_p),
+        isotropy_p: known(found.isotropy_p),
+        isotropy_ratio: known(found.isotropy_ratio),
+        isotropy_azimuth_deg: known(found.isotropy_azimuth_deg),
+        stationarity_p: known(found.stationarity_p),
+        block_sigma_max_over_min: known(found.block_sigma_max_over_min),
+        normality_p: known(found.normality_p),
+        window_disagreement_z: known(found.window_disagreement_z),
+        naive_sigma_m: known(found.naive_sigma_m),
+        naive_range_m: known(found.naive_range_m),
+        band_rms_m: known(found.band_rms_m),
+        increment_1m_m: known(found.increment_1m_m),
+        hurst: known(found.hurst),
         noise_sigma_m: setting("noise_sigma_m"),
         correlated_noise_sigma_m: setting("correlated_noise_sigma_m"),
         correlated_noise_range_m: setting("correlated_noise_range_m"),
-        effective_resolution_m: finding("effective_resolution_m"),
+        effective_resolution_m: known(found.effective_resolution_m),
         warnings: fit.warnings.join("; "),
     }
 }

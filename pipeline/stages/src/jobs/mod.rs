@@ -5,6 +5,7 @@ pub mod dem;
 pub mod exports;
 pub mod fit;
 pub mod mask;
+pub mod matched;
 pub mod missions;
 pub mod original;
 pub mod rasters;

@@ -1,10 +1,11 @@
 //! Stage `scoreboard`: all methods of a texture side by side.
 
-use super::texture::Matched;
+use super::matched::Matched;
 use crate::job::{Estimate, Job, JobError, Outcome, Work};
 use crate::revision::Room;
 use sastrugi_numeric::Streams;
 use sastrugi_schemas::tables::{ScoreCovarianceRow, ScoreRow};
+use sastrugi_texture::Cost;
 use sastrugi_texture::synth::scoreboard::{Score, score};
 use serde_json::{Value, json};
 
@@ -17,8 +18,8 @@ pub struct Entrant {
     pub method: String,
     /// Raw parameters.
     pub parameters: Value,
-    /// Predicted operations and bytes, unless the method refused the parameters.
-    pub cost: Option<(f64, u64)>,
+    /// What a realisation takes, unless the method refused the parameters.
+    pub cost: Option<Cost>,
 }
 
 /// The scoreboard of one texture.
@@ -59,8 +60,8 @@ impl ScoreboardJob {
             ratio_wanted: score.ratio_wanted,
             ratio_found: score.ratio_found,
             seam_jump_ratio: score.seam_jump_ratio,
-            operations: score.operations,
-            memory_bytes: score.memory_bytes as f64,
+            operations: score.cost.operations,
+            memory_bytes: score.cost.memory_bytes as f64,
             refused: String::new(),
         }
     }
@@ -110,11 +111,11 @@ impl Job for ScoreboardJob {
     }
 
     fn memory_bytes(&self) -> u64 {
-        self.entrants.iter().filter_map(|e| e.cost).map(|(_, bytes)| bytes).max().unwrap_or(0)
+        self.entrants.iter().filter_map(|e| e.cost).map(|cost| cost.memory_bytes).max().unwrap_or(0)
     }
 
     fn estimate(&self) -> Estimate {
-        let operations: f64 = self.entrants.iter().filter_map(|e| e.cost).map(|(operations, _)| operations).sum();
+        let operations: f64 = self.entrants.iter().filter_map(|e| e.cost).map(|cost| cost.operations).sum();
         // 5e9 operations a second measured, on average over the methods.
         Estimate { seconds: 2e-10 * operations * f64::from(self.realisations), bytes: 1e5 }
     }

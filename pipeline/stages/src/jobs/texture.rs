@@ -2,6 +2,7 @@
 
 use super::dem::{self as dem_job, HEIGHTS, input_error};
 use super::fit;
+use super::matched::Matched;
 use super::rasters::{raster_options, raster_packing};
 use super::scoreboard::{self, Entrant, ScoreboardJob};
 use super::surface::{Surface, SurfaceRows};
@@ -18,7 +19,7 @@ use sastrugi_store::dem::{self, Crs};
 use sastrugi_store::digest;
 use sastrugi_texture::covariance::Covariance;
 use sastrugi_texture::synth::{conditional, fft_ma};
-use sastrugi_texture::{SlopeFactors, Synthesis, TextureOutcome};
+use sastrugi_texture::{Cost, Method, SlopeFactors, TextureOutcome};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeSet;
 
@@ -30,61 +31,6 @@ const REALISATIONS_MAX: u32 = 1000;
 /// Synthesis methods.
 pub fn kinds() -> Vec<Kind> {
     sastrugi_texture::kinds().into_iter().filter(|k| k.family == "texture").collect()
-}
-
-/// What a texture matches.
-#[derive(Clone)]
-pub enum Matched {
-    /// A fit of the study.
-    Item(ItemRef),
-    /// A covariance that the study states.
-    Stated(Box<FitFile>),
-}
-
-impl Matched {
-    /// The fit file.
-    ///
-    /// # Errors
-    /// A file that cannot be read.
-    pub fn read(&self, work: &Work<'_>) -> Result<FitFile, JobError> {
-        match self {
-            Self::Stated(fit) => Ok(FitFile::clone(fit)),
-            Self::Item(item) => {
-                let path = work.parent(item, fit::FIT)?;
-                let bytes = std::fs::read(&path).map_err(|e| JobError::at(&path, e))?;
-                serde_json::from_slice(&bytes).map_err(JobError::new)
-            }
-        }
-    }
-
-    /// As a recipe and the table `terrains` name it.
-    pub fn describe(&self) -> Value {
-        match self {
-            Self::Item(item) => json!(item.id),
-            Self::Stated(fit) => json!({ "model": fit.model, "parameters": fit.parameters }),
-        }
-    }
-
-    fn parent(&self) -> Option<ItemRef> {
-        match self {
-            Self::Item(item) => Some(item.clone()),
-            Self::Stated(_) => None,
-        }
-    }
-
-    /// What parameters are checked against: the stated fit, or a stand-in for one that is not made yet.
-    fn stand_in(&self) -> FitFile {
-        let parameters = [("sigma_m".to_owned(), 1.0), ("range_m".to_owned(), 1.0)].into();
-        let height_quantiles_m = vec![-1.0, 1.0];
-        match self {
-            Self::Stated(fit) => FitFile::clone(fit),
-            Self::Item(_) => {
-                let window_m = Some([1.0; 2]);
-                let model = "exponential".to_owned();
-                FitFile { model, parameters, height_quantiles_m, window_m, ..FitFile::default() }
-            }
-        }
-    }
 }
 
 /// Factor of a texture on its base.
@@ -151,8 +97,8 @@ struct TextureJob {
     /// The DEM whose holes are filled.
     fill: Option<ItemRef>,
     method: String,
-    /// Prepared with a stand-in for a fit that is not made yet: shape and parameters do not depend on the fit's numbers.
-    draft: Box<dyn Synthesis>,
+    synthesis: Box<dyn Method>,
+    cost: Cost,
     /// Whether it is one of several realisations.
     one_of_many: bool,
     /// Cells of the heightfield that is written.
@@ -185,11 +131,12 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
             let mut refusal = None;
             for method in &methods {
                 let own = if side_by_side { own_parameters(&one.params, &kinds, method) } else { one.params.clone() };
-                let draft = sastrugi_texture::prepare(method, &own, &matched.stand_in());
-                let cost = draft.as_ref().ok().map(|d| (d.operations(), d.memory_bytes()));
+                let checked = sastrugi_texture::method(method, &own)
+                    .and_then(|synthesis| Ok((matched.cost(synthesis.as_ref())?, synthesis)));
+                let cost = checked.as_ref().ok().map(|(cost, _)| *cost);
                 entrants.push(Entrant { method: method.clone(), parameters: own, cost });
-                let draft = match draft {
-                    Ok(draft) => draft,
+                let (cost, synthesis) = match checked {
+                    Ok(checked) => checked,
                     Err(error) => {
                         refusal = refusal.or(Some(error));
                         continue;
@@ -205,15 +152,15 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
                     variant: one.sweep.clone().filter(|_| item.group.is_some()),
                     replicate: Some(one.replicate),
                     kind: method.clone(),
-                    parameters: parameters(&item, &matched, draft.as_ref()),
+                    parameters: parameters(&item, &matched, synthesis.as_ref()),
                     stream: Some(streams.label()),
                     release_path: format!("texture/{id}.tif"),
                     cells: match (&base, &fill) {
                         (Some(Base { cells, .. }), _) | (None, Some((_, cells))) => *cells,
-                        (None, None) => draft.geometry().len() as u64,
+                        (None, None) => synthesis.geometry().len() as u64,
                     },
-                    cell_m: Some(draft.geometry().cell.into_iter().fold(f64::INFINITY, f64::min)),
-                    geometry: (base.is_none() && fill.is_none()).then(|| draft.geometry()),
+                    cell_m: Some(synthesis.geometry().cell.into_iter().fold(f64::INFINITY, f64::min)),
+                    geometry: (base.is_none() && fill.is_none()).then(|| synthesis.geometry()),
                 };
                 let cells = field.cells;
                 let one_of_many = item.count.is_some_and(|count| count > 1);
@@ -233,7 +180,8 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
                     modulation,
                     fill,
                     method,
-                    draft,
+                    synthesis,
+                    cost,
                     one_of_many,
                     cells,
                     streams,
@@ -369,7 +317,7 @@ fn own_parameters(params: &Value, kinds: &[Kind], method: &str) -> Value {
 }
 
 /// What the table `terrains` says of a texture.
-fn parameters(item: &TextureItem, matched: &Matched, draft: &dyn Synthesis) -> Value {
+fn parameters(item: &TextureItem, matched: &Matched, synthesis: &dyn Method) -> Value {
     let mut all = Map::new();
     all.insert("fit".to_owned(), matched.describe());
     let more = [
@@ -378,7 +326,7 @@ fn parameters(item: &TextureItem, matched: &Matched, draft: &dyn Synthesis) -> V
         ("fill", item.fill.as_ref().map(|id| json!(id))),
     ];
     all.extend(more.into_iter().filter_map(|(key, value)| Some((key.to_owned(), value?))));
-    if let Value::Object(own) = draft.parameters() {
+    if let Value::Object(own) = synthesis.parameters() {
         all.extend(own);
     }
     Value::Object(all)
@@ -424,7 +372,7 @@ impl Job for TextureJob {
         let base = self.base.as_ref().map(Base::name);
         let mut recipe = json!({
             "method": self.method,
-            "params": self.draft.parameters(),
+            "params": self.synthesis.parameters(),
             "fit": self.matched.describe(),
             "onto": base,
         });
@@ -453,11 +401,11 @@ impl Job for TextureJob {
 
     fn memory_bytes(&self) -> u64 {
         // The texture, what describes it once it is detrended as the fit's residual was, and a base or a DEM to fill.
-        self.draft.memory_bytes().max((64 << 20) + 110 * self.cells)
+        self.cost.memory_bytes.max((64 << 20) + 110 * self.cells)
     }
 
     fn estimate(&self) -> Estimate {
-        let cells = self.draft.geometry().len() as f64;
+        let cells = self.synthesis.geometry().len() as f64;
         Estimate { seconds: 0.02 + 3e-7 * cells, bytes: 3.5 * cells }
     }
 
@@ -466,8 +414,7 @@ impl Job for TextureJob {
         if let Some(dem) = &self.fill {
             return self.filled(work, dem, &fit);
         }
-        let synthesis =
-            sastrugi_texture::prepare(&self.method, &self.draft.parameters(), &fit).map_err(JobError::new)?;
+        let synthesis = self.synthesis.bind(&fit).map_err(JobError::new)?;
         let TextureOutcome { grid, covariance_error_max_m2, clip_share } =
             synthesis.generate(&self.streams).map_err(JobError::new)?;
         let mut notes = sastrugi_texture::fit_notes(&fit);

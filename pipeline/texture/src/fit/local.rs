@@ -263,7 +263,7 @@ mod tests {
         let covariance = Covariance::new(crate::covariance::model("exponential").unwrap(), 1.0, 0.3).unwrap();
         let tile = TileParameters { size_px: Some([cells; 2]), cell_m: Cell::Square(CELL_M), ..Default::default() };
         let parameters = FftMaParameters { phase: Phase::Gaussian, periodic: false, ..FftMaParameters::default() };
-        let synthesis = fft_ma::texture(tile, parameters, covariance).unwrap();
+        let synthesis = fft_ma::texture(tile, &parameters, covariance).unwrap();
         synthesis.generate(&Streams::for_seed(seed, "local-test")).unwrap().grid
     }
 

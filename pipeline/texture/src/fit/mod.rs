@@ -164,7 +164,7 @@ fn corrected(case: &Case, naive: &Estimate, streams: &Streams) -> Result<FitFile
         candidates: verdicts::candidates(&estimates, on_rings),
         profile: profile::profile(&estimator, estimate),
         disagreement,
-        others: windows.others.iter().map(verdicts::window_entry).collect(),
+        others: windows.others.iter().map(verdicts::other_window).collect(),
         isotropy: rough.as_ref().and_then(|rough| verdicts::isotropy(rough, estimate)),
         stationarity: verdicts::stationarity(&estimator, estimate, &blocks),
         misfit_p: verdicts::misfit_p(estimate, replicates.as_ref()),

@@ -4,13 +4,13 @@ use super::Mode;
 use super::case::Case;
 use super::estimator::{Estimate, Estimator, difference, on_surface};
 use super::profile::LIKELIHOOD_RISE;
-use super::resampling::{SILL_OVER_RANGE, sill_over_range};
+use super::resampling::sill_over_range;
 use super::verdicts::{Isotropy, ScaleExplicit, Stationarity, is_range_told};
 use crate::covariance::form::Role;
 use crate::covariance::{Covariance, Form, Structure};
-use sastrugi_schemas::fit::{Candidate, Carried, DirectionBin, FitFile, GsTools, Intervals, Profile, Trim};
-use serde_json::{Value, json};
-use std::collections::BTreeMap;
+use sastrugi_schemas::fit::{
+    Candidate, Carried, Diagnostics, DirectionBin, FitFile, GsTools, Intervals, OtherWindow, Profile, Trim,
+};
 use std::f64::consts::FRAC_PI_2;
 
 /// Naive range over window above which the true range cannot be told (its ceiling for a pure exponential is 0.135).
@@ -39,7 +39,7 @@ pub struct Findings {
     pub profile: Option<Profile>,
     /// Largest disagreement of fits at other windows, in standard errors.
     pub disagreement: Option<f64>,
-    pub others: Vec<Value>,
+    pub others: Vec<OtherWindow>,
     /// Where they disagree.
     pub scale_explicit: Option<ScaleExplicit>,
     pub isotropy: Option<Isotropy>,
@@ -162,53 +162,42 @@ impl Figures {
         count as f64 / self.cells as f64
     }
 
-    fn diagnostics(
-        &self,
-        case: &Case,
-        naive: &Estimate,
-        estimate: &Estimate,
-        findings: &Findings,
-    ) -> BTreeMap<String, Value> {
+    fn diagnostics(&self, case: &Case, naive: &Estimate, estimate: &Estimate, findings: &Findings) -> Diagnostics {
         let survey = &case.survey;
         let self_affine = findings.scale_explicit.as_ref().and_then(ScaleExplicit::structure);
-        let mut entries = vec![
-            ("naive_sigma_m", json!(naive.covariance.sigma_m())),
-            ("naive_range_m", json!(naive.covariance.range_m())),
-            ("naive_range_windows", json!(self.naive_range_windows)),
-            ("iterations", json!(estimate.steps)),
-            ("misfit_m2", json!(self.misfit_m2)),
-            ("range_at_search_bound", json!(!is_range_told(case, estimate))),
-            ("lag_max_m", json!(case.max_lag_m)),
-            ("window_cells", json!([case.window.cells()[1], case.window.cells()[0]])),
-            ("min_valid_share", json!(case.settings.min_valid_share)),
-            ("no_data_share", json!(1.0 - self.share(survey.measured))),
-            ("object_share", json!(self.share(survey.measured - self.trusted))),
-            ("window_lacks_data_share", json!(self.share(self.trusted - survey.detrended))),
-            ("trimmed_share", json!(self.share(survey.detrended - survey.kept))),
-        ];
-        let known = [
-            (SILL_OVER_RANGE, sill_over_range(&estimate.covariance)),
-            ("misfit_chi2_per_freedom", self.misfit_ratio),
-            ("misfit_p", findings.misfit_p),
-            ("normality_p", findings.normality_p),
-            ("window_disagreement_z", findings.disagreement),
-            ("isotropy_p", findings.isotropy.as_ref().map(|i| i.p)),
-            ("isotropy_ratio", findings.isotropy.as_ref().map(|i| i.ratio)),
-            ("isotropy_azimuth_deg", findings.isotropy.as_ref().map(|i| i.azimuth_deg)),
-            ("stationarity_p", findings.stationarity.as_ref().map(|s| s.p)),
-            ("block_sigma_max_over_min", findings.stationarity.as_ref().map(|s| s.sigma_max_over_min)),
-            ("chi2_rise_at_3b", self.rise_at_3b(findings)),
-            ("band_rms_m", Some(survey.trim.rms_m)),
-            ("sigma2_over_range_spread", findings.sill_over_range_spread),
-            ("effective_resolution_m", resolution_m(case, &estimate.covariance)),
-            ("increment_1m_m", self_affine.map(|s| s.sigma_m)),
-            ("hurst", self_affine.map(|s| s.shape)),
-        ];
-        entries.extend(known.into_iter().filter_map(|(k, v)| Some((k, json!(v?)))));
-        if !findings.others.is_empty() {
-            entries.push(("other_windows", json!(findings.others)));
+        let (isotropy, stationarity) = (findings.isotropy.as_ref(), findings.stationarity.as_ref());
+        Diagnostics {
+            band_rms_m: Some(survey.trim.rms_m),
+            block_sigma_max_over_min: stationarity.map(|s| s.sigma_max_over_min),
+            chi2_rise_at_3b: self.rise_at_3b(findings),
+            effective_resolution_m: resolution_m(case, &estimate.covariance),
+            hurst: self_affine.map(|s| s.shape),
+            increment_1m_m: self_affine.map(|s| s.sigma_m),
+            isotropy_azimuth_deg: isotropy.map(|i| i.azimuth_deg),
+            isotropy_p: isotropy.map(|i| i.p),
+            isotropy_ratio: isotropy.map(|i| i.ratio),
+            iterations: Some(estimate.steps as u64),
+            lag_max_m: Some(case.max_lag_m),
+            min_valid_share: Some(case.settings.min_valid_share),
+            misfit_chi2_per_freedom: self.misfit_ratio,
+            misfit_m2: Some(self.misfit_m2),
+            misfit_p: findings.misfit_p,
+            naive_range_m: Some(naive.covariance.range_m()),
+            naive_range_windows: Some(self.naive_range_windows),
+            naive_sigma_m: Some(naive.covariance.sigma_m()),
+            no_data_share: Some(1.0 - self.share(survey.measured)),
+            normality_p: findings.normality_p,
+            object_share: Some(self.share(survey.measured - self.trusted)),
+            other_windows: findings.others.clone(),
+            range_at_search_bound: !is_range_told(case, estimate),
+            sigma2_over_range_m: sill_over_range(&estimate.covariance),
+            sigma2_over_range_spread: findings.sill_over_range_spread,
+            stationarity_p: stationarity.map(|s| s.p),
+            trimmed_share: Some(self.share(survey.detrended - survey.kept)),
+            window_cells: Some([case.window.cells()[1], case.window.cells()[0]]),
+            window_disagreement_z: findings.disagreement,
+            window_lacks_data_share: Some(self.share(self.trusted - survey.detrended)),
         }
-        entries.into_iter().map(|(k, v)| (k.to_owned(), v)).collect()
     }
 
     /// How much the sum of squares rises at three times the range, over what misfit there is.

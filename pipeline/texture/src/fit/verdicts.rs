@@ -10,8 +10,8 @@ use crate::covariance::bins::Layout;
 use crate::covariance::form::Role;
 use sastrugi_numeric::sums;
 use sastrugi_schemas::fit::Candidate;
+use sastrugi_schemas::fit::OtherWindow;
 use sastrugi_statistics::normal;
-use serde_json::{Value, json};
 
 /// Replicates without which no p-value of 1 % comes about.
 const REPLICATES_MIN: usize = 99;
@@ -253,11 +253,11 @@ pub fn candidates(estimates: &[Estimate], rings: &Estimator) -> Vec<Candidate> {
 }
 
 /// A fit at another window as a diagnostic.
-pub fn window_entry(at: &AtWindow) -> Value {
-    json!({
-        "outer_scale_m": at.outer_scale_m,
-        "parameters": at.estimate.covariance.parameters(&at.estimate.form),
-        "misfit_chi2_per_freedom": at.estimate.misfit_ratio(),
-        "band_rms_m": at.rms_m,
-    })
+pub fn other_window(at: &AtWindow) -> OtherWindow {
+    OtherWindow {
+        band_rms_m: at.rms_m,
+        misfit_chi2_per_freedom: at.estimate.misfit_ratio(),
+        outer_scale_m: at.outer_scale_m,
+        parameters: at.estimate.covariance.parameters(&at.estimate.form),
+    }
 }

@@ -150,7 +150,7 @@ fn unconditional(dem: &Grid, covariance: &Covariance, streams: &Streams) -> Resu
         ..TileParameters::default()
     };
     let own = FftMaParameters { phase: Phase::Gaussian, ..FftMaParameters::default() };
-    let texture = fft_ma::texture(parameters, own, covariance.clone())?;
+    let texture = fft_ma::texture(parameters, &own, covariance.clone())?;
     let made = texture.generate(streams).map_err(|e| FillError::Field(e.to_string()))?;
     Ok(Grid { geometry: g, ..made.grid.window(0, 0, g.rows, g.cols) })
 }

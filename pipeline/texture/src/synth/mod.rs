@@ -25,11 +25,39 @@ use sastrugi_numeric::{Geometry, Grid, Streams};
 use sastrugi_schemas::ParameterError;
 use sastrugi_schemas::fit::{CovarianceMap, FitFile};
 use schemars::JsonSchema;
+use serde::Serialize;
 use serde::de::DeserializeOwned;
-use serde_json::{Map, Value};
-use tile::{Tile, TileParameters};
+use serde_json::Value;
+use tile::Tile;
 
-/// A method with checked parameters, ready to make fields.
+/// A method with checked parameters, before it is known what its textures match.
+pub trait Method: Send + Sync {
+    /// Shape and cells of the texture; its south-west corner is the origin.
+    fn geometry(&self) -> Geometry;
+
+    /// The checked parameters with every default written out.
+    fn parameters(&self) -> Value;
+
+    /// What a texture takes, as far as that is known without the covariance.
+    fn cost(&self) -> Cost;
+
+    /// The texture that matches a fit.
+    ///
+    /// # Errors
+    /// A fit without a covariance, or one that the method cannot make on this tile.
+    fn bind(&self, fit: &FitFile) -> Result<Box<dyn Synthesis>, ParameterError>;
+}
+
+/// What a texture takes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cost {
+    /// Working memory, result included, bytes.
+    pub memory_bytes: u64,
+    /// Arithmetic operations, to a factor of about two.
+    pub operations: f64,
+}
+
+/// A method and what its textures match, ready to make fields.
 pub trait Synthesis: Send + Sync {
     /// Shape and cells of the texture; its south-west corner is the origin.
     fn geometry(&self) -> Geometry;
@@ -37,11 +65,8 @@ pub trait Synthesis: Send + Sync {
     /// The checked parameters with every default written out.
     fn parameters(&self) -> Value;
 
-    /// Working memory of [`Self::generate`], result included.
-    fn memory_bytes(&self) -> u64;
-
-    /// Arithmetic operations of [`Self::generate`], to a factor of about two.
-    fn operations(&self) -> f64;
+    /// What [`Self::generate`] takes.
+    fn cost(&self) -> Cost;
 
     /// Sentences a user should read: rounded sizes, coarse cells, a torus too small for the range.
     fn notes(&self) -> Vec<String>;
@@ -123,16 +148,38 @@ pub enum SynthesisError {
     },
 }
 
+/// Parameters of a method beside those of its tile.
+pub trait MethodParameters: DeserializeOwned + Serialize + JsonSchema + Clone + Send + Sync + 'static {
+    /// Its name.
+    const NAME: &'static str;
+    /// Whether it makes measured covariances, besides those of models.
+    const MAKES_MEASURED: bool = false;
+    /// What makes a tile.
+    type Kernel: Kernel + 'static;
+
+    /// Whether the tile repeats without seams.
+    fn is_periodic(&self) -> bool;
+
+    /// Refuses what is wrong whatever the covariance.
+    ///
+    /// # Errors
+    /// Parameters out of range.
+    fn check(&self, tile: &Tile) -> Result<(), ParameterError>;
+
+    /// What a tile takes, as far as that is known without the covariance.
+    fn cost(&self, tile: &Tile) -> Cost;
+
+    /// The method for one tile of `wanted`, which is the covariance of `fitted` with the anisotropy of the tile.
+    ///
+    /// # Errors
+    /// A covariance that the method cannot make on this tile.
+    fn kernel(&self, tile: &Tile, wanted: &Covariance, fitted: &Wanted) -> Result<Self::Kernel, ParameterError>;
+}
+
 /// One way to make a tile.
 pub trait Kernel: Send + Sync {
-    /// Its own parameters with every default written out.
-    fn parameters(&self) -> Value;
-
-    /// Working memory, result included.
-    fn memory_bytes(&self) -> u64;
-
-    /// Arithmetic operations.
-    fn operations(&self) -> f64;
+    /// What a tile takes.
+    fn cost(&self) -> Cost;
 
     /// Sentences a user should read.
     fn notes(&self) -> Vec<String>;
@@ -222,21 +269,50 @@ impl From<Covariance> for Wanted {
     }
 }
 
-/// A texture from raw parameters: those of the tile and those of the method, `P`.
-fn prepare<P: DeserializeOwned + JsonSchema, K: Kernel + 'static>(
-    raw: &Value,
-    wanted: Wanted,
-    periodic: impl FnOnce(&P) -> bool,
-    kernel: impl FnOnce(P, &Tile, &Covariance) -> Result<K, ParameterError>,
-) -> Result<Box<dyn Synthesis>, ParameterError> {
-    let (of_tile, own) = tile::read(raw)?;
-    let periodic = periodic(&own);
-    Ok(Box::new(Texture::new(of_tile, periodic, wanted, |tile, wanted| kernel(own, tile, wanted))?))
+/// The checked parameters of a method and its tile.
+struct Checked<P> {
+    tile: Tile,
+    own: P,
+}
+
+/// Checks raw parameters: those of the tile and those of the method, `P`.
+///
+/// # Errors
+/// Parameters that are unknown or out of range.
+pub fn check<P: MethodParameters>(raw: &Value) -> Result<Box<dyn Method>, ParameterError> {
+    let (of_tile, own) = tile::read::<P>(raw)?;
+    let tile = Tile::check(of_tile, own.is_periodic())?;
+    own.check(&tile)?;
+    Ok(Box::new(Checked { tile, own }))
+}
+
+impl<P: MethodParameters> Method for Checked<P> {
+    fn geometry(&self) -> Geometry {
+        self.tile.whole()
+    }
+
+    fn parameters(&self) -> Value {
+        self.tile.parameters_with(&self.own)
+    }
+
+    fn cost(&self) -> Cost {
+        self.tile.repeated_cost(self.own.cost(&self.tile))
+    }
+
+    fn bind(&self, fit: &FitFile) -> Result<Box<dyn Synthesis>, ParameterError> {
+        let wanted = Wanted::of_fit(fit)?;
+        if wanted.map.is_some() && !P::MAKES_MEASURED {
+            let message = format!("is `{}`; an empirical covariance is made by `fft_ma` only", P::NAME);
+            return Err(ParameterError::new("method", message));
+        }
+        Ok(Box::new(Texture::new(&self.tile, &self.own, wanted)?))
+    }
 }
 
 /// A method with what all of them have in common.
 pub struct Texture<K> {
     tile: Tile,
+    parameters: Value,
     marginal: Option<Marginal>,
     wanted: Covariance,
     kernel: K,
@@ -249,24 +325,18 @@ const ERROR_NOTE: f64 = 1e-4;
 const LAGS_MAX: usize = 2048;
 
 impl<K: Kernel> Texture<K> {
-    /// The texture of `parameters` that matches `fitted`; `kernel` makes the method for one tile of the covariance wanted.
+    /// The texture of checked parameters that matches `fitted`.
     ///
     /// # Errors
-    /// Parameters out of range.
-    pub fn new(
-        parameters: TileParameters,
-        periodic: bool,
-        fitted: Wanted,
-        kernel: impl FnOnce(&Tile, &Covariance) -> Result<K, ParameterError>,
-    ) -> Result<Self, ParameterError> {
-        let tile = Tile::check(parameters, periodic)?;
+    /// A covariance or heights that the method cannot make on this tile.
+    pub fn new<P: MethodParameters<Kernel = K>>(tile: &Tile, own: &P, fitted: Wanted) -> Result<Self, ParameterError> {
         let mut notes = Vec::new();
-        let wanted = tile.covariance(fitted.covariance, &mut notes);
-        let kernel = kernel(&tile, &wanted)?;
+        let wanted = tile.covariance(fitted.covariance.clone(), &mut notes);
+        let kernel = own.kernel(tile, &wanted, &fitted)?;
         let variance_m2 = if kernel.aims_at_a_model() { wanted.at_distance(0.0) } else { kernel.achieved()([0.0; 2]) };
         let marginal = tile.marginal(&fitted.quantiles_m, variance_m2)?;
         notes.extend(kernel.notes());
-        Ok(Self { tile, marginal, wanted, kernel, notes })
+        Ok(Self { tile: tile.clone(), parameters: tile.parameters_with(own), marginal, wanted, kernel, notes })
     }
 
     /// The tile with the wanted heights.
@@ -319,24 +389,15 @@ impl<K: Kernel> Synthesis for Texture<K> {
     }
 
     fn parameters(&self) -> Value {
-        let mut all: Map<String, Value> = self.tile.parameters();
-        if let Value::Object(own) = self.kernel.parameters() {
-            all.extend(own);
-        }
-        Value::Object(all)
+        self.parameters.clone()
     }
 
-    fn memory_bytes(&self) -> u64 {
-        let whole = self.tile.whole().len();
-        let repeated = if whole > self.tile.geometry.len() { 8 * whole as u64 } else { 0 };
-        self.kernel.memory_bytes() + repeated
-    }
-
-    fn operations(&self) -> f64 {
+    fn cost(&self) -> Cost {
         /// A distribution function.
         const MARGINAL: f64 = 60.0;
         let marginal = self.marginal.as_ref().map_or(0.0, |_| MARGINAL * self.tile.geometry.len() as f64);
-        self.kernel.operations() + marginal
+        let Cost { memory_bytes, operations } = self.tile.repeated_cost(self.kernel.cost());
+        Cost { memory_bytes, operations: operations + marginal }
     }
 
     fn notes(&self) -> Vec<String> {

@@ -12,7 +12,7 @@
 //! transforms of each.
 
 use super::fft_ma::torus_covariance;
-use super::{LagCovariance, Synthesis, SynthesisError};
+use super::{Cost, LagCovariance, Synthesis, SynthesisError};
 use crate::covariance::masked_covariance;
 use sastrugi_numeric::{Geometry, Grid, Streams, sums};
 use std::f64::consts::PI;
@@ -41,10 +41,8 @@ pub struct Score {
     pub ratio_found: f64,
     /// Mean square step across the edges over that inside.
     pub seam_jump_ratio: f64,
-    /// Predicted arithmetic operations of one realisation.
-    pub operations: f64,
-    /// Predicted working memory, bytes.
-    pub memory_bytes: u64,
+    /// What one realisation is predicted to take.
+    pub cost: Cost,
     /// Covariance along rows.
     pub curve: Vec<CurvePoint>,
 }
@@ -91,8 +89,7 @@ pub fn score(synthesis: &dyn Synthesis, streams: &Streams, realisations: u32) ->
         ratio_wanted: synthesis.ratio(),
         ratio_found: tally.map.ratio(synthesis.geometry().cell).unwrap_or(f64::NAN),
         seam_jump_ratio: tally.seam / tally.inside,
-        operations: synthesis.operations(),
-        memory_bytes: synthesis.memory_bytes(),
+        cost: synthesis.cost(),
         curve: curve.collect(),
     })
 }
@@ -295,6 +292,6 @@ mod tests {
         let size = || json!({ "size_m": [12.0, 12.0] });
         let [fft, gaussians, quasi] = ["fft_ma", "gaussians", "quasi_wavelets"].map(|m| scored(m, size()));
         assert!(gaussians.error_max > 0.05 && quasi.error_max < 0.02, "{} {}", gaussians.error_max, quasi.error_max);
-        assert!(fft.operations < quasi.operations);
+        assert!(fft.cost.operations < quasi.cost.operations);
     }
 }

@@ -1,5 +1,6 @@
 //! Size, cells, repetition, anisotropy and height distribution: what the parameters of all methods have in common.
 
+use super::Cost;
 use super::marginal::Marginal;
 use crate::covariance::Covariance;
 use crate::covariance::form::half_turn;
@@ -104,6 +105,7 @@ impl Default for TileParameters {
 }
 
 /// Checked parameters of a tile.
+#[derive(Clone)]
 pub struct Tile {
     parameters: TileParameters,
     /// One tile; its south-west corner is the origin.
@@ -143,7 +145,11 @@ impl Tile {
             return Err(ParameterError::new("azimuth_deg", format!("is {azimuth}; it must be finite")));
         }
         parameters.outer_m.map(|m| ParameterError::positive("outer_m", m)).transpose()?;
-        Ok(Self { parameters, geometry, periodic, note })
+        let tile = Self { parameters, geometry, periodic, note };
+        if tile.parameters.marginal_m.is_some() {
+            tile.marginal(&[], f64::NAN)?;
+        }
+        Ok(tile)
     }
 
     /// The height distribution, unless normal; `measured_m` are the fit's quantiles.
@@ -187,15 +193,21 @@ impl Tile {
         Grid::new(whole, values)
     }
 
-    /// The parameters with every default written out.
-    pub fn parameters(&self) -> Map<String, Value> {
+    /// The parameters with every default written out, and those of the method.
+    pub fn parameters_with(&self, own: &impl Serialize) -> Value {
         let size_m = self.parameters.size_m.or(self.parameters.size_px.is_none().then_some(DEFAULT_SIZE_M));
-        let all = TileParameters { size_m, ..self.parameters.clone() };
-        // A plain struct of numbers always has a JSON form.
-        match serde_json::to_value(all) {
-            Ok(Value::Object(map)) => map,
-            _ => Map::new(),
-        }
+        let of_tile = TileParameters { size_m, ..self.parameters.clone() };
+        // Plain structs of numbers and words always have a JSON form.
+        let parts = [serde_json::to_value(of_tile), serde_json::to_value(own)].map(Result::unwrap_or_default);
+        let all = parts.iter().filter_map(Value::as_object).flatten();
+        Value::Object(all.map(|(key, value)| (key.clone(), value.clone())).collect())
+    }
+
+    /// What it takes to lay a tile as often as asked for.
+    pub fn repeated_cost(&self, tile: Cost) -> Cost {
+        let whole = self.whole().len();
+        let repeated = if whole > self.geometry.len() { 8 * whole as u64 } else { 0 };
+        Cost { memory_bytes: tile.memory_bytes + repeated, ..tile }
     }
 
     /// What is asked for: the fit's covariance with this texture's anisotropy, and with a range where it has none. Adds the

@@ -140,7 +140,7 @@ fn at_bound(file: &FitFile, name: &str) -> Option<String> {
 fn poorly_known(fit: &FitRow, file: Option<&FitFile>) -> Option<String> {
     let [_, range, ratio] = parameters(fit);
     let wide = |interval: [f64; 2]| interval[1] > WIDE * interval[0];
-    let spread = file.and_then(|f| f.diagnostics.get("sigma2_over_range_spread")?.as_f64()).unwrap_or(1.0);
+    let spread = file.and_then(|f| f.diagnostics.sigma2_over_range_spread).unwrap_or(1.0);
     let ratio_words = match spread > SPREAD {
         true => format!(
             "σ²/b is better constrained at this window but varies by a factor of {} between windows",
@@ -269,7 +269,7 @@ pub fn intervals(dem: &str, fits: &[&FitRow]) -> TableBlock {
 mod tests {
     use super::*;
     use crate::tests::made_up;
-    use sastrugi_schemas::fit::Intervals;
+    use sastrugi_schemas::fit::{Diagnostics, Intervals};
 
     #[test]
     fn val_sentences_say_what_the_row_says() {
@@ -318,7 +318,7 @@ mod tests {
                 from_profile: true,
                 values: [ends("range_m")].into(),
             }),
-            diagnostics: [("range_at_search_bound".to_owned(), true.into())].into(),
+            diagnostics: Diagnostics { range_at_search_bound: true, ..Diagnostics::default() },
             ..FitFile::default()
         };
         let bounded = paragraph(&data.fits[0], &[], Some(&file));

@@ -13,14 +13,13 @@
 //! millionth of the cost; this is the reference beside it.
 
 use super::tile::{self, Tile};
-use super::{Kernel, Made, Synthesis, SynthesisError, Wanted};
+use super::{Cost, Kernel, Made, MethodParameters, SynthesisError, Wanted};
 use crate::covariance::Covariance;
 use rayon::prelude::*;
 use sastrugi_numeric::{Geometry, Streams};
 use sastrugi_schemas::{Kind, ParameterError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use serde_json::Value;
 use std::sync::OnceLock;
 
 /// Most cells: 100 x 100, a matrix of 0.8 GB.
@@ -47,36 +46,50 @@ pub struct Cholesky {
 pub fn kind() -> Kind {
     Kind {
         family: "texture",
-        kind: "cholesky",
+        kind: CholeskyParameters::NAME,
         summary: "normal field from the factor of its dense covariance matrix; not periodic; at most 10000 cells",
         source: "Vecherin et al. 2022, section 3.2",
         parameters: tile::schema::<CholeskyParameters>(),
     }
 }
 
-/// The texture with raw parameters, matching `wanted`.
-///
-/// # Errors
-/// Parameters out of range; too many cells.
-pub fn prepare(parameters: &Value, wanted: Wanted) -> Result<Box<dyn Synthesis>, ParameterError> {
-    super::prepare(parameters, wanted, |_| false, Cholesky::new)
+impl MethodParameters for CholeskyParameters {
+    const NAME: &'static str = "cholesky";
+    type Kernel = Cholesky;
+
+    fn is_periodic(&self) -> bool {
+        false
+    }
+
+    fn check(&self, tile: &Tile) -> Result<(), ParameterError> {
+        let cells = tile.geometry.len();
+        if cells <= CELLS_MAX {
+            return Ok(());
+        }
+        let gigabytes = 8e-9 * cells as f64 * cells as f64;
+        let message = format!(
+            "gives {} x {} cells, a covariance matrix of {gigabytes:.1} GB; `cholesky` takes at most {CELLS_MAX} cells \
+             (0.8 GB), `fft_ma` any number",
+            tile.geometry.cols, tile.geometry.rows
+        );
+        Err(ParameterError::new("size_m", message))
+    }
+
+    fn cost(&self, tile: &Tile) -> Cost {
+        cost(tile.geometry.len())
+    }
+
+    fn kernel(&self, tile: &Tile, wanted: &Covariance, _: &Wanted) -> Result<Cholesky, ParameterError> {
+        Ok(Cholesky { covariance: wanted.clone(), tile: tile.geometry, factor: OnceLock::new() })
+    }
+}
+
+fn cost(cells: usize) -> Cost {
+    let (bytes, n) = (cells as u64, cells as f64);
+    Cost { memory_bytes: 4 * bytes * (bytes + BLOCK as u64) + 8 * bytes, operations: n * n * n / 3.0 }
 }
 
 impl Cholesky {
-    fn new(_: CholeskyParameters, tile: &Tile, wanted: &Covariance) -> Result<Self, ParameterError> {
-        let cells = tile.geometry.len();
-        if cells > CELLS_MAX {
-            let gigabytes = 8e-9 * cells as f64 * cells as f64;
-            let message = format!(
-                "gives {} x {} cells, a covariance matrix of {gigabytes:.1} GB; `cholesky` takes at most {CELLS_MAX} cells \
-                 (0.8 GB), `fft_ma` any number",
-                tile.geometry.cols, tile.geometry.rows
-            );
-            return Err(ParameterError::new("size_m", message));
-        }
-        Ok(Self { covariance: wanted.clone(), tile: tile.geometry, factor: OnceLock::new() })
-    }
-
     /// Rows `i` and columns `j` of the covariance matrix, row-major.
     fn block(&self, i: usize, j: usize) -> Vec<f64> {
         let Geometry { cols, cell: [dx, dy], .. } = self.tile;
@@ -100,22 +113,12 @@ impl Cholesky {
 }
 
 impl Kernel for Cholesky {
-    fn parameters(&self) -> Value {
-        Value::Object(serde_json::Map::new())
-    }
-
-    fn memory_bytes(&self) -> u64 {
-        let cells = self.tile.len() as u64;
-        4 * cells * (cells + BLOCK as u64) + 8 * cells
-    }
-
-    fn operations(&self) -> f64 {
-        let cells = self.tile.len() as f64;
-        cells * cells * cells / 3.0
+    fn cost(&self) -> Cost {
+        cost(self.tile.len())
     }
 
     fn notes(&self) -> Vec<String> {
-        let gigabytes = 1e-9 * self.memory_bytes() as f64;
+        let gigabytes = 1e-9 * self.cost().memory_bytes as f64;
         vec![format!(
             "the covariance matrix of {} cells takes {gigabytes:.3} GB; the field is not periodic",
             self.tile.len()

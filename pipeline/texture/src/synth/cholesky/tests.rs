@@ -1,6 +1,6 @@
 use super::*;
 use crate::covariance::model;
-use crate::synth::Texture;
+use crate::synth::{Synthesis, Texture};
 use serde_json::json;
 
 fn covariance(name: &str, range_m: f64) -> Covariance {
@@ -8,8 +8,11 @@ fn covariance(name: &str, range_m: f64) -> Covariance {
 }
 
 fn kernel(size_px: [u32; 2], covariance: &Covariance) -> Result<Cholesky, ParameterError> {
-    let (of_tile, own) = tile::read(&json!({ "size_px": size_px, "cell_m": [0.1, 0.12] }))?;
-    Cholesky::new(own, &Tile::check(of_tile, false)?, covariance)
+    let raw = json!({ "size_px": size_px, "cell_m": [0.1, 0.12] });
+    let (of_tile, own) = tile::read::<CholeskyParameters>(&raw)?;
+    let tile = Tile::check(of_tile, own.is_periodic())?;
+    own.check(&tile)?;
+    own.kernel(&tile, covariance, &covariance.clone().into())
 }
 
 /// `L L'` is the covariance matrix to 2e-9 of the variance (what is added to each cell), also where the last block is not
@@ -41,16 +44,16 @@ fn val_memory_is_stated_and_limited() {
     let error = kernel([200, 200], &covariance("exponential", 1.0)).err().unwrap().to_string();
     assert!(error.contains("12.8 GB") && error.contains("0.8 GB"), "{error}");
     let largest = kernel([100, 100], &covariance("exponential", 1.0)).unwrap();
-    assert!((largest.memory_bytes() as f64 / 4.026e8 - 1.0).abs() < 0.01);
+    assert!((largest.cost().memory_bytes as f64 / 4.026e8 - 1.0).abs() < 0.01);
     assert!(largest.notes()[0].contains("0.403 GB"), "{:?}", largest.notes());
 }
 
 /// One thread or many: the same bits.
 #[test]
 fn prop_threads_change_no_bit() {
-    let (of_tile, own) = tile::read(&json!({ "size_px": [17, 13] })).unwrap();
-    let texture =
-        Texture::new(of_tile, false, covariance("exponential", 0.5).into(), |t, w| Cholesky::new(own, t, w)).unwrap();
+    let (of_tile, own) = tile::read::<CholeskyParameters>(&json!({ "size_px": [17, 13] })).unwrap();
+    let tile = Tile::check(of_tile, own.is_periodic()).unwrap();
+    let texture = Texture::new(&tile, &own, covariance("exponential", 0.5).into()).unwrap();
     let run = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| texture.generate(&Streams::for_seed(9, "texture")).unwrap().grid.values)

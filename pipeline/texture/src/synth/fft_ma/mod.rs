@@ -37,7 +37,7 @@ mod aim;
 mod spectrum;
 
 use super::tile::{self, CELLS_MAX, Tile, TileParameters};
-use super::{Kernel, Made, Synthesis, SynthesisError, Texture, Wanted, reach};
+use super::{Cost, Kernel, Made, MethodParameters, SynthesisError, Texture, Wanted, reach};
 use crate::covariance::Covariance;
 use crate::covariance::empirical::Purpose;
 use aim::Aim;
@@ -47,7 +47,6 @@ use sastrugi_numeric::{Geometry, Grid, Stream, Streams, sums, turns};
 use sastrugi_schemas::{Kind, ParameterError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use serde_json::Value;
 use spectrum::Spectrum;
 
 /// Negative share of the spectrum that is set to 0; more is refused.
@@ -131,25 +130,11 @@ pub struct FftMa {
 pub fn kind() -> Kind {
     Kind {
         family: "texture",
-        kind: "fft_ma",
+        kind: FftMaParameters::NAME,
         summary: "random field from the square root of its spectrum; periodic, exact on the torus with unit phases",
         source: "Vecherin et al. 2022, Eqs. 11-12; Oliver 1995",
         parameters: tile::schema::<FftMaParameters>(),
     }
-}
-
-/// The texture with raw parameters, matching `wanted`.
-///
-/// # Errors
-/// Parameters out of range.
-pub fn prepare(parameters: &Value, wanted: Wanted) -> Result<Box<dyn Synthesis>, ParameterError> {
-    let fitted = wanted.clone();
-    super::prepare(
-        parameters,
-        wanted,
-        |own: &FftMaParameters| own.periodic,
-        |own, tile, covariance| FftMa::new(own, tile, covariance, &fitted),
-    )
 }
 
 /// The texture of a covariance.
@@ -158,65 +143,114 @@ pub fn prepare(parameters: &Value, wanted: Wanted) -> Result<Box<dyn Synthesis>,
 /// Parameters out of range.
 pub fn texture(
     of_tile: TileParameters,
-    own: FftMaParameters,
+    own: &FftMaParameters,
     covariance: Covariance,
 ) -> Result<Texture<FftMa>, ParameterError> {
-    let fitted: Wanted = covariance.into();
-    Texture::new(of_tile, own.periodic, fitted.clone(), |tile, wanted| FftMa::new(own, tile, wanted, &fitted))
+    let tile = Tile::check(of_tile, own.periodic)?;
+    own.check(&tile)?;
+    Texture::new(&tile, own, covariance.into())
 }
 
-impl FftMa {
-    /// The method for one tile of a covariance, of a fit.
-    ///
-    /// # Errors
-    /// Eq. 10 of a covariance that is no isotropic exponential; a residual of a fit without a window; cells that are no multiples of the measured ones.
-    pub fn new(
-        parameters: FftMaParameters,
-        tile: &Tile,
-        wanted: &Covariance,
-        fitted: &Wanted,
-    ) -> Result<Self, ParameterError> {
-        let purpose = match parameters.covariance {
+impl MethodParameters for FftMaParameters {
+    const NAME: &'static str = "fft_ma";
+    const MAKES_MEASURED: bool = true;
+    type Kernel = FftMa;
+
+    fn is_periodic(&self) -> bool {
+        self.periodic
+    }
+
+    fn check(&self, tile: &Tile) -> Result<(), ParameterError> {
+        if self.spectrum == SpectrumOf::Eq10 && self.covariance == CovarianceOf::Residual {
+            return Err(not_of_a_surface());
+        }
+        let cells = self.torus_of_any(tile).map(|n| n as f64);
+        if cells[0] * cells[1] > CELLS_MAX as f64 {
+            let message = format!(
+                "is false, which needs a torus of {:.1e} cells; at most {CELLS_MAX} are made: larger cells, or a smaller texture",
+                cells[0] * cells[1]
+            );
+            return Err(ParameterError::new("periodic", message));
+        }
+        Ok(())
+    }
+
+    fn cost(&self, tile: &Tile) -> Cost {
+        let [rows, cols] = self.torus_of_any(tile);
+        cost(rows * cols, tile.geometry.len(), 0)
+    }
+
+    /// Refuses Eq. 10 of a covariance that is no isotropic exponential, a residual of a fit without a window, and cells that are no
+    /// multiples of the measured ones.
+    fn kernel(&self, tile: &Tile, wanted: &Covariance, fitted: &Wanted) -> Result<FftMa, ParameterError> {
+        let purpose = match self.covariance {
             CovarianceOf::Surface => Purpose::Surface,
             CovarianceOf::Residual => Purpose::Residual,
         };
         let aim = Aim::of(fitted, purpose, tile.geometry.cell)?;
-        if parameters.spectrum == SpectrumOf::Eq10 && aim.is_some() {
-            let message = "is `eq10`, which is the spectrum of a surface's exponential alone";
-            return Err(ParameterError::new("spectrum", message));
+        if self.spectrum == SpectrumOf::Eq10 && aim.is_some() {
+            return Err(not_of_a_surface());
         }
         if fitted.map.is_some() && tile.turns() {
             let message = "is given, but the fit's covariance is empirical: it has the direction that was measured";
             return Err(ParameterError::new("azimuth_deg", message));
         }
-        if parameters.spectrum == SpectrumOf::Eq10 && !is_plain_exponential(wanted) {
+        if self.spectrum == SpectrumOf::Eq10 && !is_plain_exponential(wanted) {
             let message = "is `eq10`, which is an isotropic exponential without nugget; the fit is another model";
             return Err(ParameterError::new("spectrum", message));
         }
-        if let Some(aim) = aim.as_ref().filter(|_| parameters.periodic) {
+        if let Some(aim) = aim.as_ref().filter(|_| self.periodic) {
             aim.check_tile(&tile.geometry)?;
         }
-        let Geometry { rows, cols, cell: [dx, dy], .. } = tile.geometry;
-        let [width_m, height_m] =
-            aim.as_ref().map_or_else(|| reach::torus_m(wanted), |aim| aim.torus_m(tile.geometry.cell));
-        let oversampling = aim.as_ref().map_or(1, Aim::oversampling) as f64;
-        let enough = [(rows, height_m, dy), (cols, width_m, dx)].map(|(n, side_m, cell_m)| match parameters.periodic {
-            true => n as f64,
-            false => (2.0 * n as f64).max((side_m / cell_m).ceil()),
+        let torus = self.torus(tile, wanted, aim.as_ref())?;
+        Ok(FftMa { parameters: self.clone(), covariance: wanted.clone(), aim, tile: tile.geometry, torus })
+    }
+}
+
+impl FftMaParameters {
+    /// Rows and columns of the least torus for a tile, whatever the covariance.
+    fn torus_of_any(&self, tile: &Tile) -> [usize; 2] {
+        let least = [tile.geometry.rows, tile.geometry.cols];
+        if self.periodic { least } else { least.map(|n| 2 * n) }
+    }
+
+    /// Rows and columns of the torus for a tile of a covariance.
+    fn torus(&self, tile: &Tile, wanted: &Covariance, aim: Option<&Aim>) -> Result<[usize; 2], ParameterError> {
+        let [dx, dy] = tile.geometry.cell;
+        let [width_m, height_m] = aim.map_or_else(|| reach::torus_m(wanted), |aim| aim.torus_m(tile.geometry.cell));
+        let [rows, cols] = self.torus_of_any(tile).map(|n| n as f64);
+        let enough = [(rows, height_m, dy), (cols, width_m, dx)].map(|(n, side_m, cell_m)| match self.periodic {
+            true => n,
+            false => n.max((side_m / cell_m).ceil()),
         });
-        if oversampling * enough[0] * enough[1] > CELLS_MAX as f64 {
+        let cells = aim.map_or(1, Aim::oversampling) as f64 * enough[0] * enough[1];
+        if cells > CELLS_MAX as f64 {
             let message = format!(
-                "is false, for which the range of {} m needs a torus of {:.1e} cells; at most {CELLS_MAX} are made: larger cells, \
+                "is false, for which the range of {} m needs a torus of {cells:.1e} cells; at most {CELLS_MAX} are made: larger cells, \
                  or a shorter range",
-                wanted.range_m(),
-                oversampling * enough[0] * enough[1]
+                wanted.range_m()
             );
             return Err(ParameterError::new("periodic", message));
         }
-        let torus = enough.map(|n| if parameters.periodic { n as usize } else { smooth_length(n as usize) });
-        Ok(Self { parameters, covariance: wanted.clone(), aim, tile: tile.geometry, torus })
+        Ok(enough.map(|n| if self.periodic { n as usize } else { smooth_length(n as usize) }))
     }
+}
 
+/// The error for Eq. 10 of a residual or of a measured covariance.
+fn not_of_a_surface() -> ParameterError {
+    ParameterError::new("spectrum", "is `eq10`, which is the spectrum of a surface's exponential alone")
+}
+
+/// What a tile from a torus takes; `oversampling` is that of the spectrum of a residual or of a measured covariance, 0 for others.
+fn cost(torus: usize, tile: usize, oversampling: u64) -> Cost {
+    /// Covariance, root and phase of one cell.
+    const PER_CELL: f64 = 60.0;
+    let memory_bytes = (BYTES_PER_CELL + AIM_BYTES_PER_CELL * oversampling) * torus as u64 + 8 * tile as u64;
+    let cells = torus as f64;
+    Cost { memory_bytes, operations: cells * (3.75 * libm::log2(cells) + PER_CELL) }
+}
+
+impl FftMa {
     fn spectrum(&self) -> Spectrum {
         let term = &self.covariance.structures[0];
         match self.parameters.spectrum {
@@ -294,21 +328,9 @@ pub(super) fn size_notes(covariance: &Covariance, tile: &Geometry, periodic: boo
 }
 
 impl Kernel for FftMa {
-    fn parameters(&self) -> Value {
-        // A plain struct of words always has a JSON form.
-        serde_json::to_value(&self.parameters).unwrap_or_default()
-    }
-
-    fn memory_bytes(&self) -> u64 {
-        let fine = self.aim.as_ref().map_or(0, |aim| AIM_BYTES_PER_CELL * aim.oversampling() as u64);
-        (BYTES_PER_CELL + fine) * self.torus[0] as u64 * self.torus[1] as u64 + 8 * self.tile.len() as u64
-    }
-
-    fn operations(&self) -> f64 {
-        /// Covariance, root and phase of one cell.
-        const PER_CELL: f64 = 60.0;
-        let cells = (self.torus[0] * self.torus[1]) as f64;
-        cells * (3.75 * libm::log2(cells) + PER_CELL)
+    fn cost(&self) -> Cost {
+        let oversampling = self.aim.as_ref().map_or(0, |aim| aim.oversampling() as u64);
+        cost(self.torus[0] * self.torus[1], self.tile.len(), oversampling)
     }
 
     fn notes(&self) -> Vec<String> {

@@ -1,8 +1,8 @@
 use super::*;
 use crate::covariance::{Form, model};
-use crate::synth::TextureOutcome;
+use crate::synth::{Synthesis, TextureOutcome};
 use sastrugi_schemas::fit::FitFile;
-use serde_json::json;
+use serde_json::{Value, json};
 
 fn exponential(sigma_m: f64, range_m: f64) -> Covariance {
     Covariance::new(model("exponential").unwrap(), sigma_m, range_m).unwrap()
@@ -15,8 +15,8 @@ fn covariance(form: &str, values: &[(&str, f64)]) -> Covariance {
 }
 
 fn prepared(parameters: &Value, covariance: &Covariance) -> Result<Texture<FftMa>, ParameterError> {
-    let (of_tile, own) = tile::read(parameters)?;
-    super::texture(of_tile, own, covariance.clone())
+    let (of_tile, own) = tile::read::<FftMaParameters>(parameters)?;
+    super::texture(of_tile, &own, covariance.clone())
 }
 
 fn texture(parameters: &Value, covariance: &Covariance) -> Texture<FftMa> {

@@ -14,13 +14,12 @@
 
 use super::bumps::{Class, Torus};
 use super::tile::{self, Tile};
-use super::{Kernel, Made, Synthesis, SynthesisError, Wanted, fft_ma, reach};
+use super::{Cost, Kernel, Made, MethodParameters, SynthesisError, Wanted, fft_ma, reach};
 use crate::covariance::Covariance;
 use sastrugi_numeric::{Geometry, Streams};
 use sastrugi_schemas::{Kind, ParameterError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use serde_json::Value;
 
 /// Bumps per area of their half axes where none is given: an excess kurtosis of 0.03.
 const DENSITY: f64 = 10.0;
@@ -41,7 +40,6 @@ pub struct GaussiansParameters {
 
 /// A sum of Gaussians with checked parameters.
 pub struct Gaussians {
-    parameters: GaussiansParameters,
     covariance: Covariance,
     tile: Geometry,
     torus: Torus,
@@ -52,52 +50,71 @@ pub struct Gaussians {
 pub fn kind() -> Kind {
     Kind {
         family: "texture",
-        kind: "gaussians",
+        kind: GaussiansParameters::NAME,
         summary: "sum of Gaussian bumps of one size; periodic; the variance of the fit, a Gaussian correlation",
         source: "Vecherin et al. 2022, Eq. 1",
         parameters: tile::schema::<GaussiansParameters>(),
     }
 }
 
-/// The texture with raw parameters, matching `wanted`.
-///
-/// # Errors
-/// Parameters out of range.
-pub fn prepare(parameters: &Value, wanted: Wanted) -> Result<Box<dyn Synthesis>, ParameterError> {
-    super::prepare(parameters, wanted, |_| true, Gaussians::new)
-}
+impl MethodParameters for GaussiansParameters {
+    const NAME: &'static str = "gaussians";
+    type Kernel = Gaussians;
 
-impl Gaussians {
-    fn new(parameters: GaussiansParameters, tile: &Tile, wanted: &Covariance) -> Result<Self, ParameterError> {
-        let along_m = match parameters.scale_m {
-            Some(scale_m) => ParameterError::positive("scale_m", scale_m)?,
-            // exp(-h^2 / (2 a^2)) = 1/2.
-            None => reach::half_distance_m(wanted) / (2.0 * std::f64::consts::LN_2).sqrt(),
-        };
-        let across_m = along_m * wanted.ratio;
-        let [width_m, height_m] = tile.geometry.size();
-        let usual = (DENSITY * width_m * height_m / (along_m * across_m)).ceil();
-        let count = parameters.bumps.unwrap_or(usual as u64);
-        if !(1..=COUNT_MAX).contains(&count) {
-            return Err(ParameterError::new("bumps", format!("is {count}; it must lie in 1 to {COUNT_MAX}")));
+    fn is_periodic(&self) -> bool {
+        true
+    }
+
+    fn check(&self, tile: &Tile) -> Result<(), ParameterError> {
+        self.scale_m.map(|scale_m| ParameterError::positive("scale_m", scale_m)).transpose()?;
+        match (self.bumps, self.scale_m) {
+            (Some(count), _) => check_count(count),
+            (None, Some(along_m)) => check_count(usual_count(tile, along_m, along_m)),
+            (None, None) => Ok(()),
         }
+    }
+
+    fn cost(&self, tile: &Tile) -> Cost {
+        // Without a scale, as for the narrowest bumps that the cells can show.
+        let least_m = 2.0 * tile.geometry.cell[0].min(tile.geometry.cell[1]);
+        let along_m = self.scale_m.unwrap_or(least_m);
+        let count = self.bumps.unwrap_or_else(|| usual_count(tile, along_m, along_m));
+        let class = Class { along_m, across_m: along_m, count, variance_m2: 1.0 };
+        cost(&Torus::new(tile.geometry, 0.0), &class, &tile.geometry)
+    }
+
+    fn kernel(&self, tile: &Tile, wanted: &Covariance, _: &Wanted) -> Result<Gaussians, ParameterError> {
+        // exp(-h^2 / (2 a^2)) = 1/2.
+        let fitted_m = || reach::half_distance_m(wanted) / (2.0 * std::f64::consts::LN_2).sqrt();
+        let along_m = self.scale_m.unwrap_or_else(fitted_m);
+        let across_m = along_m * wanted.ratio;
+        let count = self.bumps.unwrap_or_else(|| usual_count(tile, along_m, across_m));
+        check_count(count)?;
         let class = Class { along_m, across_m, count, variance_m2: wanted.at_distance(0.0) };
         let torus = Torus::new(tile.geometry, wanted.azimuth_deg);
-        Ok(Self { parameters, covariance: wanted.clone(), tile: tile.geometry, torus, class })
+        Ok(Gaussians { covariance: wanted.clone(), tile: tile.geometry, torus, class })
     }
+}
+
+fn usual_count(tile: &Tile, along_m: f64, across_m: f64) -> u64 {
+    let [width_m, height_m] = tile.geometry.size();
+    (DENSITY * width_m * height_m / (along_m * across_m)).ceil() as u64
+}
+
+fn check_count(count: u64) -> Result<(), ParameterError> {
+    if (1..=COUNT_MAX).contains(&count) {
+        return Ok(());
+    }
+    Err(ParameterError::new("bumps", format!("is {count}; it must lie in 1 to {COUNT_MAX}")))
+}
+
+fn cost(torus: &Torus, class: &Class, tile: &Geometry) -> Cost {
+    Cost { memory_bytes: Torus::memory_bytes(class) + 8 * tile.len() as u64, operations: torus.operations(class) }
 }
 
 impl Kernel for Gaussians {
-    fn parameters(&self) -> Value {
-        serde_json::to_value(&self.parameters).unwrap_or_default()
-    }
-
-    fn memory_bytes(&self) -> u64 {
-        Torus::memory_bytes(&self.class) + 8 * self.tile.len() as u64
-    }
-
-    fn operations(&self) -> f64 {
-        self.torus.operations(&self.class)
+    fn cost(&self) -> Cost {
+        cost(&self.torus, &self.class, &self.tile)
     }
 
     fn notes(&self) -> Vec<String> {

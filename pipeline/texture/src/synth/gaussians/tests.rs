@@ -1,13 +1,14 @@
 use super::*;
 use crate::covariance::model;
-use crate::synth::Texture;
 use crate::synth::fft_ma::torus_covariance;
-use serde_json::json;
+use crate::synth::{Synthesis, Texture};
+use serde_json::{Value, json};
 
 fn texture(raw: Value) -> Texture<Gaussians> {
     let covariance = Covariance::new(model("exponential").unwrap(), 0.3, 0.8).unwrap();
-    let (of_tile, own) = tile::read(&raw).unwrap();
-    Texture::new(of_tile, true, covariance.into(), |t, w| Gaussians::new(own, t, w)).unwrap()
+    let (of_tile, own) = tile::read::<GaussiansParameters>(&raw).unwrap();
+    let tile = Tile::check(of_tile, own.is_periodic()).unwrap();
+    Texture::new(&tile, &own, covariance.into()).unwrap()
 }
 
 /// The mean torus covariance of 20 tiles is the one that is stated. Null: equal; a tile holds `L^2 / (2 pi a^2)` = 41 and more

@@ -24,13 +24,12 @@
 
 use super::bumps::{Class, Torus};
 use super::tile::{self, Tile};
-use super::{Kernel, Made, Synthesis, SynthesisError, Wanted, fft_ma, reach};
+use super::{Cost, Kernel, Made, MethodParameters, SynthesisError, Wanted, fft_ma, reach};
 use crate::covariance::Covariance;
 use sastrugi_numeric::{Geometry, Streams};
 use sastrugi_schemas::{Kind, ParameterError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use serde_json::Value;
 
 /// Half axis of the smallest bumps, cells.
 const SMALLEST_CELLS: f64 = 0.7;
@@ -70,7 +69,6 @@ impl Default for QuasiWaveletsParameters {
 
 /// Quasi-wavelets with checked parameters.
 pub struct QuasiWavelets {
-    parameters: QuasiWaveletsParameters,
     covariance: Covariance,
     tile: Geometry,
     torus: Torus,
@@ -82,24 +80,23 @@ pub struct QuasiWavelets {
 pub fn kind() -> Kind {
     Kind {
         family: "texture",
-        kind: "quasi_wavelets",
+        kind: QuasiWaveletsParameters::NAME,
         summary: "bumps of self-similar sizes matched to the covariance, with intermittency; periodic",
         source: "Goedecke et al. 2004; Vecherin et al. 2022, section 3.1",
         parameters: tile::schema::<QuasiWaveletsParameters>(),
     }
 }
 
-/// The texture with raw parameters, matching `wanted`.
-///
-/// # Errors
-/// Parameters out of range.
-pub fn prepare(parameters: &Value, wanted: Wanted) -> Result<Box<dyn Synthesis>, ParameterError> {
-    super::prepare(parameters, wanted, |_| true, QuasiWavelets::new)
-}
+impl MethodParameters for QuasiWaveletsParameters {
+    const NAME: &'static str = "quasi_wavelets";
+    type Kernel = QuasiWavelets;
 
-impl QuasiWavelets {
-    fn new(parameters: QuasiWaveletsParameters, tile: &Tile, wanted: &Covariance) -> Result<Self, ParameterError> {
-        let QuasiWaveletsParameters { size_ratio, packing, intermittency } = parameters;
+    fn is_periodic(&self) -> bool {
+        true
+    }
+
+    fn check(&self, _: &Tile) -> Result<(), ParameterError> {
+        let &Self { size_ratio, packing, intermittency } = self;
         if !(0.3..=0.9).contains(&size_ratio) {
             return Err(ParameterError::new("size_ratio", format!("is {size_ratio}; it must lie in [0.3, 0.9]")));
         }
@@ -111,28 +108,49 @@ impl QuasiWavelets {
         if !(0.0..=2.0).contains(&intermittency) {
             return Err(ParameterError::new("intermittency", format!("is {intermittency}; it must lie in [0, 2]")));
         }
+        Ok(())
+    }
+
+    fn cost(&self, tile: &Tile) -> Cost {
+        let [width_m, height_m] = tile.geometry.size();
+        // Without the covariance, as for one that reaches across the tile: that takes most sizes.
+        match classes(self, &tile.geometry, width_m.max(height_m), 1.0) {
+            Ok(classes) => cost(&Torus::new(tile.geometry, 0.0), &classes, &tile.geometry),
+            Err(_) => Cost { memory_bytes: 8 * tile.geometry.len() as u64, operations: 0.0 },
+        }
+    }
+
+    fn kernel(&self, tile: &Tile, wanted: &Covariance, _: &Wanted) -> Result<QuasiWavelets, ParameterError> {
         let torus = Torus::new(tile.geometry, wanted.azimuth_deg);
-        let mut classes = classes(&parameters, &tile.geometry, wanted)?;
+        let mut classes = classes(self, &tile.geometry, reach::reach_m(wanted, 1e-3), wanted.ratio)?;
         let white_m2 = match_variances(&torus, &mut classes, &lags(&tile.geometry), wanted);
         classes.retain(|c| c.variance_m2 > 0.0);
-        Ok(Self { parameters, covariance: wanted.clone(), tile: tile.geometry, torus, classes, white_m2 })
+        Ok(QuasiWavelets { covariance: wanted.clone(), tile: tile.geometry, torus, classes, white_m2 })
     }
 }
 
-/// Sizes and numbers of the bumps.
+fn cost(torus: &Torus, classes: &[Class], tile: &Geometry) -> Cost {
+    Cost {
+        memory_bytes: classes.iter().map(Torus::memory_bytes).max().unwrap_or(0) + 8 * tile.len() as u64,
+        operations: classes.iter().map(|c| torus.operations(c)).sum(),
+    }
+}
+
+/// Sizes and numbers of the bumps for a covariance that reaches as far as that, with that ratio of ranges.
 fn classes(
     parameters: &QuasiWaveletsParameters,
     tile: &Geometry,
-    wanted: &Covariance,
+    reach_m: f64,
+    ratio: f64,
 ) -> Result<Vec<Class>, ParameterError> {
     let ([width_m, height_m], [dx, dy]) = (tile.size(), tile.cell);
-    let largest_m = LARGEST_SHARE * reach::reach_m(wanted, 1e-3).min(width_m.max(height_m));
+    let largest_m = LARGEST_SHARE * reach_m.min(width_m.max(height_m));
     let smallest_m = SMALLEST_CELLS * dx.min(dy);
     let mut classes = Vec::new();
     let mut share = 1.0;
     while classes.is_empty() || (largest_m * share >= smallest_m && classes.len() < CLASSES_MAX) {
         let along_m = (largest_m * share).max(smallest_m);
-        let across_m = along_m * wanted.ratio;
+        let across_m = along_m * ratio;
         let packing = parameters.packing * libm::exp(parameters.intermittency * libm::log(share));
         let count = (packing * width_m * height_m / (along_m * across_m)).ceil();
         if count > COUNT_MAX {
@@ -194,16 +212,8 @@ fn non_negative_least_squares(gram: &[Vec<f64>], right: &[f64]) -> Vec<f64> {
 }
 
 impl Kernel for QuasiWavelets {
-    fn parameters(&self) -> Value {
-        serde_json::to_value(&self.parameters).unwrap_or_default()
-    }
-
-    fn memory_bytes(&self) -> u64 {
-        self.classes.iter().map(Torus::memory_bytes).max().unwrap_or(0) + 8 * self.tile.len() as u64
-    }
-
-    fn operations(&self) -> f64 {
-        self.classes.iter().map(|c| self.torus.operations(c)).sum()
+    fn cost(&self) -> Cost {
+        cost(&self.torus, &self.classes, &self.tile)
     }
 
     fn notes(&self) -> Vec<String> {

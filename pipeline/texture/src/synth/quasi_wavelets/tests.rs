@@ -1,14 +1,15 @@
 use super::*;
 use crate::covariance::model;
-use crate::synth::Texture;
 use crate::synth::fft_ma::torus_covariance;
+use crate::synth::{Synthesis, Texture};
 use sastrugi_numeric::sums;
-use serde_json::json;
+use serde_json::{Value, json};
 
 fn texture(name: &str, raw: Value) -> Texture<QuasiWavelets> {
     let covariance = Covariance::new(model(name).unwrap(), 0.3, 0.6).unwrap();
-    let (of_tile, own) = tile::read(&raw).unwrap();
-    Texture::new(of_tile, true, covariance.into(), |t, w| QuasiWavelets::new(own, t, w)).unwrap()
+    let (of_tile, own) = tile::read::<QuasiWaveletsParameters>(&raw).unwrap();
+    let tile = Tile::check(of_tile, own.is_periodic()).unwrap();
+    Texture::new(&tile, &own, covariance.into()).unwrap()
 }
 
 /// Mixtures of Gaussians are met to 1 % of the variance at every lag, along any direction (a single Gaussian that falls

@@ -1,0 +1,61 @@
+//! What a texture matches: a fit of the study, or a covariance that the study states.
+
+use super::fit;
+use crate::job::{ItemRef, JobError, Work};
+use sastrugi_schemas::ParameterError;
+use sastrugi_schemas::fit::FitFile;
+use sastrugi_texture::{Cost, Method};
+use serde_json::{Value, json};
+
+/// What a texture matches.
+#[derive(Clone)]
+pub enum Matched {
+    /// A fit of the study.
+    Item(ItemRef),
+    /// A covariance that the study states.
+    Stated(Box<FitFile>),
+}
+
+impl Matched {
+    /// The fit file.
+    ///
+    /// # Errors
+    /// A file that cannot be read.
+    pub fn read(&self, work: &Work<'_>) -> Result<FitFile, JobError> {
+        match self {
+            Self::Stated(fit) => Ok(FitFile::clone(fit)),
+            Self::Item(item) => {
+                let path = work.parent(item, fit::FIT)?;
+                let bytes = std::fs::read(&path).map_err(|e| JobError::at(&path, e))?;
+                serde_json::from_slice(&bytes).map_err(JobError::new)
+            }
+        }
+    }
+
+    /// As a recipe and the table `terrains` name it.
+    pub fn describe(&self) -> Value {
+        match self {
+            Self::Item(item) => json!(item.id),
+            Self::Stated(fit) => json!({ "model": fit.model, "parameters": fit.parameters }),
+        }
+    }
+
+    /// The item that makes the fit.
+    pub fn parent(&self) -> Option<ItemRef> {
+        match self {
+            Self::Item(item) => Some(item.clone()),
+            Self::Stated(_) => None,
+        }
+    }
+
+    /// What a texture of the method takes. Of a fit of the study that is known only as far as the method's parameters tell.
+    ///
+    /// # Errors
+    /// A stated covariance that the method refuses.
+    pub fn cost(&self, method: &dyn Method) -> Result<Cost, ParameterError> {
+        match self {
+            Self::Item(_) => Ok(method.cost()),
+            Self::Stated(fit) => Ok(method.bind(fit)?.cost()),
+        }
+    }
+}
