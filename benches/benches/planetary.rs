@@ -19,10 +19,10 @@ fn streams() -> Streams {
     Streams::for_seed(1, "terrain")
 }
 
-fn bench_kind(bencher: Bencher, kind: &str, params: &Value, bases: &[Grid]) {
+fn bench_kind(bencher: Bencher, kind: &str, params: &Value, inputs: &[Grid]) {
     let generator = sastrugi_terrain::prepare(kind, params).expect("the bench's own parameters are valid");
     let samples = generator.geometry().len();
-    bencher.counter(ItemsCount::new(samples)).bench(|| generator.generate(&streams(), bases));
+    bencher.counter(ItemsCount::new(samples)).bench(|| generator.generate(&streams(), inputs));
 }
 
 fn all_processes() -> Value {

@@ -220,11 +220,11 @@ mod tests {
 
     #[test]
     fn val_selected_columns_keep_name_unit_and_order() {
-        let row = PsdRow { terrain_id: "a".into(), bin: 0, frequency_cycles_m: 0.5, psd_m4: f64::NAN, modes: 4 };
-        let numbers = Numbers::select("modes > 3", [&row], &["modes", "psd_m4", "no such column", "terrain_id"]);
+        let row = PsdRow { surface_id: "a".into(), bin: 0, frequency_cycles_m: 0.5, psd_m4: f64::NAN, modes: 4 };
+        let numbers = Numbers::select("modes > 3", [&row], &["modes", "psd_m4", "no such column", "surface_id"]);
         let names: Vec<&str> = numbers.columns.iter().map(|c| c.name.as_str()).collect();
-        assert_eq!(names, ["modes", "psd_m4", "terrain_id"]);
-        assert_eq!(numbers.query, "select modes, psd_m4, terrain_id from 'tables/psd/*.parquet' where modes > 3");
+        assert_eq!(names, ["modes", "psd_m4", "surface_id"]);
+        assert_eq!(numbers.query, "select modes, psd_m4, surface_id from 'tables/psd/*.parquet' where modes > 3");
         assert_eq!(numbers.columns[1].unit, "m4");
         let json = numbers.to_json("x", "t");
         assert_eq!(json["rows"][0], json!([4, null, "a"]));

@@ -231,7 +231,7 @@ impl Data {
     /// Spectrum of a heightfield: bins with a positive frequency and density.
     pub fn spectrum(&self, id: &str) -> Vec<&PsdRow> {
         let usable = |r: &&PsdRow| r.frequency_cycles_m > 0.0 && r.psd_m4 > 0.0;
-        of_key(&self.psd, |r| &r.terrain_id, id).iter().filter(usable).collect()
+        of_key(&self.psd, |r| &r.surface_id, id).iter().filter(usable).collect()
     }
 
     /// Figures of a surface.
@@ -270,7 +270,7 @@ impl Data {
 
     /// Histogram of a heightfield.
     pub fn histogram(&self, id: &str) -> Vec<&HeightDistributionRow> {
-        of_key(&self.heights, |r| &r.terrain_id, id).iter().filter(|r| r.density_per_m.is_finite()).collect()
+        of_key(&self.heights, |r| &r.surface_id, id).iter().filter(|r| r.density_per_m.is_finite()).collect()
     }
 }
 

@@ -103,24 +103,24 @@ fn counts(count: usize, shares: &[f64; 3]) -> Option<[usize; 3]> {
 
 /// Terrains by what ties them to one another.
 fn units(study: &Study, fields: &BTreeMap<String, Heightfield>, graph: &Graph) -> Vec<Unit> {
-    let mut forest = Forest::default();
+    let mut sets = DisjointSets::default();
     let makers: BTreeMap<&ItemRef, &str> = fields.iter().map(|(id, field)| (&field.item, id.as_str())).collect();
     for (id, field) in fields {
-        forest.root(id);
+        sets.root(id);
         let parents = graph.find(&field.item).into_iter().flat_map(|p| &graph.node(p).parents);
-        parents.filter_map(|parent| makers.get(parent)).for_each(|parent| forest.join(id, parent));
+        parents.filter_map(|parent| makers.get(parent)).for_each(|parent| sets.join(id, parent));
         if let Some(word) = shared_draw(study, field) {
-            forest.join(id, &word);
+            sets.join(id, &word);
         }
         // Explicit seeds may give one stream twice. The sign sorts after all ids, so that none of these words stands for a unit.
         let stream = graph.find(&field.item).and_then(|p| graph.node(p).stream.clone());
         if let Some(stream) = stream {
-            forest.join(id, &format!("~{stream}"));
+            sets.join(id, &format!("~{stream}"));
         }
     }
     let mut units: BTreeMap<String, Unit> = BTreeMap::new();
     for (id, field) in fields {
-        let root = forest.root(id);
+        let root = sets.root(id);
         let rank = || Streams::for_item(study.head.seed, STAGE, root.trim_start()).stream("rank").bits();
         let unit = units.entry(root.clone()).or_insert_with(|| Unit {
             terrains: Vec::new(),
@@ -141,9 +141,9 @@ fn shared_draw(study: &Study, field: &Heightfield) -> Option<String> {
 
 /// Names that belong together; the first of them in order stands for all.
 #[derive(Default)]
-struct Forest(BTreeMap<String, String>);
+struct DisjointSets(BTreeMap<String, String>);
 
-impl Forest {
+impl DisjointSets {
     fn root(&mut self, name: &str) -> String {
         let mut at = name.to_owned();
         loop {

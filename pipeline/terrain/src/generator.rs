@@ -30,23 +30,23 @@ pub trait Generator: Send + Sync {
     fn notes(&self) -> Vec<String>;
 
     /// The surfaces that it stands on, as its parameters name them.
-    fn bases(&self) -> Vec<Base> {
+    fn inputs(&self) -> Vec<Input> {
         Vec::new()
     }
 
-    /// The heightfield, with what belongs to it. `bases` are the surfaces of [`Self::bases`], in that order.
+    /// The heightfield, with what belongs to it. `inputs` are the surfaces of [`Self::inputs`], in that order.
     ///
     /// # Errors
     /// A [`TerrainError`] where the parameters are possible one by one but give no usable surface together.
-    fn generate(&self, streams: &Streams, bases: &[Grid]) -> Result<Terrain, TerrainError>;
+    fn generate(&self, streams: &Streams, inputs: &[Grid]) -> Result<Terrain, TerrainError>;
 
     /// As [`Self::generate`], and the heights are finite and not the same everywhere, whatever the parameters: in single precision, in
     /// which files hold them.
     ///
     /// # Errors
     /// As [`Self::generate`]; heights beyond all numbers, or without relief.
-    fn generate_checked(&self, streams: &Streams, bases: &[Grid]) -> Result<Terrain, TerrainError> {
-        let made = self.generate(streams, bases)?;
+    fn generate_checked(&self, streams: &Streams, inputs: &[Grid]) -> Result<Terrain, TerrainError> {
+        let made = self.generate(streams, inputs)?;
         let part = "the heights";
         if let Some(&value) = made.heights.values.iter().find(|z| !(**z as f32).is_finite()) {
             return Err(TerrainError::Unrepresentable { part, figure: "one of them", value });
@@ -65,7 +65,7 @@ pub trait Generator: Send + Sync {
 
 /// A surface that a generator stands on.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Base {
+pub struct Input {
     /// Dotted path of the parameter that names it.
     pub key: String,
     /// Its name: an id in a study, a file on the command line.
@@ -178,7 +178,7 @@ pub enum TerrainError {
     },
     /// A surface that the generator stands on does not serve.
     #[error("use \"{base}\": it {reason}")]
-    Base {
+    Input {
         /// Its name in the parameters.
         base: String,
         /// What is wrong, and what would be right.

@@ -75,7 +75,7 @@ fn jackknife_error(parts: &[(f64, f64)]) -> f64 {
 
 /// A texture as the fit would see it: less its moving average over the fit's window, and without the share of it that the
 /// fit trimmed. `None` when the fit does not say its window, or the texture is below two windows wide.
-pub fn alike(texture: &Grid, fit: &FitFile) -> Option<Grid> {
+pub fn texture_residual(texture: &Grid, fit: &FitFile) -> Option<Grid> {
     let [window_x, window_y] = fit.window_m?;
     let [size_x, size_y] = texture.geometry.size();
     if size_x < 2.0 * window_x || size_y < 2.0 * window_y {
@@ -164,12 +164,12 @@ mod tests {
     fn val_a_texture_is_treated_as_the_residual_was() {
         let (dem, residual, FitOutcome { fit, .. }) = &*FITTED;
         let texture = dem.map(|z| if z.is_nan() { 0.0 } else { z });
-        let alike = alike(&texture, fit).unwrap();
-        let used = alike.finite_count() as f64 / alike.values.len() as f64;
+        let residual_of_texture = texture_residual(&texture, fit).unwrap();
+        let used = residual_of_texture.finite_count() as f64 / residual_of_texture.values.len() as f64;
         assert!((used - 0.95).abs() < 0.02, "{used}");
         let rms = |g: &Grid| sums::variance(&sums::finite(&g.values)).sqrt();
-        assert!((rms(&alike) / rms(residual) - 1.0).abs() < 0.05);
-        assert!(super::alike(&texture.window(0, 0, 29, 29), fit).is_none());
-        assert!(super::alike(&texture, &FitFile::default()).is_none());
+        assert!((rms(&residual_of_texture) / rms(residual) - 1.0).abs() < 0.05);
+        assert!(super::texture_residual(&texture.window(0, 0, 29, 29), fit).is_none());
+        assert!(super::texture_residual(&texture, &FitFile::default()).is_none());
     }
 }

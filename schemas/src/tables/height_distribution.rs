@@ -4,8 +4,8 @@ super::table! {
     /// One row per bin of a heightfield's histogram, as drawn by the report.
     "height_distribution" HeightDistributionRow {
         keys {
-            /// Id of the heightfield, or of the fit for its residual.
-            terrain_id: String,
+            /// Id of the surface (table `surfaces`).
+            surface_id: String,
             /// Number of the bin, from 0.
             bin: i64,
         }

@@ -5,8 +5,8 @@ super::table! {
     /// spatial frequency in cycles per metre).
     "psd" PsdRow {
         keys {
-            /// Id of the heightfield, or of the fit for its residual.
-            terrain_id: String,
+            /// Id of the surface (table `surfaces`).
+            surface_id: String,
             /// Number of the bin, from 0.
             bin: i64,
         }

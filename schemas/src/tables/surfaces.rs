@@ -8,7 +8,7 @@ super::table! {
             /// Id of the heightfield, of the fit for its residual, or `<texture>.residual`.
             surface_id: String,
         }
-        /// `dem`, `terrain` or `texture`; `fit` for the residual of a measured DEM; `alike` for a texture detrended and trimmed alike.
+        /// `dem`, `terrain` or `texture`; `fit` for the residual of a measured DEM; `texture_residual` for a texture detrended and trimmed as the DEM of its fit was.
         stage: String [""],
         /// The fit whose window and trimming it went through; null for a heightfield as it is.
         fit_id: Option<String> [""],

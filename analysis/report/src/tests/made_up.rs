@@ -293,14 +293,14 @@ fn curves(data: &mut Data, id: &str, slope: f64, width_m: f64) {
     for bin in 0..120 {
         let f = 0.02 * libm::pow(1.055, bin as f64);
         let psd_m4 = 0.01 * libm::pow(f, slope) * libm::exp(0.25 * s.normal());
-        data.psd.push(PsdRow { terrain_id: id.into(), bin, frequency_cycles_m: f, psd_m4, modes: 8 * (bin + 1) });
+        data.psd.push(PsdRow { surface_id: id.into(), bin, frequency_cycles_m: f, psd_m4, modes: 8 * (bin + 1) });
     }
     for bin in 0..60 {
         let low_m = width_m * (bin as f64 / 10.0 - 3.0);
         let z = (low_m + 0.05 * width_m) / width_m;
         let density_per_m = libm::exp(-0.5 * z * z) / (2.5066 * width_m) * (1.0 + 0.06 * s.normal());
         data.heights.push(HeightDistributionRow {
-            terrain_id: id.into(),
+            surface_id: id.into(),
             bin,
             low_m,
             high_m: low_m + 0.1 * width_m,
@@ -521,13 +521,13 @@ fn measured(data: &mut Data, shelf: &mut Shelf) {
     curves(data, "texture", -2.5, 8.3);
     surface(data, "texture", "texture", None, 9.0);
     curves(data, "texture.residual", -2.4, 8.1);
-    surface(data, "texture.residual", "alike", Some("jacksboro-corrected"), 8.2);
+    surface(data, "texture.residual", "texture_residual", Some("jacksboro-corrected"), 8.2);
     data.covariance.sort_by(|a, b| (&a.fit_id, a.bin).cmp(&(&b.fit_id, b.bin)));
     data.surfaces.sort_by(|a, b| a.surface_id.cmp(&b.surface_id));
     data.structure.sort_by(|a, b| a.surface_id.cmp(&b.surface_id));
     data.profile_psd.sort_by(|a, b| a.surface_id.cmp(&b.surface_id));
-    data.psd.sort_by(|a, b| a.terrain_id.cmp(&b.terrain_id));
-    data.heights.sort_by(|a, b| a.terrain_id.cmp(&b.terrain_id));
+    data.psd.sort_by(|a, b| a.surface_id.cmp(&b.surface_id));
+    data.heights.sort_by(|a, b| a.surface_id.cmp(&b.surface_id));
 }
 
 /// Two more models, a profile, and covariances by direction.

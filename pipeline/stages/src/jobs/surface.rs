@@ -53,7 +53,7 @@ impl SurfaceRows {
         }
     }
 
-    /// What a fit leaves of a surface: the residual of its DEM, or a texture treated alike. Both share the lags of the Hurst
+    /// What a fit leaves of a surface: the residual of its DEM, or a texture detrended and trimmed as that was. Both share the lags of the Hurst
     /// exponent.
     pub fn of_residual(surface: &Surface<'_>, fit: &FitFile) -> Self {
         let map = SpectralMap::of(surface.grid);
@@ -148,7 +148,7 @@ fn profile_rows(id: &str, bins: &[ProfileBin]) -> Vec<ProfilePsdRow> {
 
 fn psd_rows(id: &str, spectrum: &[SpectrumBin]) -> Vec<PsdRow> {
     let row = |(bin, b): (usize, &SpectrumBin)| PsdRow {
-        terrain_id: id.to_owned(),
+        surface_id: id.to_owned(),
         bin: bin as i64,
         frequency_cycles_m: b.frequency_cycles_m,
         psd_m4: b.psd_m4,
@@ -159,7 +159,7 @@ fn psd_rows(id: &str, spectrum: &[SpectrumBin]) -> Vec<PsdRow> {
 
 fn height_rows(id: &str, histogram: &[HistogramBin]) -> Vec<HeightDistributionRow> {
     let row = |(bin, b): (usize, &HistogramBin)| HeightDistributionRow {
-        terrain_id: id.to_owned(),
+        surface_id: id.to_owned(),
         bin: bin as i64,
         low_m: b.low_m,
         high_m: b.high_m,

@@ -25,9 +25,9 @@ struct TerrainJob {
     id: String,
     generator: Box<dyn Generator>,
     /// Items of the surfaces that the generator stands on.
-    bases: Vec<ItemRef>,
+    inputs: Vec<ItemRef>,
     /// Cells of those.
-    base_cells: u64,
+    input_cells: u64,
     streams: Streams,
     png16: bool,
     exports: Exports,
@@ -50,7 +50,7 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
         for one in expanded {
             builder.claim(&entry, STAGE, &one.id)?;
             let generator = sastrugi_terrain::prepare(&item.kind, &one.params).map_err(|e| entry.refuse(e))?;
-            let (bases, base_cells) = bases(builder, &entry, generator.as_ref())?;
+            let (inputs, input_cells) = inputs(builder, &entry, generator.as_ref())?;
             let shared = builder.is_paired().then(|| common(one.replicate));
             let streams = builder.streams(STAGE, shared.as_ref().unwrap_or(&one.id), item.seed, one.replicate);
             let field = Heightfield {
@@ -68,9 +68,9 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
             };
             let geotiff = builder.study.head.geotiff;
             let exports = Exports::new(&item.exports, &generator.geometry()).map_err(|e| entry.error("exports", e))?;
-            let parents = bases.clone().into_iter().collect::<BTreeSet<_>>().into_iter().collect();
+            let parents = inputs.clone().into_iter().collect::<BTreeSet<_>>().into_iter().collect();
             let id = one.id.clone();
-            let job = TerrainJob { id, generator, bases, base_cells, streams, png16: item.png16, exports, geotiff };
+            let job = TerrainJob { id, generator, inputs, input_cells, streams, png16: item.png16, exports, geotiff };
             let node = Node {
                 item: field.item.clone(),
                 parents,
@@ -86,15 +86,15 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
 }
 
 /// The items of the surfaces that a generator stands on, and how many cells they have together.
-fn bases(
+fn inputs(
     builder: &Builder<'_>,
     entry: &Entry<'_>,
     generator: &dyn Generator,
 ) -> Result<(Vec<ItemRef>, u64), StudyError> {
     let mut items = Vec::new();
     let mut cells = 0;
-    for base in generator.bases() {
-        let field = builder.surface(entry, &base.key, &base.name)?;
+    for input in generator.inputs() {
+        let field = builder.surface(entry, &input.key, &input.name)?;
         cells += field.cells;
         items.push(field.item.clone());
     }
@@ -133,7 +133,7 @@ impl Job for TerrainJob {
 
     fn memory_bytes(&self) -> u64 {
         let exports = self.exports.memory_bytes(self.generator.geometry().len() as u64);
-        self.generator.memory_bytes() + 8 * self.base_cells + exports
+        self.generator.memory_bytes() + 8 * self.input_cells + exports
     }
 
     fn estimate(&self) -> Estimate {
@@ -142,8 +142,8 @@ impl Job for TerrainJob {
     }
 
     fn run(&self, work: &Work<'_>) -> Result<Outcome, JobError> {
-        let (bases, crs) = self.read_bases(work)?;
-        let made = generate(self.generator.as_ref(), &self.streams, &bases)?;
+        let (inputs, crs) = self.read_inputs(work)?;
+        let made = generate(self.generator.as_ref(), &self.streams, &inputs)?;
         let options = raster_options(self.geotiff);
         let mut products = vec![self.write(work, HEIGHTS, "", &made.heights, &crs, &options)?];
         for map in &made.maps {
@@ -166,11 +166,11 @@ impl Job for TerrainJob {
 
 impl TerrainJob {
     /// The surfaces that the generator stands on, and the coordinate system of the first.
-    fn read_bases(&self, work: &Work<'_>) -> Result<(Vec<Grid>, Crs), JobError> {
+    fn read_inputs(&self, work: &Work<'_>) -> Result<(Vec<Grid>, Crs), JobError> {
         let mut grids = Vec::new();
         let mut crs = None;
-        for base in &self.bases {
-            let read = dem::read(&work.parent(base, HEIGHTS)?).map_err(input_error)?;
+        for input in &self.inputs {
+            let read = dem::read(&work.parent(input, HEIGHTS)?).map_err(input_error)?;
             crs.get_or_insert(read.info.crs);
             grids.push(read.grid);
         }
@@ -205,11 +205,11 @@ pub fn values_of(map: &Map) -> Values {
 ///
 /// # Errors
 /// When the generator has no result, or heights that are not finite or the same everywhere.
-pub fn generate(generator: &dyn Generator, streams: &Streams, bases: &[Grid]) -> Result<Terrain, JobError> {
-    generator.generate_checked(streams, bases).map_err(|e| {
+pub fn generate(generator: &dyn Generator, streams: &Streams, inputs: &[Grid]) -> Result<Terrain, JobError> {
+    generator.generate_checked(streams, inputs).map_err(|e| {
         let message = format!("failed to {e}");
         // The surface below does not serve: another part of it, or another file, would.
-        if matches!(e, TerrainError::Base { .. }) { JobError::input(message) } else { JobError::new(message) }
+        if matches!(e, TerrainError::Input { .. }) { JobError::input(message) } else { JobError::new(message) }
     })
 }
 

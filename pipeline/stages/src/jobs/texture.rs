@@ -454,9 +454,9 @@ impl TextureJob {
     /// The texture, without its base, detrended and trimmed as the fit's residual was: what that residual is compared with.
     fn residual(&self, texture: &Grid, fit: &FitFile) -> Option<SurfaceRows> {
         let Matched::Item(item) = &self.matched else { return None };
-        let residual = sastrugi_texture::shown::alike(texture, fit)?;
+        let residual = sastrugi_texture::shown::texture_residual(texture, fit)?;
         let id = format!("{}.residual", self.id);
-        let surface = Surface { id: &id, stage: "alike", fit_id: Some(&item.id), grid: &residual };
+        let surface = Surface { id: &id, stage: "texture_residual", fit_id: Some(&item.id), grid: &residual };
         Some(SurfaceRows::of_residual(&surface, fit))
     }
 

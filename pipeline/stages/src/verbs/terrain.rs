@@ -38,8 +38,8 @@ pub fn terrain(request: &Request<'_>) -> Result<Value, Error> {
     let seed = request.seed.or(seed).unwrap_or(0);
     super::check_output(request.output)?;
     let streams = Streams::for_seed(seed, STAGE);
-    let (bases, crs) = read_bases(generator.as_ref())?;
-    let made = generate(generator.as_ref(), &streams, &bases)?;
+    let (inputs, crs) = read_inputs(generator.as_ref())?;
+    let made = generate(generator.as_ref(), &streams, &inputs)?;
     let mut notes = generator.notes();
     notes.extend(made.notes);
     if Format::of_name(request.output) == Some(Format::Png) {
@@ -70,11 +70,11 @@ pub fn terrain(request: &Request<'_>) -> Result<Value, Error> {
 }
 
 /// The files that a generator stands on, in metres, and the coordinate system of the first.
-fn read_bases(generator: &dyn Generator) -> Result<(Vec<Grid>, Crs), Error> {
+fn read_inputs(generator: &dyn Generator) -> Result<(Vec<Grid>, Crs), Error> {
     let mut grids = Vec::new();
     let mut crs = None;
-    for base in generator.bases() {
-        let read = super::read(Path::new(&base.name), &super::Reading::default())?.dem;
+    for input in generator.inputs() {
+        let read = super::read(Path::new(&input.name), &super::Reading::default())?.dem;
         crs.get_or_insert(read.info.crs);
         // As an item of a study reads it.
         grids.push(read.grid.as_stored());

@@ -188,7 +188,7 @@ fn val_many_rows_stream_through() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("t.parquet");
     let psd =
-        |bin: i64| PsdRow { terrain_id: "a".to_owned(), bin, frequency_cycles_m: bin as f64, psd_m4: 1.0, modes: bin };
+        |bin: i64| PsdRow { surface_id: "a".to_owned(), bin, frequency_cycles_m: bin as f64, psd_m4: 1.0, modes: bin };
     let mut writer = TableWriter::create(&path, &PsdRow::TABLE, None).unwrap();
     let count = 2 * ROW_GROUP_ROWS as i64 + 17;
     (0..count).for_each(|bin| writer.push(psd(bin).cells()).unwrap());

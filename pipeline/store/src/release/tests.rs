@@ -16,7 +16,7 @@ fn head() -> Head {
 
 fn rows(n: i64) -> Vec<PsdRow> {
     let row = |bin: i64| PsdRow {
-        terrain_id: "a".to_owned(),
+        surface_id: "a".to_owned(),
         bin,
         frequency_cycles_m: 0.1 * bin as f64,
         psd_m4: if bin == 3 { f64::NAN } else { 1.0 / (1.0 + bin as f64) },

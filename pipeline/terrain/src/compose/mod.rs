@@ -32,7 +32,7 @@ mod tests;
 
 pub use params::{Compose, Operation, RawCompose, RawProcess, RawRegion};
 
-use crate::generator::{Base, Generator, MAPS, Map, Terrain, TerrainError};
+use crate::generator::{Generator, Input, MAPS, Map, Terrain, TerrainError};
 use params::{Operand, Part, Process, Region, Step};
 use sastrugi_numeric::{Geometry, Grid, Streams, Surface, ops, sums};
 use serde_json::Value;
@@ -44,12 +44,12 @@ pub const KIND: &str = "compose";
 const SECONDS_PER_JOIN: f64 = 2e-8;
 
 impl Operand {
-    fn bases(&self) -> Vec<Base> {
+    fn inputs(&self) -> Vec<Input> {
         match self {
             Self::Surface(base) => vec![base.clone()],
             Self::Generator { generator, key } => {
-                let within = |b: Base| Base { key: format!("{key}.{}", b.key), ..b };
-                generator.bases().into_iter().map(within).collect()
+                let within = |b: Input| Input { key: format!("{key}.{}", b.key), ..b };
+                generator.inputs().into_iter().map(within).collect()
             }
         }
     }
@@ -68,27 +68,27 @@ impl Operand {
         }
     }
 
-    /// The values on the cells of `geometry`; takes its bases off the front of `bases`.
-    fn values(&self, geometry: &Geometry, streams: &Streams, bases: &mut &[Grid]) -> Result<Terrain, TerrainError> {
-        let (own, rest) = bases.split_at(self.bases().len().min(bases.len()));
-        *bases = rest;
+    /// The values on the cells of `geometry`; takes its inputs off the front of `inputs`.
+    fn values(&self, geometry: &Geometry, streams: &Streams, inputs: &mut &[Grid]) -> Result<Terrain, TerrainError> {
+        let (own, rest) = inputs.split_at(self.inputs().len().min(inputs.len()));
+        *inputs = rest;
         match (self, own) {
             (Self::Generator { generator, .. }, own) => generator.generate(streams, own),
             (Self::Surface(base), [surface]) => sampled(base, surface, geometry).map(Terrain::from),
             (Self::Surface(base), _) => {
-                Err(TerrainError::Base { base: base.name.clone(), reason: "is not there".to_owned() })
+                Err(TerrainError::Input { base: base.name.clone(), reason: "is not there".to_owned() })
             }
         }
     }
 }
 
 /// A surface at the centres of other cells.
-fn sampled(base: &Base, surface: &Grid, geometry: &Geometry) -> Result<Grid, TerrainError> {
+fn sampled(base: &Input, surface: &Grid, geometry: &Geometry) -> Result<Grid, TerrainError> {
     let at = |k: usize| {
         let (x, y) = (geometry.x(k % geometry.cols), geometry.y(k / geometry.cols));
         surface.height(x, y).ok_or_else(|| {
             let reason = format!("has no height at x = {x} m, y = {y} m; it must reach all centres of the cells");
-            TerrainError::Base { base: base.name.clone(), reason }
+            TerrainError::Input { base: base.name.clone(), reason }
         })
     };
     Ok(Grid::new(*geometry, (0..geometry.len()).map(at).collect::<Result<_, _>>()?))
@@ -106,7 +106,7 @@ impl Region {
 struct Running<'a> {
     geometry: Geometry,
     streams: Streams,
-    bases: &'a [Grid],
+    inputs: &'a [Grid],
     maps: Vec<Map>,
     notes: Vec<String>,
 }
@@ -122,7 +122,7 @@ impl Running<'_> {
         operand: &Operand,
         streams: &Streams,
     ) -> Result<Terrain, TerrainError> {
-        let made = operand.values(&self.geometry, streams, &mut self.bases)?;
+        let made = operand.values(&self.geometry, streams, &mut self.inputs)?;
         self.notes.extend(made.notes.iter().map(|note| part.note(number, note)));
         let placed = |values: Grid| Grid::new(self.geometry, values.values);
         let maps = made.maps.into_iter().map(|map| Map { values: placed(map.values), ..map }).collect();
@@ -236,13 +236,13 @@ impl Generator for Compose {
         self.notes.clone()
     }
 
-    fn bases(&self) -> Vec<Base> {
-        self.processes.iter().flat_map(Process::operands).flat_map(Operand::bases).collect()
+    fn inputs(&self) -> Vec<Input> {
+        self.processes.iter().flat_map(Process::operands).flat_map(Operand::inputs).collect()
     }
 
-    fn generate(&self, streams: &Streams, bases: &[Grid]) -> Result<Terrain, TerrainError> {
+    fn generate(&self, streams: &Streams, inputs: &[Grid]) -> Result<Terrain, TerrainError> {
         let geometry = self.geometry;
-        let mut running = Running { geometry, streams: streams.clone(), bases, maps: Vec::new(), notes: Vec::new() };
+        let mut running = Running { geometry, streams: streams.clone(), inputs, maps: Vec::new(), notes: Vec::new() };
         let mut heights = Grid::filled(geometry, 0.0);
         for (k, process) in self.processes.iter().enumerate() {
             heights = running.apply(heights, k + 1, process)?;

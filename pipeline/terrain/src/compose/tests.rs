@@ -10,8 +10,8 @@ fn streams() -> Streams {
     Streams::for_seed(1, "terrain")
 }
 
-fn made(processes: Value, bases: &[Grid]) -> Terrain {
-    prepared(processes).generate(&streams(), bases).unwrap()
+fn made(processes: Value, inputs: &[Grid]) -> Terrain {
+    prepared(processes).generate(&streams(), inputs).unwrap()
 }
 
 /// A ramp that rises by 1 a metre to the east.
@@ -39,7 +39,7 @@ fn val_operations_are_those_of_the_table() {
 
 #[test]
 fn val_regions_rise_smoothly_between_their_values() {
-    let operand = || Operand::Surface(Base { key: String::new(), name: String::new() });
+    let operand = || Operand::Surface(Input { key: String::new(), name: String::new() });
     let region = |from, to| Region { operand: operand(), from, to };
     let weights = [1.0, 2.0, 2.5, 3.0, 4.0].map(|v| region(2.0, 3.0).weight(v));
     assert_eq!(weights, [0.0, 0.0, 0.5, 1.0, 1.0]);
@@ -109,9 +109,9 @@ fn val_surfaces_must_reach_the_cells() {
 fn val_bases_stand_in_the_order_of_the_processes() {
     let region = json!({"of": "b", "from": 0.0, "to": 1.0});
     let generator = prepared(json!([{"of": "a", "region": region}, {"kind": "spheroids"}, {"of": "c"}]));
-    let bases: Vec<(String, String)> = generator.bases().into_iter().map(|b| (b.key, b.name)).collect();
+    let inputs: Vec<(String, String)> = generator.inputs().into_iter().map(|b| (b.key, b.name)).collect();
     let expected = [("processes.0.of", "a"), ("processes.0.region.of", "b"), ("processes.2.of", "c")];
-    assert_eq!(bases, expected.map(|(k, n)| (k.to_owned(), n.to_owned())));
+    assert_eq!(inputs, expected.map(|(k, n)| (k.to_owned(), n.to_owned())));
 }
 
 /// Every generator that needs no other surface can take part.
@@ -121,7 +121,7 @@ fn prop_every_generator_composes() {
         let params =
             json!({"size_px": [32, 24], "cell_m": 0.05, "origin_m": [2.0, 1.0], "processes": [{"kind": kind.kind}]});
         let generator = crate::prepare(KIND, &params).unwrap_or_else(|e| panic!("{}: {e}", kind.kind));
-        if generator.bases().is_empty() {
+        if generator.inputs().is_empty() {
             let made = generator.generate(&streams(), &[]).unwrap_or_else(|e| panic!("{}: {e}", kind.kind));
             assert_eq!(made.heights.geometry, generator.geometry(), "{}", kind.kind);
             assert!(made.maps.iter().all(|m| m.values.geometry == generator.geometry()), "{}", kind.kind);
@@ -175,8 +175,8 @@ fn val_maps_of_generators_go_on() {
 #[test]
 fn val_maps_follow_their_region() {
     let region = |from: f64, to: f64| json!({"of": "ramp", "from": from, "to": to});
-    let known = |processes: Value, bases: &[Grid]| -> Vec<bool> {
-        let maps = made(processes, bases).maps;
+    let known = |processes: Value, inputs: &[Grid]| -> Vec<bool> {
+        let maps = made(processes, inputs).maps;
         maps.first().map_or_else(Vec::new, |map| map.values.row(7).iter().map(|v| v.is_finite()).collect())
     };
     let east: Vec<bool> = (0..30).map(|k| 0.5 * k as f64 + 0.25 > 4.0).collect();

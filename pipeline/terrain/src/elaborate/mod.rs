@@ -42,7 +42,7 @@ pub(crate) use fit::seen_through_the_lags;
 pub use fit::{TextureFit, fit};
 pub use params::{Elaborate, RawElaborate};
 
-use crate::generator::{Base, Generator, Terrain, TerrainError};
+use crate::generator::{Generator, Input, Terrain, TerrainError};
 use crate::planetary::{self, Assembly, RawProcess, Window, World};
 use background::Background;
 use rayon::prelude::*;
@@ -281,13 +281,13 @@ impl Generator for Elaborate {
         self.size.note().into_iter().collect()
     }
 
-    fn bases(&self) -> Vec<Base> {
-        vec![Base { key: "dem".to_owned(), name: self.raw.dem.clone() }]
+    fn inputs(&self) -> Vec<Input> {
+        vec![Input { key: "dem".to_owned(), name: self.raw.dem.clone() }]
     }
 
-    fn generate(&self, streams: &Streams, bases: &[Grid]) -> Result<Terrain, TerrainError> {
-        let failed = |reason: String| TerrainError::Base { base: self.raw.dem.clone(), reason };
-        let dem = bases.first().ok_or_else(|| failed("is not there".to_owned()))?;
+    fn generate(&self, streams: &Streams, inputs: &[Grid]) -> Result<Terrain, TerrainError> {
+        let failed = |reason: String| TerrainError::Input { base: self.raw.dem.clone(), reason };
+        let dem = inputs.first().ok_or_else(|| failed("is not there".to_owned()))?;
         self.refine(streams, dem).map_err(|e| failed(e.to_string()))
     }
 }

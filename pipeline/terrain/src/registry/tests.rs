@@ -22,26 +22,26 @@ fn val_part_of_a_layer_leaves_the_rest_at_its_defaults() {
 /// Parameters of a small surface of every kind, and what it stands on.
 fn small(kind: &str) -> (Value, Vec<Grid>) {
     let mut params = json!({"size_m": [1.6, 1.2], "cell_m": 0.05});
-    let mut bases = Vec::new();
+    let mut inputs = Vec::new();
     if kind == "elaborate" {
         params["dem"] = json!("site");
         params["origin_m"] = json!([3.0, 3.0]);
-        bases.push(Grid::new(Geometry::square(9, 8, 1.0), (0..72).map(|k| f64::from(k * k % 7)).collect()));
+        inputs.push(Grid::new(Geometry::square(9, 8, 1.0), (0..72).map(|k| f64::from(k * k % 7)).collect()));
     }
-    (params, bases)
+    (params, inputs)
 }
 
 #[test]
 fn prop_parameters_read_back_to_the_same_generator() {
     for kind in kinds() {
-        let (params, bases) = small(kind.kind);
+        let (params, inputs) = small(kind.kind);
         let first = prepare(kind.kind, &params).unwrap();
         let second = prepare(kind.kind, &first.parameters()).unwrap();
         assert_eq!(first.parameters(), second.parameters());
         assert_eq!(first.geometry(), second.geometry());
         let streams = Streams::for_seed(1, "terrain");
-        let made = first.generate(&streams, &bases).unwrap();
-        assert_eq!(made, second.generate(&streams, &bases).unwrap());
+        let made = first.generate(&streams, &inputs).unwrap();
+        assert_eq!(made, second.generate(&streams, &inputs).unwrap());
         assert_eq!(made.heights.geometry, first.geometry());
     }
 }

@@ -17,7 +17,7 @@ use crate::covariance::Covariance;
 use crate::covariance::bins::Layout;
 use crate::fit::case::Case;
 use crate::fit::resampling::{self, CELLS_MAX};
-use crate::fit::twins::Twins;
+use crate::fit::null_surfaces::NullSurfaces;
 use rayon::prelude::*;
 use sastrugi_numeric::{Grid, Streams, sums};
 use sastrugi_roughness::{Statistic, unfitted_statistics};
@@ -92,7 +92,7 @@ fn cut(site: &Grid) -> (Grid, Grid) {
 fn texture_statistics(case: &Case, covariance: &Covariance, streams: &Streams) -> Vec<Statistic> {
     let g = case.geometry;
     let trusted = case.survey.trusted(0..g.rows, 0..g.cols);
-    statistics(case, Twins::new(case, covariance, [g.rows, g.cols], trusted).one(streams).residual)
+    statistics(case, NullSurfaces::new(case, covariance, [g.rows, g.cols], trusted).one(streams).residual)
 }
 
 fn statistics(case: &Case, residual: Vec<f64>) -> Vec<Statistic> {

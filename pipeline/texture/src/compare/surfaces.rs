@@ -130,7 +130,7 @@ impl<'a> Side<'a> {
         let case = self.rings.case;
         let part = Part::of(case);
         let (cols, scale) = (part.cols, part.scale);
-        let twins = part.twins(case, covariance);
+        let nulls = part.null_surfaces(case, covariance);
         let [round, long] = [(&self.rings, &self.round), (&self.directions, &self.long)]
             .map(|(estimator, own)| centred(estimator, &own.form, covariance));
         let freedom = (self.rings.bins.len().saturating_sub(round.at.len())).max(1) as f64;
@@ -138,9 +138,9 @@ impl<'a> Side<'a> {
         (0..count)
             .into_par_iter()
             .map(|k| {
-                let twin = twins.one(&streams.child(&format!("surface-{k}")));
-                let (trim, heights) = (twin.trim, HeightCurve::of(&twin.residual));
-                let estimate = masked_covariance(&twin.trimmed(), cols, case.max_lag);
+                let null = nulls.one(&streams.child(&format!("surface-{k}")));
+                let (trim, heights) = (null.trim, HeightCurve::of(&null.residual));
+                let estimate = masked_covariance(&null.trimmed(), cols, case.max_lag);
                 let refit = |estimator: &Estimator, refits: &Refits| {
                     refits.to(&estimator.bins.means(&estimate), trim.threshold_m)
                 };

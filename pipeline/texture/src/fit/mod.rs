@@ -37,7 +37,7 @@ pub(crate) mod residual;
 mod search;
 pub(crate) mod simulate;
 pub(crate) mod survey;
-pub(crate) mod twins;
+pub(crate) mod null_surfaces;
 mod verdicts;
 
 pub use error::FitError;

@@ -20,7 +20,7 @@ use super::case::Case;
 use super::estimator::{Estimate, Estimator};
 use super::profile;
 use super::survey::Squares;
-use super::twins::Twins;
+use super::null_surfaces::NullSurfaces;
 use crate::covariance::bins;
 use crate::covariance::form::Role;
 use crate::covariance::{Covariance, LagBins, masked_covariance};
@@ -61,15 +61,15 @@ pub fn parametric(estimator: &Estimator, estimate: &Estimate, count: usize, stre
     let case = estimator.case;
     let part = Part::of(case);
     let (cols, scale) = (part.cols, part.scale);
-    let twins = part.twins(case, &estimate.covariance);
+    let surfaces = part.null_surfaces(case, &estimate.covariance);
     let freedom = estimator.bins.len().saturating_sub(estimate.at.len()).max(1) as f64;
     let refits = estimator.refits(estimate);
     let results: Vec<(Vec<f64>, f64, f64)> = (0..count)
         .into_par_iter()
         .map(|k| {
-            let twin = twins.one(&streams.child(&format!("bootstrap-{k}")));
-            let trim = twin.trim;
-            let data = estimator.bins.means(&masked_covariance(&twin.trimmed(), cols, case.max_lag));
+            let surface = surfaces.one(&streams.child(&format!("bootstrap-{k}")));
+            let trim = surface.trim;
+            let data = estimator.bins.means(&masked_covariance(&surface.trimmed(), cols, case.max_lag));
             let end = refits.to(&data, trim.threshold_m);
             let at = end.at.iter().zip(&estimate.at).map(|(a, e)| e + scale * (a - e)).collect();
             // A smaller part scatters more: its sum of squares is larger by the square of the scale.
@@ -95,8 +95,8 @@ pub struct Part {
 
 impl Part {
     /// Surfaces of a covariance on it.
-    pub fn twins<'a>(self, case: &'a Case<'a>, covariance: &Covariance) -> Twins<'a> {
-        Twins::new(case, covariance, [self.rows, self.cols], self.mask)
+    pub fn null_surfaces<'a>(self, case: &'a Case<'a>, covariance: &Covariance) -> NullSurfaces<'a> {
+        NullSurfaces::new(case, covariance, [self.rows, self.cols], self.mask)
     }
 
     /// The whole, or a window about the middle with as much of it as may be.

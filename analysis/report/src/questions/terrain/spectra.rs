@@ -44,7 +44,7 @@ pub fn spectra(data: &Data, groups: &[Group<TerrainRow>]) -> Vec<Figure> {
             set::fixed(middle, 2)
         );
         let rows: Vec<&PsdRow> = group.rows.iter().flat_map(|t| data.spectrum(&t.terrain_id)).collect();
-        let names = ["terrain_id", "bin", "frequency_cycles_m", "psd_m4", "modes"];
+        let names = ["surface_id", "bin", "frequency_cycles_m", "psd_m4", "modes"];
         let numbers = Numbers::select(
             &format!("{} and frequency_cycles_m > 0 and psd_m4 > 0", sql::of_group(group)),
             rows,

@@ -29,16 +29,16 @@ const ROWS: [Row; 15] = [
 ];
 
 /// Id under which a texture's stage stores what the fit would see of it.
-pub fn alike_id(texture: &TerrainRow) -> String {
+pub fn residual_id(texture: &TerrainRow) -> String {
     format!("{}.residual", texture.terrain_id)
 }
 
-/// Columns: measured residual, texture treated alike, texture as it is; without rows where the release describes none.
+/// Columns: measured residual, residual of the texture, texture as it is; without rows where the release describes none.
 pub fn table(data: &Data, texture: &TerrainRow, fit: &str) -> TableBlock {
-    let alike = alike_id(texture);
+    let residual = residual_id(texture);
     let sides = [
         ("measured", data.surface(fit)),
-        ("alike", data.surface(&alike)),
+        ("texture residual", data.surface(&residual)),
         ("as made", data.surface(&texture.terrain_id)),
     ];
     let present: Vec<(&str, &SurfaceRow)> = sides.into_iter().filter_map(|(name, s)| Some((name, s?))).collect();
@@ -46,7 +46,7 @@ pub fn table(data: &Data, texture: &TerrainRow, fit: &str) -> TableBlock {
         [("figure", "")].into_iter().chain(present.iter().map(|(name, _)| (*name, ""))).collect();
     let query = format!(
         "select * from 'tables/surfaces/*.parquet' where surface_id in ({})",
-        [fit, &alike, &texture.terrain_id].map(quoted).join(", ")
+        [fit, &residual, &texture.terrain_id].map(quoted).join(", ")
     );
     let mut numbers = Numbers::computed(query, &columns);
     for (name, unit, figure) in ROWS.iter().filter(|_| !present.is_empty()) {

@@ -133,14 +133,14 @@ fn common_size(a: &Grid, b: Option<&Grid>) -> [f64; 2] {
 }
 
 const MEASURED: Stroke = Stroke { paint: Paint::Ink, width: 2.4, dash: "", opacity: 0.75 };
-const ALIKE: Stroke = Stroke { paint: Paint::Series(1), width: 1.9, dash: "6 3", opacity: 1.0 };
+const RESIDUAL: Stroke = Stroke { paint: Paint::Series(1), width: 1.9, dash: "6 3", opacity: 1.0 };
 const AS_MADE: Stroke = Stroke { paint: Paint::Series(0), width: 1.4, dash: "2 3", opacity: 1.0 };
 
 /// Surfaces that are drawn in one frame: name, id, line.
 fn sides(fit: &str, texture: &TerrainRow) -> [(&'static str, String, Stroke); 3] {
     [
         ("measured residual", fit.to_owned(), MEASURED),
-        ("synthetic, treated alike", figures::alike_id(texture), ALIKE),
+        ("synthetic, residual", figures::residual_id(texture), RESIDUAL),
         ("synthetic, as made", texture.terrain_id.clone(), AS_MADE),
     ]
 }
@@ -183,8 +183,8 @@ fn spectra(data: &Data, texture: &TerrainRow, fit: &str) -> Option<Figure> {
     let id = slug(&format!("psd-{}", texture.terrain_id));
     let plot = (!curves.is_empty()).then(|| curves::spectra(&id, &curves, curves::ranges(&curves), None))?;
     let rows = sides(fit, texture).into_iter().flat_map(|(_, id, _)| data.spectrum(&id));
-    let names = ["terrain_id", "bin", "frequency_cycles_m", "psd_m4", "modes"];
-    let query = format!("terrain_id in ({}) and frequency_cycles_m > 0 and psd_m4 > 0", ids(fit, texture));
+    let names = ["surface_id", "bin", "frequency_cycles_m", "psd_m4", "modes"];
+    let query = format!("surface_id in ({}) and frequency_cycles_m > 0 and psd_m4 > 0", ids(fit, texture));
     let chart = Chart {
         what: "psd",
         title: "Spectra.",
@@ -228,10 +228,10 @@ fn structures(data: &Data, texture: &TerrainRow, fit: &str) -> Option<Figure> {
     Some(chart.figure(texture, &curves, plot, Numbers::select(&query, rows, &names)))
 }
 
-/// Profile spectra along both axes, of the two surfaces that were treated alike.
+/// Profile spectra along both axes, of the two residuals.
 fn profiles(data: &Data, texture: &TerrainRow, fit: &str) -> Option<Figure> {
-    let alike = figures::alike_id(texture);
-    let surfaces = [("measured", fit, MEASURED.paint), ("synthetic", alike.as_str(), ALIKE.paint)];
+    let residual = figures::residual_id(texture);
+    let surfaces = [("measured", fit, MEASURED.paint), ("synthetic", residual.as_str(), RESIDUAL.paint)];
     let axes = [("x", "east-west", ""), ("y", "north-south", "5 3")];
     let curve = |(name, id, paint): (&str, &str, Paint), (axis, words, dash): (&str, &str, &'static str)| Curve {
         name: Some(format!("{name}, {words}")),
@@ -249,7 +249,7 @@ fn profiles(data: &Data, texture: &TerrainRow, fit: &str) -> Option<Figure> {
     let rows = surfaces.into_iter().flat_map(|(_, id, _)| axes.map(|(axis, _, _)| data.profile_spectrum(id, axis)));
     let names = ["surface_id", "direction", "bin", "frequency_cycles_m", "psd_m3", "modes"];
     let query =
-        format!("surface_id in ({}, {}) and frequency_cycles_m > 0 and psd_m3 > 0", quoted(fit), quoted(&alike));
+        format!("surface_id in ({}, {}) and frequency_cycles_m > 0 and psd_m3 > 0", quoted(fit), quoted(&residual));
     let chart = Chart {
         what: "profiles",
         title: "Spectra of profiles.",

@@ -12,7 +12,7 @@ use sastrugi_numeric::Streams;
 const OUTER_WINDOWS: f64 = 8.0;
 
 /// Such surfaces, on the whole or a part of a case.
-pub struct Twins<'a> {
+pub struct NullSurfaces<'a> {
     case: &'a Case<'a>,
     cols: usize,
     /// Cells that enter the moving average.
@@ -21,14 +21,14 @@ pub struct Twins<'a> {
 }
 
 /// One of them.
-pub struct Twin {
+pub struct NullSurface {
     /// Residual before trimming, m.
     pub residual: Vec<f64>,
     /// Where it is cut off.
     pub trim: Trim,
 }
 
-impl<'a> Twins<'a> {
+impl<'a> NullSurfaces<'a> {
     /// On as many rows and columns as `trusted` has cells, of which the true ones enter the moving average.
     pub fn new(case: &'a Case<'a>, covariance: &Covariance, [rows, cols]: [usize; 2], trusted: Vec<bool>) -> Self {
         let shape = Shape { rows, cols, profiles: case.heights.are_profiles() };
@@ -38,16 +38,16 @@ impl<'a> Twins<'a> {
     }
 
     /// The one of these streams.
-    pub fn one(&self, streams: &Streams) -> Twin {
+    pub fn one(&self, streams: &Streams) -> NullSurface {
         let mut surface = self.simulator.surface(streams);
         surface.iter_mut().zip(&self.trusted).filter(|(_, trusted)| !**trusted).for_each(|(z, _)| *z = f64::NAN);
         let residual = residual(&surface, self.cols, self.case.settings, self.case.window);
         let trim = Trim::of(&Sizes::of(&residual), self.case.settings);
-        Twin { residual, trim }
+        NullSurface { residual, trim }
     }
 }
 
-impl Twin {
+impl NullSurface {
     /// The residual after trimming.
     pub fn trimmed(mut self) -> Vec<f64> {
         self.trim.apply(&mut self.residual);
