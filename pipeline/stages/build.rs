@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-const ROOMS: [(&str, &str); 11] = [
+const ROOMS: [(&str, &str); 12] = [
     ("SCHEMAS", "../../schemas/src"),
     ("NUMERIC", "../numeric/src"),
     ("ROUGHNESS", "../roughness/src"),
@@ -14,6 +14,7 @@ const ROOMS: [(&str, &str); 11] = [
     ("STATISTICS", "../../analysis/statistics/src"),
     ("JOB", "src/job.rs"),
     ("JOBS", "src/jobs"),
+    ("OPERATIONS", "src/operations"),
     ("DEPENDENCIES", "../../Cargo.lock"),
 ];
 

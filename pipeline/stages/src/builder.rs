@@ -25,10 +25,13 @@ pub enum BuildError {
     Input(String),
 }
 
+/// The file of every item that makes a heightfield.
+pub const HEIGHTS: &str = "heights.tif";
+
 /// A heightfield that other items can refer to.
 #[derive(Clone, Debug)]
 pub struct Heightfield {
-    /// The item that makes it; its file is `heights.tif`.
+    /// The item that makes it; its file is [`HEIGHTS`].
     pub item: ItemRef,
     /// Label for statistics.
     pub group: Option<String>,

@@ -7,6 +7,7 @@ mod hypotheses;
 pub mod job;
 pub mod jobs;
 mod machine;
+pub mod operations;
 pub mod packing;
 pub mod registry;
 mod revision;

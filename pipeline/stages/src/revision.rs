@@ -17,12 +17,13 @@ pub enum Room {
 }
 
 /// What every stage stands on: schemas, numeric, store, the jobs themselves and the locked dependencies.
-const FOUNDATION: [&str; 6] = [
+const FOUNDATION: [&str; 7] = [
     env!("SASTRUGI_REVISION_SCHEMAS"),
     env!("SASTRUGI_REVISION_NUMERIC"),
     env!("SASTRUGI_REVISION_STORE"),
     env!("SASTRUGI_REVISION_JOB"),
     env!("SASTRUGI_REVISION_JOBS"),
+    env!("SASTRUGI_REVISION_OPERATIONS"),
     env!("SASTRUGI_REVISION_DEPENDENCIES"),
 ];
 

@@ -6,7 +6,7 @@ use crate::args::{Common, Coregister};
 use crate::failure::{Code, Failure};
 use crate::output::{columns, print};
 use sastrugi_schemas::coregistration::Coregistration;
-use sastrugi_stages::jobs::coregistration::{rounds, verdict};
+use sastrugi_stages::operations::coregistration::{rounds, verdict};
 use sastrugi_stages::verbs::coregister::{self, Request};
 use sastrugi_stages::verbs::{Reading, numbers};
 use sastrugi_store::dem::WriteOptions;

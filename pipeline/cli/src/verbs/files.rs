@@ -5,7 +5,7 @@ use crate::Verdict;
 use crate::args::{self, Common, Convert, Info};
 use crate::failure::{Code, Failure};
 use crate::output::{columns, print};
-use sastrugi_stages::jobs::dem::to_metres;
+use sastrugi_stages::operations::dem::to_metres;
 use sastrugi_stages::verbs::{self, Read, Reading, describe_grid, numbers, read_as_it_is, transects};
 use sastrugi_store::dem::simulators::{self, Fit};
 use sastrugi_store::dem::{self, Dem, DemError, Values};

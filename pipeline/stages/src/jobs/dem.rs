@@ -2,85 +2,22 @@
 
 use super::original::{self, Original};
 use super::rasters::{raster_options, raster_packing};
-use crate::builder::{BuildError, Builder, Heightfield, InputPlace};
+use crate::builder::{BuildError, Builder, HEIGHTS, Heightfield, InputPlace};
 use crate::job::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work};
+use crate::operations::dem::{input_error, to_metres, window_of};
+use crate::operations::place::{PLACE, Place};
 use crate::revision::Room;
 use crate::runner::graph::Node;
 use crate::study::terms::{self, Objection};
-use sastrugi_numeric::{Geometry, Grid, resample};
 use sastrugi_schemas::study::{DemItem, GeoTiff};
-use sastrugi_store::dem::{self, Claimed, Crs, Dem, ReadOptions};
+use sastrugi_store::dem::{self, Claimed, Dem, ReadOptions};
 use sastrugi_store::digest;
 use sastrugi_store::points::GridSettings;
-use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use std::path::Path;
 
 /// Name of the stage.
 pub const STAGE: &str = "dem";
-/// File of every heightfield item.
-pub const HEIGHTS: &str = "heights.tif";
-/// Where the heights of a measured DEM lie in its file, for masks; items of other stages have none.
-pub const PLACE: &str = "place.json";
-
-/// Where the cells of a window lie in the raster that they were cut from, in the raster's own coordinates.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Place {
-    /// Rows and columns of the whole raster.
-    shape: [usize; 2],
-    cell: [f64; 2],
-    origin: [f64; 2],
-    /// Row and column of the window's north-west cell.
-    corner: [usize; 2],
-    /// Rows and columns of the window.
-    size: [usize; 2],
-}
-
-impl Place {
-    /// The whole raster, or the window that was cut from it.
-    pub fn of(whole: &Geometry, window: &Geometry) -> Self {
-        // Both count in whole cells of one size.
-        let steps = |axis: usize| ((window.origin[axis] - whole.origin[axis]) / whole.cell[axis]).round() as usize;
-        Self {
-            shape: [whole.rows, whole.cols],
-            cell: whole.cell,
-            origin: whole.origin,
-            corner: [whole.rows - window.rows - steps(1), steps(0)],
-            size: [window.rows, window.cols],
-        }
-    }
-
-    /// The place that a measured DEM's item left at `path`; without one, the heights' own.
-    ///
-    /// # Errors
-    /// A file that cannot be read.
-    pub fn read(path: &Path, heights: &Geometry) -> Result<Self, JobError> {
-        if !path.is_file() {
-            return Ok(Self::of(heights, heights));
-        }
-        let bytes = std::fs::read(path).map_err(|e| JobError::at(path, e))?;
-        serde_json::from_slice(&bytes).map_err(JobError::new)
-    }
-
-    /// Geometry of the whole raster.
-    pub fn whole(&self) -> Geometry {
-        let [rows, cols] = self.shape;
-        Geometry { rows, cols, cell: self.cell, origin: self.origin }
-    }
-
-    /// True where the heights of the item have other cells than its raster: they were in degrees and are in metres, from their
-    /// own corner.
-    pub fn was_converted(&self, heights: &Geometry) -> bool {
-        (0..2).any(|k| (heights.cell[k] / self.cell[k] - 1.0).abs() > 1e-6)
-    }
-
-    /// The window of what covers the whole raster.
-    pub fn part<T: Copy>(&self, whole: Grid<T>) -> Grid<T> {
-        let ([row, col], [rows, cols]) = (self.corner, self.size);
-        if self.size == self.shape { whole } else { whole.window(row, col, rows, cols) }
-    }
-}
-
 struct DemJob {
     item: DemItem,
     original: ItemRef,
@@ -241,44 +178,4 @@ fn import(path: &Path, item: &DemItem) -> Result<Imported, JobError> {
     let (metric, converted) = to_metres(Dem { grid: cut, info: read.info });
     notes.extend(converted);
     Ok(Imported { metric, place, notes })
-}
-
-/// The cells of a window in the DEM's own coordinates.
-///
-/// # Errors
-/// A window without cells, or without data.
-pub fn window_of(grid: &Grid, window: [f64; 4]) -> Result<Grid, JobError> {
-    let g = &grid.geometry;
-    let reach = [g.origin[0], g.origin[1], g.origin[0] + g.size()[0], g.origin[1] + g.size()[1]];
-    let part = resample::crop(grid, window).ok_or_else(|| {
-        JobError::input(format!("the window {window:?} holds no cell of the DEM, which covers {reach:?}"))
-    })?;
-    if part.finite_count() == 0 {
-        return Err(JobError::input(format!("the window {window:?} holds no cell with data")));
-    }
-    Ok(part)
-}
-
-/// A DEM in metres, and a warning where it was in degrees.
-pub fn to_metres(dem: Dem) -> (Dem, Option<String>) {
-    if !dem.info.crs.geographic {
-        return (dem, None);
-    }
-    let grid = resample::geographic_to_metres(&dem.grid);
-    let note = metres_note(&dem.grid.geometry, &grid.geometry);
-    (Dem { grid, info: dem::DemInfo { crs: Crs::default(), ..dem.info } }, Some(note))
-}
-
-/// The sentence on a geographic raster that was brought to metres.
-pub fn metres_note(degrees: &Geometry, metres: &Geometry) -> String {
-    let latitude = degrees.origin[1] + 0.5 * degrees.size()[1];
-    let [x, y] = metres.cell;
-    format!(
-        "geographic raster converted to metres at its centre latitude {latitude:.4} deg: cells of {x:.3} x {y:.3} m"
-    )
-}
-
-/// A store error as a job's.
-pub fn input_error(error: dem::DemError) -> JobError {
-    if error.unusable_input() { JobError::input(error) } else { JobError::io(error) }
 }

@@ -1,16 +1,15 @@
 //! Stage `mask`: the files that say which cells of a DEM a fit takes, copied into the release; and their use.
 
-use super::dem::{PLACE, Place};
 use super::original::Original;
 use crate::builder::{BuildError, Builder, InputPlace};
 use crate::job::{ItemRef, JobError, Work};
+use crate::operations::masks;
+use crate::operations::place::{PLACE, Place};
 use crate::study::Entry;
 use sastrugi_numeric::Grid;
 use sastrugi_schemas::fit::MaskSource;
 use sastrugi_schemas::study::{Files, FitItem};
-use sastrugi_store::mask::{self, MaskError, MaskOptions};
 use sastrugi_texture::noise::{self, ReferenceNoise};
-use std::path::{Path, PathBuf};
 
 /// Name of the stage.
 pub const STAGE: &str = "mask";
@@ -83,7 +82,7 @@ impl Mask {
         // Messages are part of the release: they name the file as it is called there.
         let name_it =
             |e: JobError| JobError { message: e.message.replace(&path.display().to_string(), &self.release_path), ..e };
-        apply(heights, place, &path, self.source.excludes).map_err(name_it)
+        masks::apply(heights, place, &path, self.source.excludes).map_err(name_it)
     }
 }
 
@@ -103,40 +102,6 @@ pub fn noise_of_item(
     noise::of_reference(&part).map_err(|e| JobError::input(format!("{}: {e}", reference.release_path)))
 }
 
-/// The noise of heights whose place is known in the part that a file marks.
-///
-/// # Errors
-/// As [`noise_of_item`].
-pub fn noise_of_file(heights: &Grid, place: &Place, path: &Path) -> Result<ReferenceNoise, JobError> {
-    let mut part = heights.clone();
-    apply(&mut part, place, path, false)?;
-    noise::of_reference(&part).map_err(|e| JobError::input(format!("{}: {e}", path.display())))
-}
-
-/// What masks dropped, for people.
-pub fn share_note(share: f64) -> String {
-    format!("masks dropped {:.2} % of the cells with data", 100.0 * share)
-}
-
-/// What was found in a noise reference, for people.
-pub fn noise_note(found: &ReferenceNoise) -> String {
-    let noise = &found.noise;
-    let correlated = match (noise.correlated_sigma_m > 0.0, found.unresolved_to_m) {
-        (true, _) => format!(
-            " and noise of {:.2e} m that is correlated over {:.2e} m",
-            noise.correlated_sigma_m, noise.correlated_range_m
-        ),
-        (false, Some(separation_m)) => format!(
-            " (only white noise is taken: up to {separation_m:.2e} m the reference has relief, or noise correlated further)"
-        ),
-        (false, None) => String::new(),
-    };
-    format!(
-        "noise reference: white noise of {:.2e} m per cell{correlated}, from {} second differences",
-        noise.white_sigma_m, found.differences
-    )
-}
-
 /// Applies the masks of an item to its DEM's heights. Returns the share of the cells with data that they dropped.
 ///
 /// # Errors
@@ -150,37 +115,5 @@ pub fn of_item(heights: &mut Grid, dem: &ItemRef, masks: &[Mask], work: &Work<'_
     for one in masks {
         one.apply(heights, &place, work)?;
     }
-    dropped_share(before, heights).map(Some)
-}
-
-/// Applies masks to heights whose place is known. Returns the share of the cells with data that they dropped, `None` without
-/// masks.
-///
-/// # Errors
-/// As [`of_item`].
-pub fn of_files(heights: &mut Grid, place: &Place, masks: &[(PathBuf, bool)]) -> Result<Option<f64>, JobError> {
-    let before = heights.finite_count();
-    for (path, excludes) in masks {
-        apply(heights, place, path, *excludes)?;
-    }
-    if masks.is_empty() { Ok(None) } else { dropped_share(before, heights).map(Some) }
-}
-
-fn apply(heights: &mut Grid, place: &Place, path: &Path, excludes: bool) -> Result<(), JobError> {
-    let keep = mask::read_with(path, &place.whole(), &MaskOptions { invert: excludes }).map_err(mask_error)?;
-    let kept = place.part(Grid::new(place.whole(), keep));
-    heights.values.iter_mut().zip(&kept.values).filter(|(_, kept)| !**kept).for_each(|(height, _)| *height = f64::NAN);
-    Ok(())
-}
-
-/// Share of the cells with data that have none any more.
-fn dropped_share(before: usize, heights: &Grid) -> Result<f64, JobError> {
-    match heights.finite_count() {
-        0 => Err(JobError::input("the masks leave no cell of the DEM with data")),
-        left => Ok(1.0 - left as f64 / before as f64),
-    }
-}
-
-fn mask_error(error: MaskError) -> JobError {
-    if error.unusable_input() { JobError::input(error) } else { JobError::io(error) }
+    masks::dropped_share(before, heights).map(Some)
 }

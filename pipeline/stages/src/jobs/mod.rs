@@ -1,6 +1,5 @@
 //! One file per stage, each the glue between a kernel and the files of an item.
 
-pub mod coregistration;
 pub mod dem;
 pub mod exports;
 pub mod fit;

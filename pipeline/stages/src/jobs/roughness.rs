@@ -1,13 +1,14 @@
 //! Stage `roughness`: every heightfield of a study described and classified.
 
-use super::dem::{HEIGHTS, input_error};
 use super::surface::{Surface, SurfaceRows};
-use crate::builder::{BuildError, Builder, Heightfield};
+use crate::builder::{BuildError, Builder, HEIGHTS, Heightfield};
 use crate::job::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work};
+use crate::operations::dem::input_error;
+use crate::operations::roughness::settings;
 use crate::revision::Room;
 use crate::runner::graph::Node;
 use sastrugi_numeric::Grid;
-use sastrugi_roughness::{ClassThresholds, DescribeSettings, Summary, classify, close_disk, describe, moore_gradient};
+use sastrugi_roughness::{Summary, classify, close_disk, describe, moore_gradient};
 use sastrugi_schemas::study::RoughnessSection;
 use sastrugi_schemas::tables::TerrainRow;
 use sastrugi_store::{dem, digest};
@@ -78,20 +79,6 @@ impl RoughnessJob {
             path: self.field.release_path.clone(),
         }
     }
-}
-
-/// Settings of the kernel.
-///
-/// # Errors
-/// Thresholds that do not increase.
-pub fn settings(section: &RoughnessSection) -> Result<DescribeSettings, JobError> {
-    let thresholds = ClassThresholds::new(section.low_max, section.semi_max).map_err(JobError::new)?;
-    Ok(DescribeSettings {
-        thresholds,
-        border_m: section.border_m,
-        band_window_m: section.band_window_m,
-        ..DescribeSettings::default()
-    })
 }
 
 impl Job for RoughnessJob {

@@ -1,20 +1,20 @@
 //! Stage `terrain`: one generated heightfield.
 
-use super::dem::{HEIGHTS, input_error};
 use super::exports::Exports;
 use super::rasters::{raster_options, raster_packing};
-use crate::builder::{BuildError, Builder, Heightfield, common};
+use crate::builder::{BuildError, Builder, HEIGHTS, Heightfield, common};
 use crate::job::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work};
+use crate::operations::dem::input_error;
+use crate::operations::terrains::{generate, values_of, write_png16};
 use crate::revision::Room;
 use crate::runner::graph::Node;
 use crate::study::entry::Expanded;
 use crate::study::{Entry, StudyError};
 use sastrugi_numeric::{Grid, Streams};
 use sastrugi_schemas::study::{GeoTiff, TerrainItem};
-use sastrugi_store::atomic::Target;
-use sastrugi_store::dem::{self, Crs, Values, WriteOptions};
+use sastrugi_store::dem::{self, Crs, WriteOptions};
 use sastrugi_store::digest;
-use sastrugi_terrain::{Generator, Map, MapKind, Terrain, TerrainError};
+use sastrugi_terrain::Generator;
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -191,47 +191,4 @@ impl TerrainJob {
         let content = digest::heights(values);
         Ok(Product::released(file, format!("terrain/{}{ending}.tif", self.id), Some(content)))
     }
-}
-
-/// How a map is written.
-pub fn values_of(map: &Map) -> Values {
-    match map.kind() {
-        MapKind { unit: "", description, .. } => Values::Codes { description: description.into() },
-        MapKind { unit, description, .. } => Values::Figures { unit: unit.into(), description: description.into() },
-    }
-}
-
-/// What a generator makes, checked.
-///
-/// # Errors
-/// When the generator has no result, or heights that are not finite or the same everywhere.
-pub fn generate(generator: &dyn Generator, streams: &Streams, inputs: &[Grid]) -> Result<Terrain, JobError> {
-    generator.generate_checked(streams, inputs).map_err(|e| {
-        let message = format!("failed to {e}");
-        // The surface below does not serve: another part of it, or another file, would.
-        if matches!(e, TerrainError::Input { .. }) { JobError::input(message) } else { JobError::new(message) }
-    })
-}
-
-/// Writes heights as 16-bit levels: the generator's own where it has them, else from lowest to highest. Returns how to read
-/// them.
-///
-/// # Errors
-/// When the file cannot be written.
-pub fn write_png16<'a>(
-    generator: &dyn Generator,
-    heights: &Grid,
-    target: impl Into<Target<'a>>,
-) -> Result<String, JobError> {
-    let Some(levels) = generator.levels(heights) else {
-        return dem::write_png_heights(target.into(), heights).map(|scale| scale.sentence()).map_err(JobError::io);
-    };
-    dem::write_png16(target.into(), &levels.grid).map_err(JobError::io)?;
-    Ok(format!(
-        "16-bit PNG: height_m = (level - {}) * {:e}; {} x {} posts",
-        levels.zero_level,
-        levels.metres_per_level,
-        levels.grid.rows(),
-        levels.grid.cols()
-    ))
 }

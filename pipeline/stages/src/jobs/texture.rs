@@ -1,13 +1,15 @@
 //! Stage `texture`: a field that matches a fit, alone or on a base heightfield.
 
-use super::dem::{self as dem_job, HEIGHTS, input_error};
+use super::dem as dem_job;
 use super::fit;
 use super::matched::Matched;
 use super::rasters::{raster_options, raster_packing};
 use super::scoreboard::{self, Entrant, ScoreboardJob};
 use super::surface::{Surface, SurfaceRows};
-use crate::builder::{BuildError, Builder, Heightfield, unknown_id};
+use crate::builder::{BuildError, Builder, HEIGHTS, Heightfield, unknown_id};
 use crate::job::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work};
+use crate::operations::dem::input_error;
+use crate::operations::textures::{fill_note, has_its_texture, lay_onto};
 use crate::revision::Room;
 use crate::runner::graph::Node;
 use crate::study::{Entry, Expanded, StudyError};
@@ -330,41 +332,6 @@ fn parameters(item: &TextureItem, matched: &Matched, synthesis: &dyn Method) -> 
         all.extend(own);
     }
     Value::Object(all)
-}
-
-/// Said of holes that are filled by an empirical fit.
-pub fn fill_note(fit: &FitFile) -> Option<String> {
-    let model = &fit.map.as_ref()?.model;
-    let text = "the fit is empirical; holes are filled with the fitted model";
-    Some(format!("{text} ({model}), not with the measured covariance"))
-}
-
-/// Said where a texture is added to the DEM that its fit was made from; `background` says where to find that DEM without its
-/// texture.
-pub fn has_its_texture(background: &str) -> String {
-    format!(
-        "the base is the DEM that was fitted and still has its own texture; add the texture to the background of the fit \
-         ({background}; in a release fit/<id>.background.tif)"
-    )
-}
-
-/// Base plus texture; a texture that does not repeat without seams must cover the base.
-///
-/// # Errors
-/// Cell sizes that differ, or a base larger than such a texture.
-pub fn lay_onto(base: &Grid, texture: &Grid, periodic: bool, factors: Option<&Grid>) -> Result<Grid, JobError> {
-    let larger = base.rows() > texture.rows() || base.cols() > texture.cols();
-    if larger && !periodic {
-        return Err(JobError::new(format!(
-            "the base of {} x {} cells is larger than the texture of {} x {}, which does not repeat without seams; make the \
-             texture larger or periodic",
-            base.rows(),
-            base.cols(),
-            texture.rows(),
-            texture.cols()
-        )));
-    }
-    sastrugi_texture::modulated_onto(base, texture, factors).map_err(JobError::new)
 }
 
 impl Job for TextureJob {

@@ -1,9 +1,10 @@
 //! Stage `traverse`: all missions of one terrain driven and recorded.
 
-use super::dem::{self as measured, HEIGHTS, input_error};
+use super::dem as measured;
 use super::{missions, roughness};
-use crate::builder::{BuildError, Builder, Heightfield, Lines, unknown_id};
+use crate::builder::{BuildError, Builder, HEIGHTS, Heightfield, Lines, unknown_id};
 use crate::job::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work};
+use crate::operations::dem::input_error;
 use crate::revision::Room;
 use crate::runner::graph::Node;
 use crate::study::entry::joined;

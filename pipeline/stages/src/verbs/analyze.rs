@@ -2,7 +2,7 @@
 
 use super::{Read, Reading, read};
 use crate::error::Error;
-use crate::jobs::roughness::settings as roughness_settings;
+use crate::operations::roughness::settings as roughness_settings;
 use sastrugi_mobility::metrics::log::{AboveNoise, Analysis, LogSettings, OnGround, analyse, on_ground};
 use sastrugi_numeric::Grid;
 use sastrugi_roughness::{classify, moore_gradient};

@@ -2,7 +2,7 @@
 
 use super::{Read, Reading, check_distinct, check_output, describe_grid, read_as_it_is, write_error};
 use crate::error::Error;
-use crate::jobs::coregistration::{IN_DEGREES, coregistered, verdict};
+use crate::operations::coregistration::{IN_DEGREES, coregistered, verdict};
 use sastrugi_schemas::coregistration::Coregistration;
 use sastrugi_store::dem::{self, WriteOptions};
 use sastrugi_texture::coregister;

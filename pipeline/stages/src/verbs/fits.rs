@@ -4,7 +4,7 @@
 use super::fit::{self, Done};
 use super::{Reading, check_distinct};
 use crate::error::Error;
-use crate::jobs::fit::fit_row;
+use crate::operations::fits::fit_row;
 use sastrugi_schemas::fit::{FitFile, Source};
 use sastrugi_schemas::tables::{BesideFit, DemFitRow, FitRow};
 use sastrugi_store::parquet::{TableMetadata, write_table};

@@ -1,8 +1,9 @@
 //! How the verbs read a DEM.
 
 use crate::error::Error;
-use crate::jobs::dem::{Place, input_error, to_metres, window_of};
-use crate::jobs::mask;
+use crate::operations::dem::{input_error, to_metres, window_of};
+use crate::operations::masks;
+use crate::operations::place::Place;
 use sastrugi_store::dem::{self, Dem, DemError, ReadOptions};
 use sastrugi_store::points::GridSettings;
 use sastrugi_store::transect::{self, TransectOptions, Transects};
@@ -59,9 +60,9 @@ pub fn read_as_it_is(path: &Path, reading: &Reading) -> Result<Read, Error> {
         None => grid,
     };
     let place = Place::of(&whole, &grid.geometry);
-    let noise = reading.noise_reference.as_ref().map(|path| mask::noise_of_file(&grid, &place, path)).transpose()?;
-    let masked_share = mask::of_files(&mut grid, &place, &reading.masks)?;
-    let said = [noise.as_ref().map(mask::noise_note), masked_share.map(mask::share_note)];
+    let noise = reading.noise_reference.as_ref().map(|path| masks::noise_of_file(&grid, &place, path)).transpose()?;
+    let masked_share = masks::of_files(&mut grid, &place, &reading.masks)?;
+    let said = [noise.as_ref().map(masks::noise_note), masked_share.map(masks::share_note)];
     let notes = info.notes.iter().cloned().chain(said.into_iter().flatten()).collect();
     Ok(Read { dem: Dem { grid, info }, notes, masked_share, noise })
 }

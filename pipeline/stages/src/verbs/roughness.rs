@@ -2,7 +2,7 @@
 
 use super::{Read, Reading, parameters, read};
 use crate::error::Error;
-use crate::jobs::roughness::settings;
+use crate::operations::roughness::settings;
 use crate::study::check_roughness;
 use sastrugi_mobility::vehicle::TraverseParameters;
 use sastrugi_numeric::Grid;

@@ -2,7 +2,8 @@
 
 use super::parameters;
 use crate::error::Error;
-use crate::jobs::terrain::{STAGE, generate, values_of, write_png16};
+use crate::jobs::terrain::STAGE;
+use crate::operations::terrains::{generate, values_of, write_png16};
 use sastrugi_numeric::{Grid, Streams};
 use sastrugi_store::dem::{self, Crs, Format, WriteOptions};
 use sastrugi_terrain::Generator;

@@ -2,7 +2,8 @@
 
 use super::parameters;
 use crate::error::Error;
-use crate::jobs::texture::{STAGE, fill_note, has_its_texture, kinds, lay_onto};
+use crate::jobs::texture::{STAGE, kinds};
+use crate::operations::textures::{fill_note, has_its_texture, lay_onto};
 use crate::verbs::{Read, Reading, read};
 use sastrugi_numeric::Streams;
 use sastrugi_schemas::fit::FitFile;

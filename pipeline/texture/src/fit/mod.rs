@@ -29,6 +29,7 @@ mod heights;
 pub(crate) mod least_squares;
 mod local;
 mod memory;
+pub(crate) mod null_surfaces;
 mod params;
 mod profile;
 pub(crate) mod report;
@@ -37,7 +38,6 @@ pub(crate) mod residual;
 mod search;
 pub(crate) mod simulate;
 pub(crate) mod survey;
-pub(crate) mod null_surfaces;
 mod verdicts;
 
 pub use error::FitError;

@@ -18,9 +18,9 @@
 use super::FitError;
 use super::case::Case;
 use super::estimator::{Estimate, Estimator};
+use super::null_surfaces::NullSurfaces;
 use super::profile;
 use super::survey::Squares;
-use super::null_surfaces::NullSurfaces;
 use crate::covariance::bins;
 use crate::covariance::form::Role;
 use crate::covariance::{Covariance, LagBins, masked_covariance};

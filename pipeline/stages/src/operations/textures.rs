@@ -1,0 +1,40 @@
+//! A texture laid onto its base, and what is said of it.
+
+use crate::job::JobError;
+use sastrugi_numeric::Grid;
+use sastrugi_schemas::fit::FitFile;
+
+/// Said of holes that are filled by an empirical fit.
+pub fn fill_note(fit: &FitFile) -> Option<String> {
+    let model = &fit.map.as_ref()?.model;
+    let text = "the fit is empirical; holes are filled with the fitted model";
+    Some(format!("{text} ({model}), not with the measured covariance"))
+}
+
+/// Said where a texture is added to the DEM that its fit was made from; `background` says where to find that DEM without its
+/// texture.
+pub fn has_its_texture(background: &str) -> String {
+    format!(
+        "the base is the DEM that was fitted and still has its own texture; add the texture to the background of the fit \
+         ({background}; in a release fit/<id>.background.tif)"
+    )
+}
+
+/// Base plus texture; a texture that does not repeat without seams must cover the base.
+///
+/// # Errors
+/// Cell sizes that differ, or a base larger than such a texture.
+pub fn lay_onto(base: &Grid, texture: &Grid, periodic: bool, factors: Option<&Grid>) -> Result<Grid, JobError> {
+    let larger = base.rows() > texture.rows() || base.cols() > texture.cols();
+    if larger && !periodic {
+        return Err(JobError::new(format!(
+            "the base of {} x {} cells is larger than the texture of {} x {}, which does not repeat without seams; make the \
+             texture larger or periodic",
+            base.rows(),
+            base.cols(),
+            texture.rows(),
+            texture.cols()
+        )));
+    }
+    sastrugi_texture::modulated_onto(base, texture, factors).map_err(JobError::new)
+}
