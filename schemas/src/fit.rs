@@ -226,14 +226,14 @@ pub struct Diagnostics {
 /// A fit of the same DEM at another window.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct OtherWindow {
-    /// Root mean square height of the residual, on the cells that all windows have, m.
-    pub band_rms_m: f64,
-    /// Generalised sum of squares per degree of freedom.
-    pub misfit_chi2_per_freedom: Option<f64>,
     /// Longest wave that is left, m.
     pub outer_scale_m: f64,
     /// Fitted parameters.
     pub parameters: BTreeMap<String, f64>,
+    /// Generalised sum of squares per degree of freedom.
+    pub misfit_chi2_per_freedom: Option<f64>,
+    /// Root mean square height of the residual, on the cells that all windows have, m.
+    pub band_rms_m: f64,
 }
 
 /// Name of sigma^2 / b among intervals.

@@ -1,9 +1,6 @@
-//! Exit codes and the one message of a failure.
+//! Failures of verbs, and exit codes.
 
-use crate::output::warn;
-use miette::{GraphicalReportHandler, GraphicalTheme, LabeledSpan, MietteDiagnostic, NamedSource, Report};
 use sastrugi_stages::Error;
-use std::io::IsTerminal;
 use std::process::ExitCode;
 
 /// Exit codes: part of the contract.
@@ -34,7 +31,7 @@ impl From<Code> for ExitCode {
 
 /// A verb that did not do what it was asked.
 #[derive(Debug)]
-pub struct Failure(Error);
+pub struct Failure(pub Error);
 
 impl Failure {
     /// Bad usage.
@@ -52,7 +49,8 @@ impl Failure {
         Self(Error::Input(message.to_string()))
     }
 
-    fn code(&self) -> Code {
+    /// Its exit code.
+    pub fn code(&self) -> Code {
         match self.0 {
             Error::Study { .. } | Error::Usage(_) => Code::Usage,
             Error::Input(_) => Code::Input,
@@ -60,39 +58,10 @@ impl Failure {
             Error::Retry(_) => Code::Retry,
         }
     }
-
-    /// Prints the message on stderr and gives the exit code.
-    pub fn report(self) -> ExitCode {
-        let code = self.code();
-        match self.0 {
-            Error::Study { name, text, error } => print_study_error(&name, &text, &error),
-            Error::Usage(m) | Error::Input(m) | Error::Failed(m) | Error::Retry(m) => warn(&format!("sastrugi: {m}")),
-        }
-        code.into()
-    }
 }
 
 impl From<Error> for Failure {
     fn from(error: Error) -> Self {
         Self(error)
-    }
-}
-
-fn print_study_error(name: &str, text: &str, error: &sastrugi_stages::study::StudyError) {
-    let mut diagnostic = MietteDiagnostic::new(error.message.clone());
-    if let Some(span) = error.span.clone() {
-        diagnostic = diagnostic.with_label(LabeledSpan::underline(span));
-    }
-    if let Some(help) = error.help.clone() {
-        diagnostic = diagnostic.with_help(help);
-    }
-    let report = Report::new(diagnostic).with_source_code(NamedSource::new(name, text.to_owned()));
-    let colours = std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none();
-    let theme = if colours { GraphicalTheme::unicode() } else { GraphicalTheme::unicode_nocolor() };
-    let mut rendered = String::new();
-    let handler = GraphicalReportHandler::new_themed(theme).with_width(100);
-    match handler.render_report(&mut rendered, report.as_ref()) {
-        Ok(()) => warn(&format!("sastrugi: the study is refused\n{}", rendered.trim_end_matches('\n'))),
-        Err(_) => warn(&format!("sastrugi: {name}: {}", error.message)),
     }
 }

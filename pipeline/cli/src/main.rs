@@ -19,11 +19,11 @@ fn main() -> ExitCode {
         output::warn(&format!("sastrugi: note: Ctrl-C will not be announced: {error}"));
     }
     if let Err(failure) = verbs::start_threads(arguments.common.threads) {
-        return failure.report();
+        return output::report(failure);
     }
     match verbs::dispatch(&arguments) {
         Ok(code) => code.into(),
-        Err(failure) => failure.report(),
+        Err(failure) => output::report(failure),
     }
 }
 

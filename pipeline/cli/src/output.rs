@@ -1,8 +1,11 @@
 //! Results on stdout: JSON for machines, aligned lines for people; messages on stderr.
 
 use crate::failure::Failure;
+use miette::{GraphicalReportHandler, GraphicalTheme, LabeledSpan, MietteDiagnostic, NamedSource, Report};
+use sastrugi_stages::Error;
 use serde_json::Value;
-use std::io::Write;
+use std::io::{IsTerminal, Write};
+use std::process::ExitCode;
 
 /// Prints JSON when asked for, else the text.
 ///
@@ -26,6 +29,35 @@ pub fn print(json: bool, value: &Value, text: &str) -> Result<(), Failure> {
 /// A line on stderr. Whoever reads it may have gone away: that is no reason to stop.
 pub fn warn(line: &str) {
     drop(writeln!(std::io::stderr(), "{line}"));
+}
+
+/// Prints the message of a failure on stderr and gives the exit code.
+pub fn report(failure: Failure) -> ExitCode {
+    let code = failure.code();
+    match failure.0 {
+        Error::Study { name, text, error } => print_study_error(&name, &text, &error),
+        Error::Usage(m) | Error::Input(m) | Error::Failed(m) | Error::Retry(m) => warn(&format!("sastrugi: {m}")),
+    }
+    code.into()
+}
+
+fn print_study_error(name: &str, text: &str, error: &sastrugi_stages::study::StudyError) {
+    let mut diagnostic = MietteDiagnostic::new(error.message.clone());
+    if let Some(span) = error.span.clone() {
+        diagnostic = diagnostic.with_label(LabeledSpan::underline(span));
+    }
+    if let Some(help) = error.help.clone() {
+        diagnostic = diagnostic.with_help(help);
+    }
+    let report = Report::new(diagnostic).with_source_code(NamedSource::new(name, text.to_owned()));
+    let colours = std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none();
+    let theme = if colours { GraphicalTheme::unicode() } else { GraphicalTheme::unicode_nocolor() };
+    let mut rendered = String::new();
+    let handler = GraphicalReportHandler::new_themed(theme).with_width(100);
+    match handler.render_report(&mut rendered, report.as_ref()) {
+        Ok(()) => warn(&format!("sastrugi: the study is refused\n{}", rendered.trim_end_matches('\n'))),
+        Err(_) => warn(&format!("sastrugi: {name}: {}", error.message)),
+    }
 }
 
 /// Rows of cells in aligned columns.

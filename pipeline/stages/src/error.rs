@@ -8,6 +8,7 @@ use crate::runner::execute::Stopped;
 use crate::study::StudyError;
 use sastrugi_schemas::ParameterError;
 use sastrugi_store::release::ReleaseError;
+use sastrugi_texture::FitError;
 use std::path::Path;
 
 /// An error, one sentence each.
@@ -95,6 +96,16 @@ impl From<ReleaseError> for Error {
             ReleaseError::Occupied { .. } => Self::Usage(error.to_string()),
             _ if error.unusable_input() => Self::Input(error.to_string()),
             _ => Self::io(error),
+        }
+    }
+}
+
+impl From<FitError> for Error {
+    /// A parameter out of range is the caller's; anything else lies in the DEM.
+    fn from(error: FitError) -> Self {
+        match error {
+            FitError::Parameter(parameter) => parameter.into(),
+            other => Self::Input(other.to_string()),
         }
     }
 }

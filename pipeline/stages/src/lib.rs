@@ -6,6 +6,7 @@ mod error;
 mod hypotheses;
 pub mod job;
 pub mod jobs;
+pub mod loaded;
 mod machine;
 pub mod operations;
 pub mod packing;

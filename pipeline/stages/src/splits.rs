@@ -165,7 +165,7 @@ impl DisjointSets {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::studies::load_text;
+    use crate::loaded::load_text;
     use std::path::Path;
 
     const HEAD: &str = "[study]\nname = \"x\"\nseed = 3\ndate = \"2026-01-01\"\n";

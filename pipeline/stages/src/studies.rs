@@ -1,84 +1,21 @@
 //! What a command does with a whole study: run, plan, merge. What it does with a release is in [`crate::verification`].
 
-use crate::error::{Error, of_build};
+use crate::error::Error;
 use crate::jobs::original;
-use crate::registry::{self, Plan};
+use crate::loaded::{Loaded, load_text};
+use crate::registry;
 use crate::runner::assemble::{Contents, assemble};
 use crate::runner::cache::Cache;
 use crate::runner::execute::{Execution, Failure, Limits, execute};
-use crate::runner::graph::Graph;
 use crate::runner::plan::{PlanSummary, plan};
 use crate::runner::progress::Progress;
 use crate::runner::shard::{self, Part};
-use crate::splits::Splits;
 use crate::study::Study;
 use sastrugi_store::release;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fs;
-use std::ops::Range;
 use std::path::{Component, Path, PathBuf};
-
-/// A study with its graph.
-pub struct Loaded {
-    /// The study.
-    pub study: Study,
-    /// Its items.
-    pub graph: Graph,
-    /// The study's text as released: input files by their place in the release.
-    pub released: String,
-    /// Which terrains are for training, validation and test.
-    pub splits: Splits,
-}
-
-/// Reads a study file.
-///
-/// # Errors
-/// A missing file, a wrong study, or a missing input file.
-pub fn load(path: &Path) -> Result<Loaded, Error> {
-    let text = fs::read(path).map_err(|e| Error::Input(format!("{}: {}", path.display(), io_reason(&e))))?;
-    let text = String::from_utf8(text)
-        .map_err(|_| Error::Usage(format!("{}: the study is not UTF-8 text", path.display())))?;
-    load_text(&text, &path.display().to_string(), path.parent().unwrap_or(Path::new("")))
-}
-
-fn io_reason(error: &std::io::Error) -> String {
-    if error.kind() == std::io::ErrorKind::NotFound { "no such file".to_owned() } else { error.to_string() }
-}
-
-/// Reads a study from text; relative paths start from `folder`.
-///
-/// # Errors
-/// As [`load`].
-pub fn load_text(text: &str, name: &str, folder: &Path) -> Result<Loaded, Error> {
-    let study = Study::parse(text, folder, &registry::section_names()).map_err(|error| Error::Study {
-        name: name.to_owned(),
-        text: text.to_owned(),
-        error,
-    })?;
-    let plan = registry::build(&study).map_err(|error| of_build(name, text, error))?;
-    if plan.graph.is_empty() {
-        return Err(Error::Usage(format!("{name}: the study has no items; add [[terrain]], [[dem]] ...")));
-    }
-    let released = released_text(text, &study, &plan);
-    Ok(Loaded { study, graph: plan.graph, released, splits: plan.splits })
-}
-
-/// The study with its input files at their places in the release; every other byte stays.
-fn released_text(text: &str, study: &Study, plan: &Plan) -> String {
-    let mut places: Vec<(Range<usize>, String)> = Vec::new();
-    for place in &plan.inputs {
-        if let Some(span) = study.span_of(&place.key) {
-            places.push((span, toml_edit::Value::from(place.release_path.as_str()).to_string()));
-        }
-    }
-    // From the end, so that the places before stay where they are.
-    places.sort_by_key(|(span, _)| std::cmp::Reverse(span.start));
-    places.into_iter().fold(text.to_owned(), |mut text, (span, path)| {
-        text.replace_range(span, &path);
-        text
-    })
-}
 
 /// A run.
 #[derive(Clone, Copy)]

@@ -2,13 +2,14 @@
 
 use crate::error::Error;
 use crate::job::ItemRef;
+use crate::loaded::{Loaded, load};
 use crate::runner::assemble::{artifacts, head, notes_of};
 use crate::runner::cache::{Cache, Record};
 use crate::runner::execute::{Limits, execute};
 use crate::runner::progress::Progress;
 use crate::runner::sources::Sources;
 use crate::splits::{self, Splits};
-use crate::studies::{Loaded, RunRequest, load, run};
+use crate::studies::{RunRequest, run};
 use sastrugi_schemas::manifest::{Artifact, ItemNote, Manifest};
 use sastrugi_schemas::{Table, tables};
 use sastrugi_store::parquet::TableReader;

@@ -89,9 +89,10 @@ impl Record for DemFitRow {
 
     /// The fit's own columns stand apart.
     fn to_json(&self) -> Value {
-        let mut object = self.beside.to_json();
-        object["file"] = json!(self.file);
-        object["fit"] = self.fit.to_json();
+        let mut object = json!({ "file": self.file, "fit": self.fit.to_json() });
+        if let (Value::Object(all), Value::Object(beside)) = (&mut object, self.beside.to_json()) {
+            all.extend(beside);
+        }
         object["error"] = json!(self.error);
         object
     }

@@ -1,6 +1,6 @@
 //! `fit` of several DEMs, or to a table.
 
-use super::generate::{fit_parameters, fit_reading};
+use super::reading;
 use super::shown::check_ending;
 use crate::Verdict;
 use crate::args::{Common, Fit};
@@ -10,6 +10,8 @@ use sastrugi_schemas::Record;
 use sastrugi_schemas::fit::{FitFile, Intervals, Quoted, SILL_OVER_RANGE};
 use sastrugi_schemas::tables::DemFitRow;
 use sastrugi_stages::verbs::fits::{self, Request};
+use sastrugi_stages::verbs::{Reading, numbers, parameters};
+use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -109,6 +111,34 @@ fn parameter(quoted: Quoted) -> String {
         Quoted::AtLeast(low) => format!("at least {}", number(low)),
         Quoted::NotIdentified { .. } => "not identified".to_owned(),
     }
+}
+
+/// Parameters of a fit as the options state them.
+pub fn fit_parameters(args: &Fit) -> Result<Value, Failure> {
+    let mut params = json!({});
+    parameters::assign(&mut params, &args.set)?;
+    let mut put = |key: &str, value: Option<Value>| {
+        if let Some(value) = value {
+            params[key] = value;
+        }
+    };
+    put("outer_scale_m", args.outer_scale.map(|v| json!(v)));
+    put("mode", args.mode.as_ref().map(|v| json!(v)));
+    put("trim", args.trim.map(|v| json!(v)));
+    put("model", args.model.as_ref().map(|v| json!(v)));
+    put("bootstrap", args.bootstrap.map(|v| json!(v)));
+    put("noise_sigma_m", args.noise_sigma.map(|v| json!(v)));
+    put("correlated_noise_sigma_m", args.correlated_noise_sigma.map(|v| json!(v)));
+    put("correlated_noise_range_m", args.correlated_noise_range.map(|v| json!(v)));
+    put("inner_scale_m", args.inner_scale.map(|v| json!(v)));
+    Ok(params)
+}
+
+/// What of a DEM is fitted, and how it is read.
+pub fn fit_reading(args: &Fit) -> Result<Reading, Failure> {
+    let window = args.window.as_deref().map(|w| numbers::<4>("--window", w)).transpose()?;
+    let noise_reference = args.noise_reference.clone();
+    Ok(Reading { window, masks: args.masks.all(), noise_reference, ..reading(&args.reading)? })
 }
 
 #[cfg(test)]

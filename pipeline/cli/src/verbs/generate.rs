@@ -1,7 +1,7 @@
 //! Verbs that make or describe one file.
 
 use super::coregister::describe;
-use super::fits;
+use super::fits::{self, fit_parameters, fit_reading};
 use super::shown::ShownFiles;
 use super::{options, reading};
 use crate::Verdict;
@@ -14,7 +14,7 @@ use sastrugi_stages::verbs::local::Local;
 use sastrugi_stages::verbs::roughness::{
     AerodynamicRoughness, ArealFigures, Bumps, Detrender, ObstacleHeight, Ride, RideRequest, WindEstimate, WindSettings,
 };
-use sastrugi_stages::verbs::{self, Reading, numbers, parameters};
+use sastrugi_stages::verbs::{self, numbers, parameters};
 use serde_json::{Value, json};
 
 /// `terrain`.
@@ -130,34 +130,6 @@ pub fn fit(args: &Fit, common: &Common) -> Verdict {
     fit.warnings.iter().for_each(|warning| text.push_str(&format!("\n  warning: {warning}")));
     print(common.json, &serde_json::to_value(&fit).map_err(Failure::failed)?, &text)?;
     Ok(Code::Done)
-}
-
-/// Parameters of a fit as the options state them.
-pub fn fit_parameters(args: &Fit) -> Result<Value, Failure> {
-    let mut params = json!({});
-    parameters::assign(&mut params, &args.set)?;
-    let mut put = |key: &str, value: Option<Value>| {
-        if let Some(value) = value {
-            params[key] = value;
-        }
-    };
-    put("outer_scale_m", args.outer_scale.map(|v| json!(v)));
-    put("mode", args.mode.as_ref().map(|v| json!(v)));
-    put("trim", args.trim.map(|v| json!(v)));
-    put("model", args.model.as_ref().map(|v| json!(v)));
-    put("bootstrap", args.bootstrap.map(|v| json!(v)));
-    put("noise_sigma_m", args.noise_sigma.map(|v| json!(v)));
-    put("correlated_noise_sigma_m", args.correlated_noise_sigma.map(|v| json!(v)));
-    put("correlated_noise_range_m", args.correlated_noise_range.map(|v| json!(v)));
-    put("inner_scale_m", args.inner_scale.map(|v| json!(v)));
-    Ok(params)
-}
-
-/// What of a DEM is fitted, and how it is read.
-pub fn fit_reading(args: &Fit) -> Result<Reading, Failure> {
-    let window = args.window.as_deref().map(|w| numbers::<4>("--window", w)).transpose()?;
-    let noise_reference = args.noise_reference.clone();
-    Ok(Reading { window, masks: args.masks.all(), noise_reference, ..reading(&args.reading)? })
 }
 
 /// A co-registration stays where its difference could not be fitted: as JSON it stands where a fit file has it.

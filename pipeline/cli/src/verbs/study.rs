@@ -6,6 +6,7 @@ use crate::failure::{Code, Failure};
 use crate::output::{bytes, columns, print, seconds};
 use crate::progress::Teller;
 use sastrugi_report::Companions;
+use sastrugi_stages::loaded;
 use sastrugi_stages::packing;
 use sastrugi_stages::runner::execute::Limits;
 use sastrugi_stages::runner::shard::Part;
@@ -32,7 +33,7 @@ fn limits(memory_gib: f64) -> Result<Limits, Failure> {
 pub fn run(args: &Run, common: &Common) -> Verdict {
     let part = args.shard.as_deref().map(Part::parse).transpose()?;
     let limits = limits(args.memory)?;
-    let loaded = studies::load(&args.study)?;
+    let loaded = loaded::load(&args.study)?;
     let Place { output, work } = &args.place;
     let request = RunRequest { output, work: work.as_deref(), part, purpose: None, replace: args.replace, limits };
     finish_run(common, |teller| Ok(studies::run(&loaded, &request, teller)?))
@@ -86,7 +87,7 @@ fn finish_run(common: &Common, run: impl FnOnce(&Teller) -> Result<RunSummary, F
 
 /// `plan`.
 pub fn plan(args: &Plan, common: &Common) -> Verdict {
-    let loaded = studies::load(&args.study)?;
+    let loaded = loaded::load(&args.study)?;
     let plan = studies::plan_of(&loaded, &args.place.output, args.place.work.as_deref())?;
     let total_seconds = plan.stale.iter().fold(0.0, |sum, s| sum + s.seconds);
     let total_bytes = plan.stale.iter().fold(0.0, |sum, s| sum + s.bytes);

@@ -6,10 +6,19 @@
 //! the direction of that velocity (backwards where that needs the smaller angle), within the limit; its speed is the part of
 //! that velocity along where the wheel points now.
 
-use super::controller::Command;
 use super::drive::Servo;
 use super::model::{Vehicle, Wheel};
 use super::params::{AckermannParameters, DriveParameters};
+
+/// Commands and what they come from.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Command {
+    pub speed_m_s: f64,
+    pub yaw_rate_rad_s: f64,
+    pub cross_track_m: f64,
+    pub heading_error_rad: f64,
+    pub distance_to_goal_m: f64,
+}
 
 /// Limits that the steering has to keep.
 #[derive(Clone, Copy, Debug)]

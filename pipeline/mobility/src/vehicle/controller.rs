@@ -7,7 +7,7 @@
 //! `turn_stop`. Speed and yaw rate change no
 //! faster than the vehicle's limits allow.
 
-use super::actuation::Limits;
+use super::actuation::{Command, Limits};
 use super::settings::TraverseSettings;
 use crate::missions::Mission;
 use std::f64::consts::{PI, TAU};
@@ -31,16 +31,6 @@ pub(crate) struct Controller {
     turning: f64,
     /// Commands in force.
     pub command: Command,
-}
-
-/// Commands and what they come from.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Command {
-    pub speed_m_s: f64,
-    pub yaw_rate_rad_s: f64,
-    pub cross_track_m: f64,
-    pub heading_error_rad: f64,
-    pub distance_to_goal_m: f64,
 }
 
 impl Controller {

@@ -297,7 +297,7 @@ fn val_steered_vehicles_turn_as_told() {
             |_, _| 0.0,
             |p| p.vehicle = name.to_owned(),
             |mut simulation, vehicle| {
-                let command = controller::Command { speed_m_s, yaw_rate_rad_s, ..controller::Command::default() };
+                let command = actuation::Command { speed_m_s, yaw_rate_rad_s, ..actuation::Command::default() };
                 let mut servos = Vec::new();
                 let mut turn = |simulation: &mut Simulation, steps: usize| {
                     for _ in 0..steps {

@@ -1,18 +1,11 @@
 //! Sums over blocks of the raster: everything that z0 is made of adds up, so that a block can be left out.
 
 use super::crossings::{self, Profiled};
+use super::partition::SIDE;
 use super::{ObstacleHeight, Wind};
 use rayon::prelude::*;
 use sastrugi_numeric::Grid;
 use std::ops::Range;
-
-/// Blocks along either side.
-pub(super) const SIDE: usize = 4;
-
-/// Block of a cell, row by row.
-pub(super) fn block_of(row: usize, col: usize, rows: usize, cols: usize) -> usize {
-    (row * SIDE / rows) * SIDE + col * SIDE / cols
-}
 
 /// Sums over the cells with data of one block, or of several.
 #[derive(Clone, Debug)]

@@ -6,7 +6,7 @@
 //! order of adding them changes nothing.
 
 use super::Wind;
-use super::block::{SIDE, block_of};
+use super::partition::{SIDE, block_of};
 use crate::band::transposed;
 use rayon::prelude::*;
 use sastrugi_numeric::Grid;

@@ -65,6 +65,7 @@
 mod block;
 mod crossings;
 mod formulas;
+mod partition;
 #[cfg(test)]
 mod tests;
 

@@ -18,7 +18,7 @@ use sastrugi_store::dem::{self, BlockReader, Crs, Format, ReadOptions};
 use sastrugi_store::{atomic, csv, digest};
 use sastrugi_texture::coregister::Coregistered;
 use sastrugi_texture::noise::ReferenceNoise;
-use sastrugi_texture::{FitError, FitOutcome, FitParameters, FitSettings, Heights, Profiles};
+use sastrugi_texture::{FitOutcome, FitParameters, FitSettings, Heights, Profiles};
 use serde_json::Value;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -152,7 +152,7 @@ fn write_background(
     crs: &Crs,
 ) -> Result<(), Error> {
     let Some(path) = request.background else { return Ok(()) };
-    let [background, _] = outcome.rasters(heights).map_err(refused)?;
+    let [background, _] = outcome.rasters(heights)?;
     dem::write(path, &background, crs, &Default::default()).map_err(super::write_error)?;
     Ok(())
 }
@@ -171,7 +171,7 @@ fn fitted(request: &Request<'_>, settings: &FitSettings) -> Result<Fitted, Error
     let whole = |heights: &dyn Heights, settings: &FitSettings, crs: &Crs, mut notes: Vec<String>| {
         // A fit and its replicates may take minutes: what cannot be mapped is refused before them.
         let checked = request.local.as_ref().map_or(Ok(()), |local| local.check(settings, heights));
-        let outcome = checked.and_then(|()| sastrugi_texture::fit(heights, settings, &streams).map_err(refused));
+        let outcome = checked.and_then(|()| sastrugi_texture::fit(heights, settings, &streams).map_err(Error::from));
         let mapped = |outcome: FitOutcome| {
             let said = request.local.as_ref().map(|local| local.write(&outcome, heights, crs)).transpose()?;
             notes.extend(said);
@@ -186,7 +186,7 @@ fn fitted(request: &Request<'_>, settings: &FitSettings) -> Result<Fitted, Error
         return Ok(Fitted { masked_share, minus: Some(minus), ..whole(&difference, settings, &dem.info.crs, notes) });
     }
     if let Some(found) = transects(request.dem, &request.reading)? {
-        let profiles = Profiles::new(found.spacing_m, &found.profiles).map_err(refused)?;
+        let profiles = Profiles::new(found.spacing_m, &found.profiles)?;
         if let Some(path) = request.background {
             let message = format!("{}: transects have no background raster; leave `--background` out", path.display());
             return Err(Error::Usage(message));
@@ -287,12 +287,4 @@ fn subtracted(request: &Request<'_>, path: &Path) -> Result<(Grid, Read, Minus),
 fn named(path: &Path) -> Result<(String, String), Error> {
     let (_, sha256) = digest::of_file(path).map_err(|e| Error::Input(format!("{}: {e}", path.display())))?;
     Ok((path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned()), sha256))
-}
-
-/// A parameter out of range is the caller's; anything else lies in the DEM.
-pub(super) fn refused(error: FitError) -> Error {
-    match error {
-        FitError::Parameter(parameter) => parameter.into(),
-        other => Error::Input(other.to_string()),
-    }
 }

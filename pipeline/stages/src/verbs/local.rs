@@ -83,7 +83,7 @@ impl Local<'_> {
     /// # Errors
     /// Blocks that do not fit, heights that cannot be read, files that cannot be written.
     pub fn write(&self, outcome: &FitOutcome, heights: &dyn Heights, crs: &Crs) -> Result<String, Error> {
-        let maps = outcome.local_maps(heights, self.block_m).map_err(super::fit::refused)?;
+        let maps = outcome.local_maps(heights, self.block_m)?;
         let LocalMaps { band_rms_m, sigma_m, sigma2_over_range_m, .. } = &maps;
         let all =
             [(BAND_RMS, Some(band_rms_m)), (SIGMA, sigma_m.as_ref()), (SIGMA2_OVER_B, sigma2_over_range_m.as_ref())];

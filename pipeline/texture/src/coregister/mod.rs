@@ -31,6 +31,7 @@
 //! # Cost
 //! Some 100 operations per cell and round, usually under 10 rounds; 80 bytes per cell of A.
 
+mod equations;
 mod rounds;
 mod uncertainty;
 

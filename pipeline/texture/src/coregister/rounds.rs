@@ -8,8 +8,8 @@
 //! which always leads downhill.
 
 use super::centre_and_spread;
+use super::equations::{Equations, UNKNOWNS};
 use super::uncertainty::Uncertainty;
-use crate::fit::least_squares::Cholesky;
 use rayon::prelude::*;
 use sastrugi_numeric::surface::Surface;
 use sastrugi_numeric::{Grid, sums};
@@ -17,13 +17,8 @@ use std::ops::Range;
 
 /// Tukey's constant: 95 % efficiency on normal data (Holland and Welsch, 1977).
 const BIWEIGHT: f64 = 4.685;
-/// Unknowns: two offsets, raise, two tilts.
-pub const UNKNOWNS: usize = 5;
 /// Rounds of the plane alone.
 const PLANE_ROUNDS: usize = 10;
-/// Unknowns whose equations are closer to dependent than this cannot be told apart: smallest eigenvalue of the normal
-/// equations with unit diagonal.
-const DEPENDENT: f64 = 1e-9;
 /// Blocks that standard errors are from.
 const BLOCKS: f64 = 25.0;
 
@@ -83,79 +78,6 @@ struct Compared {
     slopes: Vec<[f64; 2]>,
     /// Weight by the agreement of the slopes of A and B; 0 where either has none.
     agreement: Vec<f64>,
-}
-
-/// Sums over cells: `sum w z z'`, `sum w z b'` (row-major), `sum w z d`, and the sum of the derivatives of `w d` by d.
-#[derive(Clone, Debug)]
-pub struct Equations([f64; Self::LEN]);
-
-impl Equations {
-    const SQUARE: usize = UNKNOWNS * UNKNOWNS;
-    const DERIVATIVES: usize = 2 * Self::SQUARE + UNKNOWNS;
-    const LEN: usize = Self::DERIVATIVES + 1;
-    const NONE: Self = Self([0.0; Self::LEN]);
-
-    fn add(&mut self, z: &[f64; UNKNOWNS], b: &[f64; UNKNOWNS], weight: f64, difference: f64) {
-        for i in 0..UNKNOWNS {
-            for j in 0..UNKNOWNS {
-                self.0[i * UNKNOWNS + j] += weight * z[i] * z[j];
-                self.0[Self::SQUARE + i * UNKNOWNS + j] += weight * z[i] * b[j];
-            }
-            self.0[2 * Self::SQUARE + i] += weight * z[i] * difference;
-        }
-    }
-
-    /// Sum in a fixed order.
-    pub fn sum(all: &[Self]) -> Self {
-        let mut total = Self::NONE;
-        for (k, sum) in total.0.iter_mut().enumerate() {
-            *sum = sums::sum(&all.iter().map(|e| e.0[k]).collect::<Vec<_>>());
-        }
-        total
-    }
-
-    /// These less others.
-    pub fn without(&self, others: &Self) -> Self {
-        let mut rest = self.clone();
-        rest.0.iter_mut().zip(&others.0).for_each(|(rest, other)| *rest -= other);
-        rest
-    }
-
-    /// Sum of the weights.
-    pub fn weight(&self) -> f64 {
-        self.0[2 * (UNKNOWNS + 1)]
-    }
-
-    /// By how much less the score follows the unknowns than with fixed weights: mean derivative of `w d` over mean w, as Huber
-    /// (1981), section 7.6, has it.
-    pub fn slackening(&self) -> f64 {
-        self.0[Self::DERIVATIVES] / self.weight()
-    }
-
-    fn square(&self, from: usize, first: usize) -> Vec<f64> {
-        let rows = first..UNKNOWNS;
-        rows.clone().flat_map(|i| rows.clone().map(move |j| self.0[from + i * UNKNOWNS + j])).collect()
-    }
-
-    fn score(&self, first: usize) -> &[f64] {
-        &self.0[2 * Self::SQUARE + first..Self::DERIVATIVES]
-    }
-
-    /// Gauss and Newton's step of the unknowns from `first` on; `None` when they cannot be told apart.
-    fn downhill(&self, first: usize) -> Option<Vec<f64>> {
-        let n = UNKNOWNS - first;
-        let normal = self.square(0, first);
-        let mut scaled: Vec<f64> =
-            (0..n * n).map(|k| normal[k] / (normal[k / n * (n + 1)] * normal[k % n * (n + 1)]).sqrt()).collect();
-        (0..n).for_each(|k| scaled[k * (n + 1)] -= DEPENDENT);
-        Cholesky::new(&scaled, n)?;
-        Some(Cholesky::new(&normal, n)?.solve(self.score(first)))
-    }
-
-    /// Step of the unknowns from `first` on with the slopes of both; `None` when their products are singular.
-    pub fn straight(&self, first: usize) -> Option<Vec<f64>> {
-        solve(self.square(Self::SQUARE, first), self.score(first).to_vec())
-    }
 }
 
 impl<'a> Overlay<'a> {
@@ -284,26 +206,6 @@ fn parts(range: &Range<usize>, count: f64) -> Vec<Range<usize>> {
     let count = (count as usize).clamp(1, range.len().max(1));
     let end = |k: usize| range.start + k * range.len() / count;
     (0..count).map(|k| end(k)..end(k + 1)).collect()
-}
-
-/// Solution of `m x = v` by elimination with row pivots; `None` when m is singular.
-fn solve(mut m: Vec<f64>, mut v: Vec<f64>) -> Option<Vec<f64>> {
-    let n = v.len();
-    for k in 0..n {
-        let pivot = (k..n).max_by(|&i, &j| m[i * n + k].abs().total_cmp(&m[j * n + k].abs()))?;
-        (0..n).for_each(|j| m.swap(k * n + j, pivot * n + j));
-        v.swap(k, pivot);
-        for i in k + 1..n {
-            let factor = m[i * n + k] / m[k * n + k];
-            (k..n).for_each(|j| m[i * n + j] -= factor * m[k * n + j]);
-            v[i] -= factor * v[k];
-        }
-    }
-    for k in (0..n).rev() {
-        let known: f64 = (k + 1..n).map(|j| m[k * n + j] * v[j]).sum();
-        v[k] = (v[k] - known) / m[k * n + k];
-    }
-    v.iter().all(|x| x.is_finite()).then_some(v)
 }
 
 /// Median, and where the biweight ends. Equal values have no spread, and nothing to weigh.

@@ -18,7 +18,7 @@
 //! Errors that reach across the whole DEM (a bent strip, a datum surface) are in no block's difference from the others.
 
 use super::StandardErrors;
-use super::rounds::{Equations, UNKNOWNS};
+use super::equations::{Equations, UNKNOWNS};
 use sastrugi_numeric::sums;
 
 /// Fewest blocks.

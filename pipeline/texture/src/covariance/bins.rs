@@ -4,6 +4,7 @@
 //! all products over the number of all pairs, and a model is brought to the bins in the same way, so that the width of a
 //! bin biases nothing.
 
+use super::lag::length_m;
 use super::masked::MaskedCovariance;
 
 /// How lags are put into bins.
@@ -142,15 +143,4 @@ fn sector([row, col]: [isize; 2], cell_m: [f64; 2], sectors: usize) -> usize {
     // A direction and its opposite are one; a lag on the edge of two sectors goes to the second, as its mirror image does.
     let place = (turn - turn.floor()) * sectors as f64 + 0.5;
     place as usize % sectors
-}
-
-/// A lag in cells as `[east, north]` in m: rows count southwards.
-pub fn lag_m([row, col]: [isize; 2], cell_m: [f64; 2]) -> [f64; 2] {
-    [col as f64 * cell_m[0], -(row as f64) * cell_m[1]]
-}
-
-/// Length in m of a lag in cells.
-pub fn length_m(lag: [isize; 2], cell_m: [f64; 2]) -> f64 {
-    let (y, x) = (lag[0] as f64 * cell_m[1], lag[1] as f64 * cell_m[0]);
-    (x * x + y * y).sqrt()
 }

@@ -14,7 +14,7 @@
 //!   ratio: Roberts, 2018) and kept as weights of C by lag, so that it is made once and applied to any model.
 
 use super::Covariance;
-use super::bins::lag_m;
+use super::lag::lag_m;
 use crate::noise::Noise;
 use sastrugi_numeric::fft::{Complex64, HalfSpectrum, RealFft2, smooth_length};
 use sastrugi_roughness::background::BoxWindow;

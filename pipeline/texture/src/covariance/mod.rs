@@ -5,6 +5,7 @@ pub(crate) mod density;
 pub(crate) mod empirical;
 pub mod filtered;
 pub mod form;
+pub mod lag;
 pub mod masked;
 pub mod models;
 pub(crate) mod partial;

@@ -10,8 +10,9 @@
 //! the same size that differ from bin to bin would be taken for structure by generalised least squares: 1e-4 of the variance moves
 //! sigma and b of a Gaussian surface by a quarter.
 
-use super::bins::{LagBins, Member, length_m};
+use super::bins::{LagBins, Member};
 use super::filtered::LagField;
+use super::lag::length_m;
 use crate::bitmap::Bitmap;
 use rayon::prelude::*;
 use sastrugi_roughness::background::{BoxWindow, Moments};

@@ -3,9 +3,9 @@
 use super::case::Case;
 use super::expectation::Expectation;
 use super::least_squares::{self, Cholesky, Chord, Minimum, curvature, minimise, slopes};
-use crate::covariance::bins::length_m;
 use crate::covariance::filtered::DetrendFilter;
 use crate::covariance::form::Role;
+use crate::covariance::lag::{lag_m, length_m};
 use crate::covariance::partial::{PAIRS_FINE, PAIRS_ROUGH, PartialWindows};
 use crate::covariance::{Covariance, Form, LagBins};
 
@@ -290,7 +290,7 @@ pub fn at_lags(case: &Case, covariance: &Covariance) -> Vec<f64> {
 pub fn on_surface(case: &Case, covariance: &Covariance) -> Vec<f64> {
     match covariance.is_isotropic() {
         true => case.bins.average(|lag| covariance.at_distance(length_m(lag, case.geometry.cell))),
-        false => case.bins.average(|lag| covariance.at(crate::covariance::bins::lag_m(lag, case.geometry.cell))),
+        false => case.bins.average(|lag| covariance.at(lag_m(lag, case.geometry.cell))),
     }
 }
 

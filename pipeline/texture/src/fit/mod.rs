@@ -20,6 +20,7 @@
 //! strips of `survey.rs`, which grow with the raster's width only, two bits per cell, and 300 bytes per cell of up to a
 //! million for each replicate at work. Heights are read in parts, a few times ([`Heights`]).
 
+mod block_places;
 mod carried;
 pub(crate) mod case;
 mod error;

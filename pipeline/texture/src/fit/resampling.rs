@@ -16,6 +16,7 @@
 //! deviations scaled by the square root of the share of residuals in it.
 
 use super::FitError;
+use super::block_places::{BLOCKS_ALONG, block_places};
 use super::case::Case;
 use super::estimator::{Estimate, Estimator};
 use super::null_surfaces::NullSurfaces;
@@ -25,11 +26,9 @@ use crate::covariance::bins;
 use crate::covariance::form::Role;
 use crate::covariance::{Covariance, LagBins, masked_covariance};
 use rayon::prelude::*;
-use sastrugi_numeric::{Geometry, Stream, Streams, sums};
-use sastrugi_roughness::background::BoxWindow;
+use sastrugi_numeric::{Stream, Streams, sums};
 use sastrugi_schemas::fit::Intervals;
 use std::collections::BTreeMap;
-use std::ops::Range;
 
 /// Name of `sigma^2 / b` among intervals and diagnostics.
 pub const SILL_OVER_RANGE: &str = "sigma2_over_range_m";
@@ -39,10 +38,6 @@ pub const LEVEL: f64 = 0.95;
 pub const CELLS_MAX: usize = 1 << 20;
 /// Fewest blocks worth drawing from.
 const BLOCKS_MIN: usize = 9;
-/// Most cells along a side of a block that are looked at.
-const BLOCK_SIDE_MAX: usize = 1024;
-/// Most blocks along a side.
-const BLOCKS_ALONG: usize = 8;
 /// Replicates of the block bootstrap for each one asked for: they cost little.
 const BLOCK_REPLICATES: usize = 4;
 
@@ -151,23 +146,6 @@ impl Block {
     pub fn variance_m2(&self) -> f64 {
         self.squares.sum_m2 / self.squares.count as f64
     }
-}
-
-/// Rows and columns of the blocks of a DEM, of at least two windows each. Blocks of more cells than are looked at stand for
-/// their surroundings.
-pub fn block_places(geometry: &Geometry, window: BoxWindow, profiles: bool) -> Vec<[Range<usize>; 2]> {
-    let shape = [geometry.rows, geometry.cols];
-    let width = window.cells();
-    let along = match profiles {
-        true => [shape[0], (BLOCKS_ALONG * BLOCKS_ALONG / shape[0]).clamp(1, (shape[1] / (2 * width[1])).max(1))],
-        false => [0, 1].map(|k| (shape[k] / (2 * width[k])).clamp(1, BLOCKS_ALONG)),
-    };
-    let span = |axis: usize, index: usize| {
-        let [from, to] = [index, index + 1].map(|k| k * shape[axis] / along[axis]);
-        let cut = (to - from).saturating_sub(BLOCK_SIDE_MAX.max(2 * width[axis])) / 2;
-        from + cut..to - cut
-    };
-    (0..along[0]).flat_map(|r| (0..along[1]).map(move |c| [span(0, r), span(1, c)])).collect()
 }
 
 /// The blocks of a DEM; none when too few have data. Pairs are counted only where blocks will be resampled.

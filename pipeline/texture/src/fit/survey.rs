@@ -6,8 +6,8 @@
 //! that is more, at about 40 bytes each. It grows with the raster's width, not with its length. Heights and residuals of a
 //! strip lie where those of the one before did. Residuals of any part are made again when they are asked for.
 
+use super::block_places::block_places;
 use super::heights::Heights;
-use super::resampling::block_places;
 use super::residual::{Part, WindowTally};
 use super::{FitError, FitSettings, Mode};
 use crate::bitmap::Bitmap;

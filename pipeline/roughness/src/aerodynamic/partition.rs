@@ -1,0 +1,9 @@
+//! The blocks that a raster is parted into.
+
+/// Blocks along either side.
+pub(super) const SIDE: usize = 4;
+
+/// Block of a cell, row by row.
+pub(super) fn block_of(row: usize, col: usize, rows: usize, cols: usize) -> usize {
+    (row * SIDE / rows) * SIDE + col * SIDE / cols
+}
