@@ -1,4 +1,4 @@
-//! Random numbers by place instead of by order.
+//! Counter-based random numbers, keyed by a named stream and by the place of a lattice point.
 //!
 //! A surface without an edge cannot draw from a stream: which point comes first would depend on the patch that is looked at. A
 //! [`Counter`] is a pure function of its words instead: `counter.at(purpose).at(i).at(j)` is the same number whoever asks, in

@@ -5,8 +5,7 @@
 //! drawn together with those of the same groups. A unit's place in the draw comes from its own random stream, so that more
 //! terrains move few others.
 
-use crate::builder::Heightfield;
-use crate::builder::common;
+use crate::builder::{Heightfield, common};
 use crate::job::ItemRef;
 use crate::runner::graph::Graph;
 use crate::study::{Study, StudyError};

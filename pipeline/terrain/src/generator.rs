@@ -29,8 +29,8 @@ pub trait Generator: Send + Sync {
     /// Sentences that a reader of the result should know, such as a size that was rounded down.
     fn notes(&self) -> Vec<String>;
 
-    /// The surfaces that it stands on, as its parameters name them.
-    fn inputs(&self) -> Vec<Input> {
+    /// The surfaces that it takes as input, as its parameters name them.
+    fn inputs(&self) -> Vec<InputSurface> {
         Vec::new()
     }
 
@@ -63,9 +63,9 @@ pub trait Generator: Send + Sync {
     }
 }
 
-/// A surface that a generator stands on.
+/// A surface that a generator takes as input.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Input {
+pub struct InputSurface {
     /// Dotted path of the parameter that names it.
     pub key: String,
     /// Its name: an id in a study, a file on the command line.
@@ -176,11 +176,11 @@ pub enum TerrainError {
         /// The figure.
         value: f64,
     },
-    /// A surface that the generator stands on does not serve.
-    #[error("use \"{base}\": it {reason}")]
+    /// An input surface is not usable.
+    #[error("use \"{surface}\": it {reason}")]
     Input {
         /// Its name in the parameters.
-        base: String,
+        surface: String,
         /// What is wrong, and what would be right.
         reason: String,
     },

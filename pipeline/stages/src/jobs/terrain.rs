@@ -24,7 +24,7 @@ pub const STAGE: &str = "terrain";
 struct TerrainJob {
     id: String,
     generator: Box<dyn Generator>,
-    /// Items of the surfaces that the generator stands on.
+    /// Items of the input surfaces of the generator.
     inputs: Vec<ItemRef>,
     /// Cells of those.
     input_cells: u64,
@@ -85,7 +85,7 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
     Ok(())
 }
 
-/// The items of the surfaces that a generator stands on, and how many cells they have together.
+/// The items of the input surfaces of a generator, and how many cells they have together.
 fn inputs(
     builder: &Builder<'_>,
     entry: &Entry<'_>,
@@ -165,7 +165,7 @@ impl Job for TerrainJob {
 }
 
 impl TerrainJob {
-    /// The surfaces that the generator stands on, and the coordinate system of the first.
+    /// The input surfaces of the generator, and the coordinate system of the first.
     fn read_inputs(&self, work: &Work<'_>) -> Result<(Vec<Grid>, Crs), JobError> {
         let mut grids = Vec::new();
         let mut crs = None;

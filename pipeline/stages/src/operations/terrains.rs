@@ -21,7 +21,7 @@ pub fn values_of(map: &Map) -> Values {
 pub fn generate(generator: &dyn Generator, streams: &Streams, inputs: &[Grid]) -> Result<Terrain, JobError> {
     generator.generate_checked(streams, inputs).map_err(|e| {
         let message = format!("failed to {e}");
-        // The surface below does not serve: another part of it, or another file, would.
+        // The input surface is not usable: another part of it, or another file, would.
         if matches!(e, TerrainError::Input { .. }) { JobError::input(message) } else { JobError::new(message) }
     })
 }

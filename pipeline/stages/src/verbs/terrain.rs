@@ -70,7 +70,7 @@ pub fn terrain(request: &Request<'_>) -> Result<Value, Error> {
     }))
 }
 
-/// The files that a generator stands on, in metres, and the coordinate system of the first.
+/// The files of a generator's input surfaces, in metres, and the coordinate system of the first.
 fn read_inputs(generator: &dyn Generator) -> Result<(Vec<Grid>, Crs), Error> {
     let mut grids = Vec::new();
     let mut crs = None;

@@ -32,7 +32,7 @@ mod tests;
 
 pub use params::{Compose, Operation, RawCompose, RawProcess, RawRegion};
 
-use crate::generator::{Generator, Input, MAPS, Map, Terrain, TerrainError};
+use crate::generator::{Generator, InputSurface, MAPS, Map, Terrain, TerrainError};
 use params::{Operand, Part, Process, Region, Step};
 use sastrugi_numeric::{Geometry, Grid, Streams, Surface, ops, sums};
 use serde_json::Value;
@@ -44,11 +44,11 @@ pub const KIND: &str = "compose";
 const SECONDS_PER_JOIN: f64 = 2e-8;
 
 impl Operand {
-    fn inputs(&self) -> Vec<Input> {
+    fn inputs(&self) -> Vec<InputSurface> {
         match self {
             Self::Surface(base) => vec![base.clone()],
             Self::Generator { generator, key } => {
-                let within = |b: Input| Input { key: format!("{key}.{}", b.key), ..b };
+                let within = |b: InputSurface| InputSurface { key: format!("{key}.{}", b.key), ..b };
                 generator.inputs().into_iter().map(within).collect()
             }
         }
@@ -76,19 +76,19 @@ impl Operand {
             (Self::Generator { generator, .. }, own) => generator.generate(streams, own),
             (Self::Surface(base), [surface]) => sampled(base, surface, geometry).map(Terrain::from),
             (Self::Surface(base), _) => {
-                Err(TerrainError::Input { base: base.name.clone(), reason: "is not there".to_owned() })
+                Err(TerrainError::Input { surface: base.name.clone(), reason: "is not there".to_owned() })
             }
         }
     }
 }
 
 /// A surface at the centres of other cells.
-fn sampled(base: &Input, surface: &Grid, geometry: &Geometry) -> Result<Grid, TerrainError> {
+fn sampled(base: &InputSurface, surface: &Grid, geometry: &Geometry) -> Result<Grid, TerrainError> {
     let at = |k: usize| {
         let (x, y) = (geometry.x(k % geometry.cols), geometry.y(k / geometry.cols));
         surface.height(x, y).ok_or_else(|| {
             let reason = format!("has no height at x = {x} m, y = {y} m; it must reach all centres of the cells");
-            TerrainError::Input { base: base.name.clone(), reason }
+            TerrainError::Input { surface: base.name.clone(), reason }
         })
     };
     Ok(Grid::new(*geometry, (0..geometry.len()).map(at).collect::<Result<_, _>>()?))
@@ -236,7 +236,7 @@ impl Generator for Compose {
         self.notes.clone()
     }
 
-    fn inputs(&self) -> Vec<Input> {
+    fn inputs(&self) -> Vec<InputSurface> {
         self.processes.iter().flat_map(Process::operands).flat_map(Operand::inputs).collect()
     }
 

@@ -39,7 +39,7 @@ fn val_operations_are_those_of_the_table() {
 
 #[test]
 fn val_regions_rise_smoothly_between_their_values() {
-    let operand = || Operand::Surface(Input { key: String::new(), name: String::new() });
+    let operand = || Operand::Surface(InputSurface { key: String::new(), name: String::new() });
     let region = |from, to| Region { operand: operand(), from, to };
     let weights = [1.0, 2.0, 2.5, 3.0, 4.0].map(|v| region(2.0, 3.0).weight(v));
     assert_eq!(weights, [0.0, 0.0, 0.5, 1.0, 1.0]);

@@ -42,7 +42,7 @@ pub(crate) use fit::seen_through_the_lags;
 pub use fit::{TextureFit, fit};
 pub use params::{Elaborate, RawElaborate};
 
-use crate::generator::{Generator, Input, Terrain, TerrainError};
+use crate::generator::{Generator, InputSurface, Terrain, TerrainError};
 use crate::planetary::{self, Assembly, RawProcess, Window, World};
 use background::Background;
 use rayon::prelude::*;
@@ -281,12 +281,12 @@ impl Generator for Elaborate {
         self.size.note().into_iter().collect()
     }
 
-    fn inputs(&self) -> Vec<Input> {
-        vec![Input { key: "dem".to_owned(), name: self.raw.dem.clone() }]
+    fn inputs(&self) -> Vec<InputSurface> {
+        vec![InputSurface { key: "dem".to_owned(), name: self.raw.dem.clone() }]
     }
 
     fn generate(&self, streams: &Streams, inputs: &[Grid]) -> Result<Terrain, TerrainError> {
-        let failed = |reason: String| TerrainError::Input { base: self.raw.dem.clone(), reason };
+        let failed = |reason: String| TerrainError::Input { surface: self.raw.dem.clone(), reason };
         let dem = inputs.first().ok_or_else(|| failed("is not there".to_owned()))?;
         self.refine(streams, dem).map_err(|e| failed(e.to_string()))
     }

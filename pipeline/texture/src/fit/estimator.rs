@@ -232,7 +232,7 @@ impl<'a> Estimator<'a> {
         let misfit = |others: &[f64]| {
             self.misfit(&estimate.form, &whole(others), Some(&likelihood.weights), &self.bins.covariance_m2)
         };
-        let end = rayon::scope(|_| least_squares::least(&start, &open, misfit));
+        let end = rayon::scope(|_| least_squares::minimise_coarsely(&start, &open, misfit));
         Some(Held { rise: (end.value - likelihood.chi2).max(0.0), at: whole(&end.at) })
     }
 }

@@ -29,7 +29,7 @@ pub fn minimise(start: &[f64], bounds: &[(f64, f64)], residuals: impl Fn(&[f64])
 }
 
 /// As [`minimise`], to a millionth of the sum.
-pub fn least(start: &[f64], bounds: &[(f64, f64)], residuals: impl Fn(&[f64]) -> Vec<f64>) -> Minimum {
+pub fn minimise_coarsely(start: &[f64], bounds: &[(f64, f64)], residuals: impl Fn(&[f64]) -> Vec<f64>) -> Minimum {
     search(start, bounds, ROUGH_TOLERANCE, residuals)
 }
 
