@@ -1,6 +1,9 @@
 //! ESRI ASCII grids: a header of words, then rows from the north.
 
-use super::{Crs, Dem, DemInfo, Format, NO_DATA, Refusal, Values, cell_count};
+use super::band::Values;
+use super::checks::{cell_count, free_of_no_data_value};
+use super::crs::Crs;
+use super::raster::{Dem, DemInfo, Format, NO_DATA, Refusal};
 use sastrugi_numeric::{Geometry, Grid};
 use std::fmt::Write;
 
@@ -188,7 +191,7 @@ fn guess_crs(g: &Geometry) -> (Crs, Vec<String>) {
 
 /// The grid as text: shortest decimal forms that read back to the same numbers.
 pub(super) fn render(grid: &Grid) -> Result<Vec<u8>, Refusal> {
-    super::free_of_no_data_value(grid)?;
+    free_of_no_data_value(grid)?;
     let g = &grid.geometry;
     let cell = if g.cell[0] == g.cell[1] {
         format!("cellsize {}", g.cell[0])

@@ -7,8 +7,10 @@
 //!
 //! Infinite values are no data, as in [`super::read`], which counts them; a raster without any data is found out by its reader.
 
+use super::checks::check_place;
 use super::geotiff::Raster;
-use super::{DemError, DemInfo, Format, MAX_CELLS, ReadOptions, Refusal, SNIFFED_BYTES, check_place, read_with};
+use super::raster::{DemError, DemInfo, Format, MAX_CELLS, ReadOptions, Refusal};
+use super::{SNIFFED_BYTES, format_of, read_with};
 use sastrugi_numeric::{Geometry, Grid};
 use std::fs::File;
 use std::io::{BufReader, Read};
@@ -37,7 +39,7 @@ pub fn open(path: &Path, options: &ReadOptions) -> Result<BlockReader, DemError>
     let reading = |e| DemError::reading(path, e);
     let mut first = Vec::new();
     File::open(path).map_err(reading)?.take(SNIFFED_BYTES).read_to_end(&mut first).map_err(reading)?;
-    let rows = match Format::of_file(path, &first) {
+    let rows = match format_of(path, &first) {
         Some(Format::GeoTiff) => {
             let raster = Raster::open(path, options, ROWS_OF_BLOCKS)?;
             check_place(&raster.geometry).map_err(|refusal| refusal.about(path))?;

@@ -4,8 +4,10 @@
 //! PackBits and LERC, predictors 1 to 3, BigTIFF and big-endian files tried bit for bit; it refuses files without
 //! georeferencing. Both stand behind [`parse`], and behind [`Raster`] for rows at a time.
 
+use super::band::{self, Values};
+use super::checks::cell_count;
 use super::crs::{Crs, GeoKey};
-use super::{Claimed, Dem, DemError, DemInfo, Format, MAX_CELLS, ReadOptions, Refusal, Values, band, cell_count};
+use super::raster::{Claimed, Dem, DemError, DemInfo, Format, MAX_CELLS, ReadOptions, Refusal};
 use geotiff_reader::geokeys::{GeoKeyDirectory, GeoKeyValue};
 use geotiff_reader::{GeoTiffFile, GeoTiffOpenOptions};
 use sastrugi_numeric::{Geometry, Grid};

@@ -1,7 +1,9 @@
 //! SRTM tiles: big-endian 16-bit posts of one degree, 1201 or 3601 to a side, the outer ones shared with the neighbours.
 //! The name gives the south-western post; posts are cell centres, so the grid reaches half a cell beyond the degree.
 
-use super::{Crs, Dem, DemInfo, Format, Refusal, Values};
+use super::band::Values;
+use super::crs::Crs;
+use super::raster::{Dem, DemInfo, Format, Refusal};
 use sastrugi_numeric::{Geometry, Grid};
 use std::path::Path;
 

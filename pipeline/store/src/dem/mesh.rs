@@ -3,7 +3,8 @@
 //! One vertex per cell with data, at its centre; two triangles between four neighbours, counter-clockwise from above, whose common
 //! side runs from north-west to south-east. A triangle with a corner without data is left out.
 
-use super::{Refusal, check_single_precision};
+use super::checks::check_single_precision;
+use super::raster::Refusal;
 use sastrugi_numeric::Grid;
 use serde_json::json;
 use std::fmt::Write;

@@ -1,6 +1,10 @@
 //! NumPy arrays, versions 1 to 3 (Kern, NumPy Enhancement Proposal 1): two dimensions of real numbers, row 0 north.
 
-use super::{Crs, Dem, DemInfo, Format, ReadOptions, Refusal, Values, cell_count, geotiff};
+use super::band::Values;
+use super::checks::cell_count;
+use super::crs::Crs;
+use super::geotiff;
+use super::raster::{Dem, DemInfo, Format, ReadOptions, Refusal};
 use sastrugi_numeric::Grid;
 
 /// Reads an array.

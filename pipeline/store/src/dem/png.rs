@@ -1,9 +1,10 @@
 //! Greyscale PNG: heights as 16-bit levels, for game engines and image programs.
 
-use super::{
-    Claimed, Crs, Dem, DemError, DemInfo, Format, MAX_CELLS, ReadOptions, Refusal, Values, cell_count, geotiff, save,
-    unfit,
-};
+use super::band::Values;
+use super::checks::cell_count;
+use super::crs::Crs;
+use super::geotiff;
+use super::raster::{Claimed, Dem, DemError, DemInfo, Format, MAX_CELLS, ReadOptions, Refusal, save};
 use crate::atomic::Target;
 use sastrugi_numeric::Grid;
 use std::fs::File;
@@ -65,7 +66,7 @@ pub(super) fn claimed(mut file: File, options: &ReadOptions) -> Option<Claimed> 
 /// The grid is too large for a PNG, or the file cannot be written.
 pub fn write_png16<'a>(target: impl Into<Target<'a>>, grid: &Grid<u16>) -> Result<(), DemError> {
     let target = target.into();
-    save(target, &levels(grid).map_err(|refusal| unfit(target.path, refusal))?)
+    save(target, &levels(grid).map_err(|refusal| refusal.unfit(target.path))?)
 }
 
 /// The bytes of levels as they are.
@@ -82,7 +83,7 @@ pub fn write_png_heights<'a>(target: impl Into<Target<'a>>, grid: &Grid) -> Resu
     let target = target.into();
     let scale = HeightScale::of(grid);
     let encoded = encode(&grid.map(|v| scale.level(v)), Some(scale));
-    save(target, &encoded.map_err(|refusal| unfit(target.path, refusal))?)?;
+    save(target, &encoded.map_err(|refusal| refusal.unfit(target.path))?)?;
     Ok(scale)
 }
 

@@ -1,5 +1,6 @@
 use super::*;
 use proptest::prelude::*;
+use sastrugi_numeric::Geometry;
 use std::path::PathBuf;
 
 fn data(name: &str) -> Option<PathBuf> {

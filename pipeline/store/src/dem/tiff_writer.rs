@@ -8,8 +8,10 @@
 //! regard to the CPU (vector code there compares and sums, with the same result), and a golden hash in the tests holds
 //! the bytes. Predictor 3 is that of Adobe Photoshop TIFF Technical Note 3 (2005).
 
+use super::band::{self, Values};
+use super::checks::{check_single_precision, free_of_no_data_value};
 use super::crs::{Crs, GeoKey, RASTER_TYPE};
-use super::{Compression, NO_DATA, Refusal, Values, WriteOptions, band, check_single_precision, free_of_no_data_value};
+use super::raster::{Compression, NO_DATA, Refusal, WriteOptions};
 use flate2::write::ZlibEncoder;
 use rayon::prelude::*;
 use sastrugi_numeric::{Geometry, Grid};

@@ -13,7 +13,8 @@
 use super::levels::Levels;
 use super::posts::Posts;
 use super::{Parts, SAME};
-use crate::dem::{Refusal, mesh, png};
+use crate::dem::raster::Refusal;
+use crate::dem::{mesh, png};
 use serde_json::json;
 
 const COLLISION: &str = "collision.obj";

@@ -3,7 +3,8 @@
 
 use super::posts::Posts;
 use super::{Parts, SAME};
-use crate::dem::{Refusal, mesh};
+use crate::dem::mesh;
+use crate::dem::raster::Refusal;
 use serde_json::json;
 
 const SCENE: &str = "terrain.usda";

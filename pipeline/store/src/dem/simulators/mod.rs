@@ -20,7 +20,8 @@ mod unreal;
 #[cfg(test)]
 mod tests;
 
-use super::{DemError, Refusal, mesh, save, unfit};
+use super::mesh;
+use super::raster::{DemError, Refusal, save};
 use crate::atomic;
 use posts::Posts;
 use sastrugi_numeric::{Geometry, Grid};
@@ -108,7 +109,7 @@ const fn sizes(simulator: Simulator) -> Option<&'static [usize]> {
 /// # Errors
 /// [`DemError::Unfit`] for fewer than two rows or columns; more, or for a crop fewer, than the program takes.
 pub fn check_size(geometry: &Geometry, simulator: Simulator, fit: Fit) -> Result<Cost, DemError> {
-    let side = size(geometry, simulator, fit).map_err(|refusal| unfit(Path::new(simulator.name()), refusal))?;
+    let side = size(geometry, simulator, fit).map_err(|refusal| refusal.unfit(Path::new(simulator.name())))?;
     Ok(Cost::of(simulator, side.map_or(geometry.len(), |side| side * side) as u64))
 }
 
@@ -158,7 +159,7 @@ pub fn export_from_degrees(grid: &Grid, simulator: Simulator, fit: Fit) -> Resul
 }
 
 fn export_posts(simulator: Simulator, posts: Result<Posts, Refusal>) -> Result<Export, DemError> {
-    let refused = |refusal| unfit(Path::new(simulator.name()), refusal);
+    let refused = |refusal: Refusal| refusal.unfit(Path::new(simulator.name()));
     let posts = posts.map_err(refused)?;
     let mut parts = parts(&posts, simulator).map_err(refused)?;
     let mut files = std::mem::take(&mut parts.files);
@@ -177,7 +178,7 @@ pub fn check_folder(folder: &Path, simulator: Simulator) -> Result<(), DemError>
         return Ok(());
     }
     let reason = format!("is a folder with files, but without an export for {}; name a new folder", simulator.name());
-    Err(unfit(folder, Refusal::new(reason)))
+    Err(Refusal::new(reason).unfit(folder))
 }
 
 /// True where there is no folder, or one without a file; what runs write at this moment does not count.

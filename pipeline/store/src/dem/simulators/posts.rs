@@ -1,6 +1,7 @@
 //! Heights at posts, in scene coordinates.
 
-use crate::dem::{Refusal, check_single_precision};
+use crate::dem::checks::check_single_precision;
+use crate::dem::raster::Refusal;
 use sastrugi_numeric::resample::stretch;
 use sastrugi_numeric::{Geometry, Grid};
 use serde_json::{Value, json};

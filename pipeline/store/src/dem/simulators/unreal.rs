@@ -8,7 +8,8 @@
 use super::Parts;
 use super::levels::{Levels, rounded_up, to_millimetres};
 use super::posts::Posts;
-use crate::dem::{Refusal, png};
+use crate::dem::png;
+use crate::dem::raster::Refusal;
 use serde_json::json;
 
 /// Posts a side.

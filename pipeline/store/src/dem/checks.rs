@@ -1,0 +1,55 @@
+//! Checks that formats share.
+
+use super::raster::{Dem, MAX_CELLS, NO_DATA, Refusal};
+use sastrugi_numeric::{Geometry, Grid};
+
+/// The checks that every format shares.
+pub(crate) fn checked(mut dem: Dem) -> Result<Dem, Refusal> {
+    let g = &dem.grid.geometry;
+    check_place(g)?;
+    let infinite = dem.grid.values.iter().filter(|v| v.is_infinite()).count();
+    if infinite > 0 {
+        dem.grid.values.iter_mut().filter(|v| v.is_infinite()).for_each(|v| *v = f64::NAN);
+        dem.info.notes.push(format!("{infinite} infinite values are read as no data"));
+    }
+    if dem.grid.finite_count() == 0 {
+        return Err(Refusal::new(format!("none of the {} x {} cells holds data", g.rows, g.cols)));
+    }
+    Ok(dem)
+}
+
+/// A place that cells can have.
+pub(super) fn check_place(g: &Geometry) -> Result<(), Refusal> {
+    if g.cell.iter().all(|c| c.is_finite() && *c > 0.0) && g.origin.iter().all(|o| o.is_finite()) {
+        return Ok(());
+    }
+    Err(Refusal::new(format!("the cell size {:?} at {:?} is not usable", g.cell, g.origin)))
+}
+
+/// Number of cells of a claimed size, when it is one that can be held.
+pub(super) fn cell_count(rows: u64, cols: u64) -> Result<usize, Refusal> {
+    if rows == 0 || cols == 0 {
+        return Err(Refusal::new(format!("holds no cell ({rows} rows, {cols} columns)")));
+    }
+    let cells = rows.checked_mul(cols).filter(|&n| n <= MAX_CELLS).ok_or_else(|| {
+        Refusal::new(format!("claims {rows} rows of {cols} columns; at most {MAX_CELLS} cells can be read"))
+    })?;
+    usize::try_from(cells).map_err(|_| Refusal::new(format!("{cells} cells do not fit in memory")))
+}
+
+/// A height that equals the number for no data would be read as no data.
+pub(super) fn free_of_no_data_value(grid: &Grid) -> Result<(), Refusal> {
+    if grid.values.contains(&NO_DATA) {
+        return Err(Refusal::new(format!("a height of {NO_DATA} m cannot be told from no data")));
+    }
+    Ok(())
+}
+
+/// Heights, m, of which none is beyond single precision; `NaN` stands for no data.
+pub(super) fn check_single_precision(mut heights: impl Iterator<Item = f64>) -> Result<(), Refusal> {
+    match heights.find(|z| (*z as f32).is_infinite()) {
+        // In powers of ten: such a number has 39 digits or more.
+        Some(height) => Err(Refusal::new(format!("the height {height:e} m does not fit in single precision"))),
+        None => Ok(()),
+    }
+}
