@@ -88,7 +88,7 @@ fn looks_like_json(bytes: &[u8]) -> bool {
 
 fn of_raster(mask: &dem::Dem, geometry: &Geometry) -> Result<Vec<bool>, String> {
     let (marks, shape) = (&mask.grid, (geometry.rows, geometry.cols));
-    if !mask.info.placed() {
+    if !mask.info.placed {
         if (marks.rows(), marks.cols()) != shape {
             let (rows, cols) = shape;
             return Err(format!(

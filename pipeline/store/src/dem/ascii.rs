@@ -136,6 +136,7 @@ pub(super) fn parse(bytes: &[u8], projection: Option<&str>) -> Result<Dem, Refus
         nodata: header.nodata,
         crs,
         values: Values::Heights,
+        placed: true,
         pixel_is_point: false,
         notes,
     };

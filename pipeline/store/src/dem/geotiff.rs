@@ -7,7 +7,7 @@
 use super::band::{self, Values};
 use super::checks::cell_count;
 use super::crs::{Crs, GeoKey};
-use super::raster::{Claimed, Dem, DemError, DemInfo, Format, MAX_CELLS, ReadOptions, Refusal};
+use super::raster::{Claimed, Dem, DemError, DemInfo, Format, MAX_CELLS, ReadOptions, Refusal, unplaced};
 use geotiff_reader::geokeys::{GeoKeyDirectory, GeoKeyValue};
 use geotiff_reader::{GeoTiffFile, GeoTiffOpenOptions};
 use sastrugi_numeric::{Geometry, Grid};
@@ -29,8 +29,6 @@ const KEPT_BLOCKS_MAX: usize = 1 << 14;
 /// Cells that are decoded together when all are read.
 const TOGETHER_CELLS: usize = 1 << 20;
 const RASTER_PIXEL_IS_POINT: u16 = 2;
-/// Note on a raster that says neither where it lies nor how large its cells are.
-pub(super) const NO_CELL_SIZE: &str = "the file states no cell size; 1 m is assumed";
 const SAMPLE_FORMATS_COMPLEX: [u16; 2] = [5, 6];
 const PHOTOMETRIC_PALETTE: u16 = 3;
 
@@ -159,13 +157,14 @@ impl<R: Read + Seek> Raster<R> {
         let values = metadata.and_then(|tag| tag.value.as_str()).map(Values::of_metadata).unwrap_or_default();
         let mut notes = crs.unit_notes();
         notes.extend(values.note());
+        let placed = file.transform().is_some();
         let geometry = place(&file, options, &mut notes)?;
         let south_first = file.transform().is_some_and(|t| t.pixel_height >= 0.0);
         if south_first {
             notes.push("its first row is the southern one; rows were turned".to_owned());
         }
         let pixel_is_point = file.crs().raster_type == RASTER_PIXEL_IS_POINT;
-        let info = DemInfo { format: Format::GeoTiff, dtype, nodata, crs, values, pixel_is_point, notes };
+        let info = DemInfo { format: Format::GeoTiff, dtype, nodata, crs, values, placed, pixel_is_point, notes };
         let block_rows = ifd.tile_height().filter(|_| ifd.is_tiled()).unwrap_or_else(|| ifd.rows_per_strip());
         let block_rows = (block_rows as usize).clamp(1, geometry.rows);
         Ok(Self {
@@ -195,7 +194,8 @@ impl<R: Read + Seek> Raster<R> {
         notes.extend(values.note());
         let geometry = unplaced(rows as usize, cols as usize, options, &mut notes);
         let crs = Crs::default();
-        let info = DemInfo { format: Format::GeoTiff, dtype, nodata, crs, values, pixel_is_point: false, notes };
+        let (placed, pixel_is_point) = (false, false);
+        let info = DemInfo { format: Format::GeoTiff, dtype, nodata, crs, values, placed, pixel_is_point, notes };
         let (wide, high) = decoder.chunk_dimensions();
         if wide == 0 || high == 0 {
             return Err(Refusal::new("has strips or tiles without cells"));
@@ -350,15 +350,6 @@ fn place(file: &GeoTiffFile, options: &ReadOptions, notes: &mut Vec<String>) -> 
     }
     let south = t.origin_y + f64::min(0.0, t.pixel_height * rows as f64);
     Ok(Geometry { rows, cols, cell: [t.pixel_width, t.pixel_height.abs()], origin: [t.origin_x, south] })
-}
-
-/// Geometry of a raster that does not say where it lies.
-pub(super) fn unplaced(rows: usize, cols: usize, options: &ReadOptions, notes: &mut Vec<String>) -> Geometry {
-    let cell = options.cell_m.unwrap_or_else(|| {
-        notes.push(NO_CELL_SIZE.to_owned());
-        [1.0; 2]
-    });
-    Geometry { rows, cols, cell, origin: [0.0; 2] }
 }
 
 /// Rows and columns of a file without georeferencing: the strips or tiles that hold them, cut.

@@ -27,6 +27,7 @@ pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Dem, Refusal> {
         nodata: Some(f64::from(VOID)),
         crs: Crs::wgs84(),
         values: Values::Heights,
+        placed: true,
         pixel_is_point: true,
         notes: vec![],
     };

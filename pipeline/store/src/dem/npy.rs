@@ -3,8 +3,7 @@
 use super::band::Values;
 use super::checks::cell_count;
 use super::crs::Crs;
-use super::geotiff;
-use super::raster::{Dem, DemInfo, Format, ReadOptions, Refusal};
+use super::raster::{Dem, DemInfo, Format, ReadOptions, Refusal, unplaced};
 use sastrugi_numeric::Grid;
 
 /// Reads an array.
@@ -28,13 +27,14 @@ pub(super) fn parse(bytes: &[u8], options: &ReadOptions) -> Result<Dem, Refusal>
     let stored: Vec<f64> = data.chunks_exact(element.bytes).map(|v| (element.decode)(v, big_endian)).collect();
     let values = if fortran { transposed(&stored, rows, cols) } else { stored };
     let mut notes = vec![];
-    let geometry = geotiff::unplaced(rows, cols, options, &mut notes);
+    let geometry = unplaced(rows, cols, options, &mut notes);
     let info = DemInfo {
         format: Format::Npy,
         dtype: element.name,
         nodata: None,
         crs: Crs::default(),
         values: Values::Heights,
+        placed: false,
         pixel_is_point: false,
         notes,
     };

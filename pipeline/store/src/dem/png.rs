@@ -3,8 +3,7 @@
 use super::band::Values;
 use super::checks::cell_count;
 use super::crs::Crs;
-use super::geotiff;
-use super::raster::{Claimed, Dem, DemError, DemInfo, Format, MAX_CELLS, ReadOptions, Refusal, save};
+use super::raster::{Claimed, Dem, DemError, DemInfo, Format, MAX_CELLS, ReadOptions, Refusal, save, unplaced};
 use crate::atomic::Target;
 use sastrugi_numeric::Grid;
 use std::fs::File;
@@ -139,13 +138,14 @@ pub(super) fn parse(bytes: &[u8], options: &ReadOptions) -> Result<Dem, Refusal>
         notes.push("the PNG states no height scale; levels are taken as metres".to_owned());
     }
     let values = levels.into_iter().map(|level| scale.map_or(level, |s| s.height(level))).collect();
-    let geometry = geotiff::unplaced(rows as usize, cols as usize, options, &mut notes);
+    let geometry = unplaced(rows as usize, cols as usize, options, &mut notes);
     let info = DemInfo {
         format: Format::Png,
         dtype: if wide { "uint16" } else { "uint8" },
         nodata: None,
         crs: Crs::default(),
         values: Values::Heights,
+        placed: false,
         pixel_is_point: false,
         notes,
     };

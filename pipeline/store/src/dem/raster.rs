@@ -3,7 +3,7 @@
 use super::band::Values;
 use super::crs::Crs;
 use crate::atomic::{self, Target};
-use sastrugi_numeric::Grid;
+use sastrugi_numeric::{Geometry, Grid};
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -34,17 +34,12 @@ pub struct DemInfo {
     pub crs: Crs,
     /// What the values are, as the file says.
     pub values: Values,
+    /// True when the file says where the raster lies; the south-western corner of others is (0, 0).
+    pub placed: bool,
     /// True when the file places its values at points (and the grid was shifted by half a cell to centre them).
     pub pixel_is_point: bool,
     /// Sentences a user must know.
     pub notes: Vec<String>,
-}
-
-impl DemInfo {
-    /// False for a raster that was read without a cell size and states none: then its place is unknown as well.
-    pub(crate) fn placed(&self) -> bool {
-        !self.notes.iter().any(|note| note == super::geotiff::NO_CELL_SIZE)
-    }
 }
 
 /// Raster formats.
@@ -220,6 +215,15 @@ pub struct WriteOptions {
     pub cloud_optimised: bool,
     /// What its values are.
     pub values: Values,
+}
+
+/// Geometry of a raster that does not say where it lies, with a note where nobody knows the size of its cells.
+pub(super) fn unplaced(rows: usize, cols: usize, options: &ReadOptions, notes: &mut Vec<String>) -> Geometry {
+    let cell = options.cell_m.unwrap_or_else(|| {
+        notes.push("the file states no cell size; 1 m is assumed".to_owned());
+        [1.0; 2]
+    });
+    Geometry { rows, cols, cell, origin: [0.0; 2] }
 }
 
 /// Writes the whole of a file.

@@ -191,6 +191,7 @@ fn gridded(cloud: &Cloud, settings: &GridSettings) -> Result<Gridded, Refusal> {
         nodata: None,
         crs: cloud.crs.clone(),
         values: dem::Values::Heights,
+        placed: true,
         pixel_is_point: false,
         notes,
     };
