@@ -4,7 +4,7 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 use sastrugi_schemas::study::Simulator;
-use sastrugi_store::points::Statistic;
+use sastrugi_store::dem::points::Statistic;
 use std::path::{Path, PathBuf};
 
 /// Rough-terrain datasets that can be reproduced bit for bit, and the statistics to compare them.

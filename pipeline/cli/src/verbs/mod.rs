@@ -15,8 +15,8 @@ use crate::args::{self, Arguments, Compress, Verb, Writing};
 use crate::failure::Failure;
 use sastrugi_stages::verbs::{Reading, numbers};
 use sastrugi_store::atomic;
+use sastrugi_store::dem::points::GridSettings;
 use sastrugi_store::dem::{Compression, Format, WriteOptions};
-use sastrugi_store::points::GridSettings;
 use std::path::Path;
 
 /// Does what was asked.

@@ -10,9 +10,9 @@ use crate::revision::Room;
 use crate::runner::graph::Node;
 use crate::study::terms::{self, Objection};
 use sastrugi_schemas::study::{DemItem, GeoTiff};
+use sastrugi_store::dem::points::GridSettings;
 use sastrugi_store::dem::{self, Claimed, Dem, ReadOptions};
 use sastrugi_store::digest;
-use sastrugi_store::points::GridSettings;
 use serde_json::{Value, json};
 use std::path::Path;
 

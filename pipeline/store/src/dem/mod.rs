@@ -1,4 +1,4 @@
-//! Elevation rasters of many formats, and point clouds gridded to one ([`crate::points`]), read to one form and written
+//! Elevation rasters of many formats, and point clouds gridded to one ([`points`]), read to one form and written
 //! from it.
 //!
 //! Heights are metres as the file states them; `NaN` stands for no data. Cells follow the grid convention of
@@ -18,6 +18,7 @@ mod hgt;
 mod mesh;
 mod npy;
 mod png;
+pub mod points;
 mod raster;
 pub mod simulators;
 mod tiff_writer;
@@ -31,11 +32,11 @@ pub use crs::{Crs, GeoKey};
 pub use png::{HeightScale, write_png_heights, write_png16};
 pub use raster::{Claimed, Compression, Dem, DemError, DemInfo, Format, MAX_CELLS, NO_DATA, ReadOptions, WriteOptions};
 
-pub(crate) use checks::checked;
 pub(crate) use raster::Refusal;
 
 use crate::atomic::Target;
-use crate::points::{self, GridSettings};
+use checks::checked;
+use points::GridSettings;
 use raster::save;
 use sastrugi_numeric::Grid;
 use std::fs::{self, File};

@@ -61,7 +61,7 @@ pub enum Format {
     Glb,
     /// OpenUSD mesh with collision, as text; written only.
     Usda,
-    /// Point cloud, LAS or LAZ, which is gridded ([`crate::points`]); read only.
+    /// Point cloud, LAS or LAZ, which is gridded ([`super::points`]); read only.
     Las,
 }
 

@@ -13,8 +13,8 @@
 //! Cost: one pass over the points for every five sizes; one bit per cell.
 
 use super::lattice::Lattice;
-use super::{Chosen, MAX_CELLS, Survey};
-use crate::dem::Refusal;
+use super::{Chosen, Survey};
+use crate::dem::raster::{MAX_CELLS, Refusal};
 
 /// Share of cells with points that is sought.
 const SHARE: f64 = 0.75;

@@ -5,7 +5,8 @@
 
 use super::crs;
 use super::header::{Claims, unreadable};
-use crate::dem::{Crs, Refusal};
+use crate::dem::crs::Crs;
+use crate::dem::raster::Refusal;
 use las::{PointDataBuilder, Reader};
 use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, SeekFrom};

@@ -3,7 +3,8 @@
 //!
 //! Of well-known text, the name, the EPSG code and the units of the horizontal and the vertical system are kept.
 
-use crate::dem::{Crs, GeoKey, Refusal};
+use crate::dem::crs::{Crs, GeoKey};
+use crate::dem::raster::Refusal;
 use las::Header;
 use las::crs::GeoTiffData;
 

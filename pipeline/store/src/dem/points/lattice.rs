@@ -1,7 +1,7 @@
 //! Which cell a point falls in.
 
-use super::{MAX_CELLS, Survey};
-use crate::dem::Refusal;
+use super::Survey;
+use crate::dem::raster::{MAX_CELLS, Refusal};
 use sastrugi_numeric::Geometry;
 
 /// Whole numbers up to here are exact.

@@ -10,8 +10,7 @@
 //!
 //! Cost: O(cells) for the closing, at most 9 additions per void cell and step; 2 bytes per cell and its margin of `reach`.
 
-use super::MAX_CELLS;
-use crate::dem::Refusal;
+use crate::dem::raster::{MAX_CELLS, Refusal};
 
 /// Fills gaps of a grid, row by row, and returns their number of cells.
 ///

@@ -7,7 +7,7 @@
 //! The decoders (`las`, `laz`) ask for memory by numbers found in the file: the length of an extended record, the
 //! number of chunks, the bytes of a layer. Each of them is compared here with what the file can hold.
 
-use crate::dem::Refusal;
+use crate::dem::raster::Refusal;
 use std::io::{self, Read, Seek, SeekFrom};
 
 /// Longest header of a known version, bytes.

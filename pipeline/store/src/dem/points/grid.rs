@@ -2,7 +2,7 @@
 
 use super::lattice::Lattice;
 use super::{Chosen, MAX_RANKED_POINTS, Statistic};
-use crate::dem::Refusal;
+use crate::dem::raster::Refusal;
 
 /// Heights (`NaN` without points) and numbers of points, cell by cell.
 pub(super) struct Cells {

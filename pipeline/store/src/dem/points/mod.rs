@@ -28,7 +28,10 @@ mod lattice;
 #[cfg(test)]
 mod tests;
 
-use crate::dem::{self, Claimed, Dem, DemError, DemInfo, Format, MAX_CELLS, Refusal};
+use super::band::Values;
+use super::checks::checked;
+use super::crs::Crs;
+use super::raster::{Claimed, Dem, DemError, DemInfo, Format, MAX_CELLS, Refusal};
 use cloud::{Cloud, Point};
 use grid::Cells;
 use header::Claims;
@@ -116,7 +119,7 @@ pub struct Gridded {
 /// Reads and grids a point cloud.
 ///
 /// # Errors
-/// [`DemError::Unfit`] for settings out of range; otherwise as [`dem::read`]: a file that is damaged, holds no usable point,
+/// [`DemError::Unfit`] for settings out of range; otherwise as [`super::read`]: a file that is damaged, holds no usable point,
 /// lies in degrees, or covers more than [`MAX_CELLS`] cells.
 pub fn read(path: &Path, settings: &GridSettings) -> Result<Gridded, DemError> {
     let file = File::open(path).map_err(|e| DemError::reading(path, e))?;
@@ -124,13 +127,13 @@ pub fn read(path: &Path, settings: &GridSettings) -> Result<Gridded, DemError> {
 }
 
 /// As [`read`], with the file open already.
-pub(crate) fn read_open(path: &Path, file: File, settings: &GridSettings) -> Result<Gridded, DemError> {
+pub(super) fn read_open(path: &Path, file: File, settings: &GridSettings) -> Result<Gridded, DemError> {
     check(settings).map_err(|reason| DemError::Unfit { path: path.to_owned(), reason })?;
     Cloud::open(path, file).and_then(|cloud| gridded(&cloud, settings)).map_err(|refusal| refusal.about(path))
 }
 
 /// What the header of a cloud says it will be gridded to, with cells of a given size.
-pub(crate) fn claimed(mut file: File, cell_m: Option<f64>) -> Option<Claimed> {
+pub(super) fn claimed(mut file: File, cell_m: Option<f64>) -> Option<Claimed> {
     let Claims { points, extent, .. } = Claims::read(&mut file).ok()?;
     let cells = match cell_m {
         Some(cell) => (extent[0] / cell + 1.0) * (extent[1] / cell + 1.0),
@@ -142,7 +145,7 @@ pub(crate) fn claimed(mut file: File, cell_m: Option<f64>) -> Option<Claimed> {
 }
 
 /// True for the first bytes of a point cloud.
-pub(crate) fn looks_like(bytes: &[u8]) -> bool {
+pub(super) fn looks_like(bytes: &[u8]) -> bool {
     bytes.starts_with(header::SIGNATURE)
 }
 
@@ -190,12 +193,12 @@ fn gridded(cloud: &Cloud, settings: &GridSettings) -> Result<Gridded, Refusal> {
         dtype: "int32",
         nodata: None,
         crs: cloud.crs.clone(),
-        values: dem::Values::Heights,
+        values: Values::Heights,
         placed: true,
         pixel_is_point: false,
         notes,
     };
-    let dem = dem::checked(Dem { grid: Grid::new(geometry, heights), info })?;
+    let dem = checked(Dem { grid: Grid::new(geometry, heights), info })?;
     Ok(Gridded { dem, counts: Grid::new(geometry, counts), filled })
 }
 
@@ -252,7 +255,7 @@ fn survey(chosen: &Chosen<'_>) -> Result<(Survey, Vec<String>), Refusal> {
     let place = |stored: [i32; 2]| [0, 1].map(|axis| cloud.coordinate(axis, f64::from(stored[axis])));
     let survey = Survey { points, low: place(low), high: place(high) };
     let mut notes = cloud.crs.unit_notes();
-    if cloud.crs == dem::Crs::default() {
+    if cloud.crs == Crs::default() {
         notes.push("the file names no reference system; coordinates are taken as metres".to_owned());
     }
     if noise > 0 {
