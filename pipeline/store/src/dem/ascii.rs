@@ -6,13 +6,15 @@ use super::crs::Crs;
 use super::raster::{Dem, DemInfo, Format, NO_DATA, Refusal};
 use sastrugi_numeric::{Geometry, Grid};
 use std::fmt::Write;
+use std::fs;
+use std::path::Path;
 
 /// Sizes of the usual global grids in arc seconds that no grid in metres has by chance (as degrees they have no short
 /// decimal form).
 const ARC_SECONDS: [f64; 10] = [1.0 / 9.0, 1.0 / 3.0, 1.0, 2.0, 3.0, 5.0, 6.0, 10.0, 15.0, 30.0];
 
-/// True when the first word is one of a header.
-pub(super) fn looks_like(bytes: &[u8]) -> bool {
+/// True for the text of an ESRI ASCII grid: its first word is one of a header.
+pub(crate) fn looks_like(bytes: &[u8]) -> bool {
     words(bytes).next().is_some_and(|word| matches!(Key::of(word), Some(Key::Columns | Key::Rows)))
 }
 
@@ -111,8 +113,8 @@ fn count(word: &[u8], key: &str) -> Result<u64, Refusal> {
     parsed.ok_or_else(|| Refusal::new(format!("{key} of the ASCII grid is {}; it must be a count", quoted(word))))
 }
 
-/// Reads an ESRI ASCII grid, with the text of the `.prj` file beside it when there is one.
-pub(super) fn parse(bytes: &[u8], projection: Option<&str>) -> Result<Dem, Refusal> {
+/// Reads an ESRI ASCII grid, with the `.prj` file beside it when there is one.
+pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Dem, Refusal> {
     let mut header = Header::default();
     let mut words = words(bytes).peekable();
     while let Some(key) = words.peek().copied().and_then(Key::of) {
@@ -128,7 +130,8 @@ pub(super) fn parse(bytes: &[u8], projection: Option<&str>) -> Result<Dem, Refus
         return Err(Refusal::new(format!("claims {rows} rows of {cols} columns in {} bytes", bytes.len())));
     }
     let (values, integers) = read_values(words, cells, header.nodata)?;
-    let (crs, notes) = projection.and_then(named_crs).unwrap_or_else(|| guess_crs(&geometry));
+    let projection = fs::read_to_string(path.with_extension("prj")).ok();
+    let (crs, notes) = projection.as_deref().and_then(named_crs).unwrap_or_else(|| guess_crs(&geometry));
     let dtype = if integers { "int32" } else { "float32" };
     let info = DemInfo {
         format: Format::EsriAscii,
@@ -190,8 +193,8 @@ fn guess_crs(g: &Geometry) -> (Crs, Vec<String>) {
     (Crs::default(), vec!["the format names no reference system; coordinates are taken as metres".to_owned()])
 }
 
-/// The grid as text: shortest decimal forms that read back to the same numbers.
-pub(super) fn render(grid: &Grid) -> Result<Vec<u8>, Refusal> {
+/// The grid as text: shortest decimal forms that read back to the same numbers. Also sentences on what is lost.
+pub(super) fn render(grid: &Grid, crs: &Crs) -> Result<(Vec<u8>, Vec<String>), Refusal> {
     free_of_no_data_value(grid)?;
     let g = &grid.geometry;
     let cell = if g.cell[0] == g.cell[1] {
@@ -211,5 +214,5 @@ pub(super) fn render(grid: &Grid) -> Result<Vec<u8>, Refusal> {
             let _ = write!(text, "{value}{separator}");
         }
     }
-    Ok(text.into_bytes())
+    Ok((text.into_bytes(), crs.loss_notes()))
 }

@@ -9,11 +9,10 @@
 
 use super::checks::check_place;
 use super::geotiff::Raster;
-use super::raster::{DemError, DemInfo, Format, MAX_CELLS, ReadOptions, Refusal};
-use super::{SNIFFED_BYTES, format_of, read_with};
+use super::raster::{Dem, DemError, DemInfo, MAX_CELLS, ReadOptions, Refusal};
 use sastrugi_numeric::{Geometry, Grid};
 use std::fs::File;
-use std::io::{BufReader, Read};
+use std::io::BufReader;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -31,29 +30,19 @@ enum Rows {
     Held(Grid, DemInfo),
 }
 
-/// Opens a raster for reading rows.
-///
-/// # Errors
-/// As [`super::read`]; what is wrong with the cells themselves is found when they are read.
-pub fn open(path: &Path, options: &ReadOptions) -> Result<BlockReader, DemError> {
-    let reading = |e| DemError::reading(path, e);
-    let mut first = Vec::new();
-    File::open(path).map_err(reading)?.take(SNIFFED_BYTES).read_to_end(&mut first).map_err(reading)?;
-    let rows = match format_of(path, &first) {
-        Some(Format::GeoTiff) => {
-            let raster = Raster::open(path, options, ROWS_OF_BLOCKS)?;
-            check_place(&raster.geometry).map_err(|refusal| refusal.about(path))?;
-            Rows::File(raster)
-        }
-        _ => {
-            let dem = read_with(path, options)?;
-            Rows::Held(dem.grid, dem.info)
-        }
-    };
-    Ok(BlockReader { path: path.to_owned(), rows })
-}
-
 impl BlockReader {
+    /// Of a GeoTIFF, decoded as its rows are asked for.
+    pub(super) fn of_geotiff(path: &Path, options: &ReadOptions) -> Result<Self, DemError> {
+        let raster = Raster::open(path, options, ROWS_OF_BLOCKS)?;
+        check_place(&raster.geometry).map_err(|refusal| refusal.about(path))?;
+        Ok(Self { path: path.to_owned(), rows: Rows::File(raster) })
+    }
+
+    /// Of a raster that was read whole.
+    pub(super) fn of_dem(path: &Path, dem: Dem) -> Self {
+        Self { path: path.to_owned(), rows: Rows::Held(dem.grid, dem.info) }
+    }
+
     /// Shape and place of the whole raster.
     pub fn geometry(&self) -> Geometry {
         match &self.rows {

@@ -69,6 +69,12 @@ impl Crs {
         notes.into_iter().flatten().collect()
     }
 
+    /// The sentence for those who write to a format that keeps no system.
+    pub(super) fn loss_notes(&self) -> Vec<String> {
+        let known = *self != Self::default();
+        known.then(|| "the format keeps no coordinate reference system".to_owned()).into_iter().collect()
+    }
+
     fn get(&self, id: u16) -> Option<&GeoKey> {
         self.keys.iter().find(|(key, _)| *key == id).map(|(_, value)| value)
     }

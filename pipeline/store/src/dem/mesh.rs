@@ -4,6 +4,7 @@
 //! side runs from north-west to south-east. A triangle with a corner without data is left out.
 
 use super::checks::check_single_precision;
+use super::crs::Crs;
 use super::raster::Refusal;
 use sastrugi_numeric::Grid;
 use serde_json::json;
@@ -157,6 +158,13 @@ pub(super) fn usda(grid: &Grid) -> Result<Vec<u8>, Refusal> {
          uniform token subdivisionScheme = \"none\"\n    }\n}\n",
     );
     Ok(text.into_bytes())
+}
+
+/// Sentences on what the formats of single precision lose, whose coordinates must stay small.
+pub(super) fn local_notes(grid: &Grid, crs: &Crs) -> Vec<String> {
+    let [x, y] = grid.geometry.origin;
+    let shift = format!("x and y of the mesh count from the DEM's south-west corner, ({x}, {y})");
+    crs.loss_notes().into_iter().chain(([x, y] != [0.0; 2]).then_some(shift)).collect()
 }
 
 /// Values with commas between them.

@@ -12,7 +12,9 @@ mod ascii;
 mod band;
 mod blocks;
 mod checks;
+mod classes;
 mod crs;
+mod formats;
 mod geotiff;
 mod hgt;
 mod mesh;
@@ -27,26 +29,28 @@ mod tiff_writer;
 mod tests;
 
 pub use band::Values;
-pub use blocks::{BlockReader, open};
+pub use blocks::BlockReader;
+pub use classes::{read_classes, write_classes};
 pub use crs::{Crs, GeoKey};
+pub use formats::WRITTEN_ENDINGS;
 pub use png::{HeightScale, write_png_heights, write_png16};
 pub use raster::{Claimed, Compression, Dem, DemError, DemInfo, Format, MAX_CELLS, NO_DATA, ReadOptions, WriteOptions};
 
+pub(crate) use ascii::looks_like as is_grid_text;
 pub(crate) use raster::Refusal;
 
 use crate::atomic::Target;
 use checks::checked;
+use formats::READ_FORMATS;
 use points::GridSettings;
 use raster::save;
 use sastrugi_numeric::Grid;
-use std::fs::{self, File};
-use std::io::Read;
+use std::fs::File;
+use std::io::{self, Read};
 use std::path::Path;
 
-/// Bytes that tell a point cloud, which is not read whole.
-const SNIFFED_BYTES: u64 = 4;
-/// Endings of names that [`write()`] takes.
-pub const WRITTEN_ENDINGS: &str = ".tif, .asc, .hgt, .png, .npy, .obj, .glb and .usda";
+/// Number of the first bytes of a file, which tell what is not read whole.
+const FIRST_BYTES: u64 = 4;
 
 /// Reads a raster.
 ///
@@ -72,81 +76,61 @@ pub fn read_with(path: &Path, options: &ReadOptions) -> Result<Dem, DemError> {
 /// As [`read`]; also [`DemError::Unfit`] when a setting is out of range, or the file is a raster, which takes none.
 pub fn read_gridded(path: &Path, options: &ReadOptions, settings: &GridSettings) -> Result<Dem, DemError> {
     let reading = |e| DemError::reading(path, e);
-    let mut file = File::open(path).map_err(reading)?;
-    let mut bytes = Vec::new();
-    file.by_ref().take(SNIFFED_BYTES).read_to_end(&mut bytes).map_err(reading)?;
-    if points::looks_like(&bytes) {
-        let cell_m = settings.cell_m.map_or_else(|| square_cell(path, options), |cell| Ok(Some(cell)))?;
-        return Ok(points::read_open(path, file, &GridSettings { cell_m, ..*settings })?.dem);
+    let (mut file, mut bytes) = opened(path).map_err(reading)?;
+    let codec = formats::of_start(&bytes);
+    if let Some(grid) = codec.and_then(|codec| codec.grid) {
+        return grid(path, file, options, settings);
     }
     if (GridSettings { cell_m: None, ..*settings }) != GridSettings::default() {
-        let reason = "is no point cloud; statistic, filling and ground points are for .las and .laz".to_owned();
-        return Err(DemError::Unfit { path: path.to_owned(), reason });
+        let reason = "is no point cloud; statistic, filling and ground points are for .las and .laz";
+        return Err(Refusal::new(reason).unfit(path));
     }
-    if geotiff::looks_like(&bytes) {
-        return geotiff::read(path, options).and_then(|dem| checked(dem).map_err(|refusal| refusal.about(path)));
-    }
-    file.read_to_end(&mut bytes).map_err(reading)?;
-    parse(path, bytes, options).and_then(checked).map_err(|refusal| refusal.about(path))
-}
-
-/// The claims of a GeoTIFF, PNG, LAS or LAZ file; `None` for other formats, whose files have a byte or more for a cell, and
-/// for files that cannot be read.
-pub fn claimed(path: &Path, options: &ReadOptions) -> Option<Claimed> {
-    let mut file = File::open(path).ok()?;
-    let mut first = Vec::new();
-    file.by_ref().take(SNIFFED_BYTES).read_to_end(&mut first).ok()?;
-    if points::looks_like(&first) {
-        return points::claimed(file, options.cell_m.map(|[x, y]| x.min(y)));
-    }
-    match first.as_slice() {
-        bytes if geotiff::looks_like(bytes) => geotiff::claimed(path, options),
-        [0x89, b'P', b'N', b'G'] => png::claimed(file, options),
-        _ => None,
-    }
-}
-
-fn square_cell(path: &Path, options: &ReadOptions) -> Result<Option<f64>, DemError> {
-    match options.cell_m {
-        Some([x, y]) if x != y => {
-            let reason = format!("a point cloud is gridded to square cells, not to cells of {x} x {y} m");
-            Err(DemError::Unfit { path: path.to_owned(), reason })
+    let dem = match codec.and_then(|codec| codec.stream) {
+        Some(stream) => stream(path, options)?,
+        None => {
+            file.read_to_end(&mut bytes).map_err(reading)?;
+            parse(path, bytes, options).map_err(|refusal| refusal.about(path))?
         }
-        cell => Ok(cell.map(|[side, _]| side)),
-    }
+    };
+    checked(dem).map_err(|refusal| refusal.about(path))
 }
 
-/// True for the text of an ESRI ASCII grid.
-pub(crate) fn is_grid_text(bytes: &[u8]) -> bool {
-    ascii::looks_like(bytes)
-}
-
-/// The format of a file: by its first bytes, and by its name where those say nothing.
-fn format_of(path: &Path, bytes: &[u8]) -> Option<Format> {
-    match bytes {
-        _ if geotiff::looks_like(bytes) => Some(Format::GeoTiff),
-        [0x93, b'N', b'U', b'M', b'P', b'Y', ..] => Some(Format::Npy),
-        [0x89, b'P', b'N', b'G', ..] => Some(Format::Png),
-        _ if ascii::looks_like(bytes) => Some(Format::EsriAscii),
-        _ => Format::of_name(path),
-    }
+/// A file behind its first bytes, and these.
+fn opened(path: &Path) -> io::Result<(File, Vec<u8>)> {
+    let mut file = File::open(path)?;
+    let mut first = Vec::new();
+    file.by_ref().take(FIRST_BYTES).read_to_end(&mut first)?;
+    Ok((file, first))
 }
 
 fn parse(path: &Path, bytes: Vec<u8>, options: &ReadOptions) -> Result<Dem, Refusal> {
     if bytes.is_empty() {
         return Err(Refusal::new("the file is empty"));
     }
-    match format_of(path, &bytes) {
-        Some(Format::GeoTiff) => geotiff::parse(bytes, options),
-        Some(Format::EsriAscii) => ascii::parse(&bytes, fs::read_to_string(path.with_extension("prj")).ok().as_deref()),
-        Some(Format::Hgt) => hgt::parse(path, &bytes),
-        Some(Format::Npy) => npy::parse(&bytes, options),
-        Some(Format::Png) => png::parse(&bytes, options),
-        Some(Format::Las) => Err(Refusal::new("is no point cloud: LAS and LAZ files start with \"LASF\"")),
-        Some(Format::Obj | Format::Glb | Format::Usda) | None => Err(Refusal::new(
-            "is no raster that can be read; GeoTIFF, ESRI ASCII, .hgt, .npy, greyscale .png, .las and .laz can",
-        )),
+    match formats::of_raster(path, &bytes).and_then(|codec| codec.parse) {
+        Some(parse) => parse(path, bytes, options),
+        None => Err(Refusal::new(format!("is no raster that can be read; {READ_FORMATS} can"))),
     }
+}
+
+/// Opens a raster for reading rows.
+///
+/// # Errors
+/// As [`read`]; what is wrong with the cells themselves is found when they are read.
+pub fn open(path: &Path, options: &ReadOptions) -> Result<BlockReader, DemError> {
+    let (_, first) = opened(path).map_err(|e| DemError::reading(path, e))?;
+    match formats::of_raster(path, &first).and_then(|codec| codec.open) {
+        Some(open) => open(path, options),
+        None => read_with(path, options).map(|dem| BlockReader::of_dem(path, dem)),
+    }
+}
+
+/// The claims of a GeoTIFF, PNG, LAS or LAZ file; `None` for other formats, whose files have a byte or more for a cell, and
+/// for files that cannot be read.
+pub fn claimed(path: &Path, options: &ReadOptions) -> Option<Claimed> {
+    let (file, first) = opened(path).ok()?;
+    let claimed = formats::of_start(&first)?.claimed?;
+    claimed(path, file, options)
 }
 
 /// Writes heights in the format of the name's ending: `.tif` (float32, tiles of 256, no data -9999, PixelIsArea),
@@ -162,60 +146,15 @@ pub fn write<'a>(
     options: &WriteOptions,
 ) -> Result<Vec<String>, DemError> {
     let target = target.into();
-    let path = target.path;
-    let unfit = |refusal: Refusal| refusal.unfit(path);
-    let (bytes, notes) = match Format::of_name(path) {
-        Some(Format::GeoTiff) => (tiff_writer::heights(grid, crs, options).map_err(unfit)?, vec![]),
-        Some(Format::EsriAscii) => (ascii::render(grid).map_err(unfit)?, lost_crs(crs)),
-        Some(Format::Hgt) => hgt::render(path, grid, crs).map_err(unfit)?,
-        Some(Format::Npy) => (npy::render(grid), vec!["a .npy file keeps no cell size, place or CRS".to_owned()]),
-        Some(Format::Png) => {
-            let scale = write_png_heights(target, grid)?;
-            return Ok(vec![scale.sentence()]);
-        }
-        Some(Format::Obj) => (mesh::obj(grid).map_err(unfit)?, lost_crs(crs)),
-        Some(Format::Glb) => (mesh::glb(grid).map_err(unfit)?, shifted(grid, crs)),
-        Some(Format::Usda) => (mesh::usda(grid).map_err(unfit)?, shifted(grid, crs)),
-        Some(Format::Las) => return Err(unfit(Refusal::new("point clouds are read, not written"))),
-        None => {
-            return Err(unfit(Refusal::new(format!("the ending names no DEM format; {WRITTEN_ENDINGS} do"))));
-        }
-    };
+    let (bytes, notes) = render(target.path, grid, crs, options).map_err(|refusal| refusal.unfit(target.path))?;
     save(target, &bytes)?;
     Ok(notes)
 }
 
-fn lost_crs(crs: &Crs) -> Vec<String> {
-    let known = *crs != Crs::default();
-    known.then(|| "the format keeps no coordinate reference system".to_owned()).into_iter().collect()
-}
-
-/// As [`lost_crs`], for meshes of single precision, whose coordinates must stay small.
-fn shifted(grid: &Grid, crs: &Crs) -> Vec<String> {
-    let [x, y] = grid.geometry.origin;
-    let shift = format!("x and y of the mesh count from the DEM's south-west corner, ({x}, {y})");
-    lost_crs(crs).into_iter().chain(([x, y] != [0.0; 2]).then_some(shift)).collect()
-}
-
-/// Writes a class map: 8-bit GeoTIFF, no data 255.
-///
-/// # Errors
-/// The file cannot be written.
-pub fn write_classes<'a>(target: impl Into<Target<'a>>, grid: &Grid<u8>, crs: &Crs) -> Result<(), DemError> {
-    let target = target.into();
-    save(target, &tiff_writer::classes(grid, crs).map_err(|refusal| refusal.unfit(target.path))?)
-}
-
-/// Reads a class map that [`write_classes`] wrote.
-///
-/// # Errors
-/// As [`read`]; also when the raster is not of 8-bit classes.
-pub fn read_classes(path: &Path) -> Result<Grid<u8>, DemError> {
-    let bytes = fs::read(path).map_err(|e| DemError::reading(path, e))?;
-    let dem = geotiff::parse(bytes, &ReadOptions::default()).map_err(|refusal| refusal.about(path))?;
-    if dem.info.dtype != "uint8" {
-        return Err(Refusal::new(format!("holds {} values, not classes", dem.info.dtype)).about(path));
-    }
-    let no_data = sastrugi_schemas::RoughnessClass::NO_DATA;
-    Ok(dem.grid.map(|v| if v.is_nan() { no_data } else { v as u8 }))
+/// The bytes of a file, and sentences on what the format lost.
+fn render(path: &Path, grid: &Grid, crs: &Crs, options: &WriteOptions) -> Result<(Vec<u8>, Vec<String>), Refusal> {
+    let unknown = || Refusal::new(format!("the ending names no DEM format; {WRITTEN_ENDINGS} do"));
+    let codec = formats::of_name(path).ok_or_else(unknown)?;
+    let render = codec.render.ok_or_else(|| Refusal::new("point clouds are read, not written"))?;
+    render(path, grid, crs, options)
 }

@@ -6,6 +6,11 @@ use super::crs::Crs;
 use super::raster::{Dem, DemInfo, Format, ReadOptions, Refusal, unplaced};
 use sastrugi_numeric::Grid;
 
+/// True for the first bytes of an array's file.
+pub(super) fn looks_like(bytes: &[u8]) -> bool {
+    bytes.starts_with(b"\x93NUMPY")
+}
+
 /// Reads an array.
 pub(super) fn parse(bytes: &[u8], options: &ReadOptions) -> Result<Dem, Refusal> {
     let (header, data) = split(bytes).ok_or_else(|| Refusal::new("its NumPy header breaks off"))?;
@@ -111,8 +116,8 @@ fn transposed(columns: &[f64], rows: usize, cols: usize) -> Vec<f64> {
     (0..rows).flat_map(|r| (0..cols).map(move |c| columns[c * rows + r])).collect()
 }
 
-/// The heights as a float64 array, `NaN` without data.
-pub(super) fn render(grid: &Grid) -> Vec<u8> {
+/// The heights as a float64 array, `NaN` without data, and a sentence on what is lost.
+pub(super) fn render(grid: &Grid) -> (Vec<u8>, Vec<String>) {
     let shape = format!("({}, {})", grid.rows(), grid.cols());
     let dictionary = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}");
     // Magic, version and length take 10 bytes; header and all fill a multiple of 64 and end in a line feed.
@@ -123,5 +128,5 @@ pub(super) fn render(grid: &Grid) -> Vec<u8> {
     bytes.extend((header.len() as u16).to_le_bytes());
     bytes.extend(header.as_bytes());
     bytes.extend(grid.values.iter().flat_map(|v| v.to_le_bytes()));
-    bytes
+    (bytes, vec!["a .npy file keeps no cell size, place or CRS".to_owned()])
 }

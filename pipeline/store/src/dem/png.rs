@@ -49,6 +49,11 @@ impl HeightScale {
     }
 }
 
+/// True for the first bytes of a PNG.
+pub(super) fn looks_like(bytes: &[u8]) -> bool {
+    bytes.starts_with(b"\x89PNG")
+}
+
 /// What the header says, from after the first four bytes of the file: the rest of the signature, the length and the name of
 /// the first chunk, width, height.
 pub(super) fn claimed(mut file: File, options: &ReadOptions) -> Option<Claimed> {
@@ -80,10 +85,19 @@ pub(super) fn levels(grid: &Grid<u16>) -> Result<Vec<u8>, Refusal> {
 /// As [`write_png16`].
 pub fn write_png_heights<'a>(target: impl Into<Target<'a>>, grid: &Grid) -> Result<HeightScale, DemError> {
     let target = target.into();
-    let scale = HeightScale::of(grid);
-    let encoded = encode(&grid.map(|v| scale.level(v)), Some(scale));
-    save(target, &encoded.map_err(|refusal| refusal.unfit(target.path))?)?;
+    let (bytes, scale) = scaled(grid).map_err(|refusal| refusal.unfit(target.path))?;
+    save(target, &bytes)?;
     Ok(scale)
+}
+
+/// The bytes of heights as levels, and the sentence on their scale.
+pub(super) fn render(grid: &Grid) -> Result<(Vec<u8>, Vec<String>), Refusal> {
+    scaled(grid).map(|(bytes, scale)| (bytes, vec![scale.sentence()]))
+}
+
+fn scaled(grid: &Grid) -> Result<(Vec<u8>, HeightScale), Refusal> {
+    let scale = HeightScale::of(grid);
+    Ok((encode(&grid.map(|v| scale.level(v)), Some(scale))?, scale))
 }
 
 fn encode(grid: &Grid<u16>, scale: Option<HeightScale>) -> Result<Vec<u8>, Refusal> {

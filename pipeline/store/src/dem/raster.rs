@@ -42,7 +42,7 @@ pub struct DemInfo {
     pub notes: Vec<String>,
 }
 
-/// Raster formats.
+/// Raster formats; `formats.rs` says what each can do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
     /// TIFF with or without GeoTIFF tags.
@@ -63,45 +63,6 @@ pub enum Format {
     Usda,
     /// Point cloud, LAS or LAZ, which is gridded ([`super::points`]); read only.
     Las,
-}
-
-impl Format {
-    /// Name in tables.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::GeoTiff => "geotiff",
-            Self::EsriAscii => "esri_ascii",
-            Self::Hgt => "hgt",
-            Self::Npy => "npy",
-            Self::Png => "png",
-            Self::Obj => "obj",
-            Self::Glb => "glb",
-            Self::Usda => "usda",
-            Self::Las => "las",
-        }
-    }
-
-    /// The format of a file name's ending.
-    pub fn of_name(path: &Path) -> Option<Self> {
-        let ending = path.extension()?.to_str()?.to_ascii_lowercase();
-        match ending.as_str() {
-            "tif" | "tiff" => Some(Self::GeoTiff),
-            "asc" => Some(Self::EsriAscii),
-            "hgt" => Some(Self::Hgt),
-            "npy" => Some(Self::Npy),
-            "png" => Some(Self::Png),
-            "obj" => Some(Self::Obj),
-            "glb" => Some(Self::Glb),
-            "usda" => Some(Self::Usda),
-            "las" | "laz" => Some(Self::Las),
-            _ => None,
-        }
-    }
-
-    /// True for formats that state metres, so that a raster in degrees is converted before it is written.
-    pub fn in_metres(self) -> bool {
-        matches!(self, Self::Obj | Self::Glb | Self::Usda)
-    }
 }
 
 /// Why a raster was not read or written.

@@ -31,7 +31,7 @@ mod tests;
 use super::band::Values;
 use super::checks::checked;
 use super::crs::Crs;
-use super::raster::{Claimed, Dem, DemError, DemInfo, Format, MAX_CELLS, Refusal};
+use super::raster::{Claimed, Dem, DemError, DemInfo, Format, MAX_CELLS, ReadOptions, Refusal};
 use cloud::{Cloud, Point};
 use grid::Cells;
 use header::Claims;
@@ -126,8 +126,29 @@ pub fn read(path: &Path, settings: &GridSettings) -> Result<Gridded, DemError> {
     read_open(path, file, settings)
 }
 
+/// The DEM of a cloud whose file is open. Its cell size is that of the settings, or else that of the options.
+pub(super) fn read_dem(
+    path: &Path,
+    file: File,
+    options: &ReadOptions,
+    settings: &GridSettings,
+) -> Result<Dem, DemError> {
+    let square = || square_cell(options).map_err(|refusal| refusal.unfit(path));
+    let cell_m = settings.cell_m.map_or_else(square, |cell| Ok(Some(cell)))?;
+    Ok(read_open(path, file, &GridSettings { cell_m, ..*settings })?.dem)
+}
+
+fn square_cell(options: &ReadOptions) -> Result<Option<f64>, Refusal> {
+    match options.cell_m {
+        Some([x, y]) if x != y => {
+            Err(Refusal::new(format!("a point cloud is gridded to square cells, not to cells of {x} x {y} m")))
+        }
+        cell => Ok(cell.map(|[side, _]| side)),
+    }
+}
+
 /// As [`read`], with the file open already.
-pub(super) fn read_open(path: &Path, file: File, settings: &GridSettings) -> Result<Gridded, DemError> {
+fn read_open(path: &Path, file: File, settings: &GridSettings) -> Result<Gridded, DemError> {
     check(settings).map_err(|reason| DemError::Unfit { path: path.to_owned(), reason })?;
     Cloud::open(path, file).and_then(|cloud| gridded(&cloud, settings)).map_err(|refusal| refusal.about(path))
 }

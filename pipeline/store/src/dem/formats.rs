@@ -1,0 +1,170 @@
+//! The table of formats: how each is told, read and written. It names the formats; none of them knows it.
+
+use super::blocks::BlockReader;
+use super::crs::Crs;
+use super::points::{self, GridSettings};
+use super::raster::{Claimed, Dem, DemError, Format, ReadOptions, Refusal, WriteOptions};
+use super::{ascii, geotiff, hgt, mesh, npy, png, tiff_writer};
+use sastrugi_numeric::Grid;
+use std::fs::File;
+use std::path::Path;
+
+/// Endings of names that [`super::write()`] takes.
+pub const WRITTEN_ENDINGS: &str = ".tif, .asc, .hgt, .png, .npy, .obj, .glb and .usda";
+/// What can be read, in words.
+pub(super) const READ_FORMATS: &str = "GeoTIFF, ESRI ASCII, .hgt, .npy, greyscale .png, .las and .laz";
+
+/// What the program does with a format.
+pub(super) struct Codec {
+    format: Format,
+    /// Name in tables.
+    name: &'static str,
+    /// Endings of file names, in lower case.
+    endings: &'static [&'static str],
+    /// True for the first bytes of such a file.
+    starts: fn(&[u8]) -> bool,
+    /// Grids the points of a file; takes it open, at any place.
+    pub grid: Option<fn(&Path, File, &ReadOptions, &GridSettings) -> Result<Dem, DemError>>,
+    /// Reads a raster without holding its bytes.
+    pub stream: Option<fn(&Path, &ReadOptions) -> Result<Dem, DemError>>,
+    /// Reads a raster from all of its bytes.
+    pub parse: Option<fn(&Path, Vec<u8>, &ReadOptions) -> Result<Dem, Refusal>>,
+    /// Opens a raster whose rows are decoded as they are asked for.
+    pub open: Option<fn(&Path, &ReadOptions) -> Result<BlockReader, DemError>>,
+    /// What the header says of the size; takes the file open, behind its first bytes.
+    pub claimed: Option<fn(&Path, File, &ReadOptions) -> Option<Claimed>>,
+    /// The bytes of a file, and sentences on what it lost.
+    pub render: Option<fn(&Path, &Grid, &Crs, &WriteOptions) -> Result<(Vec<u8>, Vec<String>), Refusal>>,
+    /// States metres.
+    in_metres: bool,
+}
+
+impl Codec {
+    /// A format that can do nothing yet.
+    const fn new(format: Format, name: &'static str, endings: &'static [&'static str]) -> Self {
+        Self {
+            format,
+            name,
+            endings,
+            starts: |_| false,
+            grid: None,
+            stream: None,
+            parse: None,
+            open: None,
+            claimed: None,
+            render: None,
+            in_metres: false,
+        }
+    }
+}
+
+/// One entry for each format. No start of a file is that of two.
+static CODECS: [Codec; 9] = [
+    Codec {
+        starts: geotiff::looks_like,
+        stream: Some(geotiff::read),
+        parse: Some(|_, bytes, options| geotiff::parse(bytes, options)),
+        open: Some(BlockReader::of_geotiff),
+        claimed: Some(|path, _, options| geotiff::claimed(path, options)),
+        render: Some(|_, grid, crs, options| Ok((tiff_writer::heights(grid, crs, options)?, vec![]))),
+        ..Codec::new(Format::GeoTiff, "geotiff", &["tif", "tiff"])
+    },
+    Codec {
+        starts: ascii::looks_like,
+        parse: Some(|path, bytes, _| ascii::parse(path, &bytes)),
+        render: Some(|_, grid, crs, _| ascii::render(grid, crs)),
+        ..Codec::new(Format::EsriAscii, "esri_ascii", &["asc"])
+    },
+    Codec {
+        parse: Some(|path, bytes, _| hgt::parse(path, &bytes)),
+        render: Some(|path, grid, crs, _| hgt::render(path, grid, crs)),
+        ..Codec::new(Format::Hgt, "hgt", &["hgt"])
+    },
+    Codec {
+        starts: npy::looks_like,
+        parse: Some(|_, bytes, options| npy::parse(&bytes, options)),
+        render: Some(|_, grid, _, _| Ok(npy::render(grid))),
+        ..Codec::new(Format::Npy, "npy", &["npy"])
+    },
+    Codec {
+        starts: png::looks_like,
+        parse: Some(|_, bytes, options| png::parse(&bytes, options)),
+        claimed: Some(|_, file, options| png::claimed(file, options)),
+        render: Some(|_, grid, _, _| png::render(grid)),
+        ..Codec::new(Format::Png, "png", &["png"])
+    },
+    Codec {
+        render: Some(|_, grid, crs, _| Ok((mesh::obj(grid)?, crs.loss_notes()))),
+        in_metres: true,
+        ..Codec::new(Format::Obj, "obj", &["obj"])
+    },
+    Codec {
+        render: Some(|_, grid, crs, _| Ok((mesh::glb(grid)?, mesh::local_notes(grid, crs)))),
+        in_metres: true,
+        ..Codec::new(Format::Glb, "glb", &["glb"])
+    },
+    Codec {
+        render: Some(|_, grid, crs, _| Ok((mesh::usda(grid)?, mesh::local_notes(grid, crs)))),
+        in_metres: true,
+        ..Codec::new(Format::Usda, "usda", &["usda"])
+    },
+    Codec {
+        starts: points::looks_like,
+        grid: Some(points::read_dem),
+        // A cloud only by its name.
+        parse: Some(|_, _, _| Err(Refusal::new("is no point cloud: LAS and LAZ files start with \"LASF\""))),
+        claimed: Some(|_, file, options| points::claimed(file, options.cell_m.map(|[x, y]| x.min(y)))),
+        ..Codec::new(Format::Las, "las", &["las", "laz"])
+    },
+];
+
+/// The format that a file's first bytes tell.
+pub(super) fn of_start(bytes: &[u8]) -> Option<&'static Codec> {
+    CODECS.iter().find(|codec| (codec.starts)(bytes))
+}
+
+/// The format of a raster: by its first bytes, and by its name where those tell none, or a point cloud.
+pub(super) fn of_raster(path: &Path, bytes: &[u8]) -> Option<&'static Codec> {
+    of_start(bytes).filter(|codec| codec.grid.is_none()).or_else(|| of_name(path))
+}
+
+/// The format of a file name's ending.
+pub(super) fn of_name(path: &Path) -> Option<&'static Codec> {
+    let ending = path.extension()?.to_str()?.to_ascii_lowercase();
+    CODECS.iter().find(|codec| codec.endings.contains(&ending.as_str()))
+}
+
+impl Format {
+    fn codec(self) -> &'static Codec {
+        CODECS.iter().find(|codec| codec.format == self).expect("every format stands in the table")
+    }
+
+    /// Name in tables.
+    pub fn name(self) -> &'static str {
+        self.codec().name
+    }
+
+    /// The format of a file name's ending.
+    pub fn of_name(path: &Path) -> Option<Self> {
+        of_name(path).map(|codec| codec.format)
+    }
+
+    /// True for formats that state metres, so that a raster in degrees is converted before it is written.
+    pub fn in_metres(self) -> bool {
+        self.codec().in_metres
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn val_the_endings_in_words_are_those_of_the_table() {
+        let words = WRITTEN_ENDINGS.replace(" and ", ", ");
+        let named: BTreeSet<&str> = words.split(", ").map(|ending| ending.trim_start_matches('.')).collect();
+        let written = CODECS.iter().filter(|codec| codec.render.is_some()).map(|codec| codec.endings[0]);
+        assert_eq!(named, written.collect());
+    }
+}
