@@ -13,7 +13,7 @@
 //! Cost: one pass over the points for every five sizes; one bit per cell.
 
 use super::lattice::Lattice;
-use super::{Chosen, Survey};
+use super::survey::{Chosen, Survey};
 use crate::dem::raster::{MAX_CELLS, Refusal};
 
 /// Share of cells with points that is sought.

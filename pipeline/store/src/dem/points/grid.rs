@@ -1,7 +1,8 @@
 //! Statistics of the points of each cell.
 
 use super::lattice::Lattice;
-use super::{Chosen, MAX_RANKED_POINTS, Statistic};
+use super::settings::{MAX_RANKED_POINTS, Statistic};
+use super::survey::Chosen;
 use crate::dem::raster::Refusal;
 
 /// Heights (`NaN` without points) and numbers of points, cell by cell.

@@ -1,6 +1,6 @@
 //! Which cell a point falls in.
 
-use super::Survey;
+use super::survey::Survey;
 use crate::dem::raster::{MAX_CELLS, Refusal};
 use sastrugi_numeric::Geometry;
 

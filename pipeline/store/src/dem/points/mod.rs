@@ -24,86 +24,25 @@ mod fill;
 mod grid;
 mod header;
 mod lattice;
+mod settings;
+mod survey;
 
 #[cfg(test)]
 mod tests;
 
+pub use settings::{GridSettings, MAX_FILL_CELLS, MAX_RANKED_POINTS, Statistic};
+
 use super::band::Values;
 use super::checks::checked;
-use super::crs::Crs;
 use super::raster::{Claimed, Dem, DemError, DemInfo, Format, MAX_CELLS, ReadOptions, Refusal};
-use cloud::{Cloud, Point};
+use cloud::Cloud;
 use grid::Cells;
 use header::Claims;
 use lattice::Lattice;
 use sastrugi_numeric::Grid;
 use std::fs::File;
 use std::path::Path;
-use std::str::FromStr;
-
-/// Most points of which a median or a percentile is taken: 2 GiB.
-pub const MAX_RANKED_POINTS: u64 = 1 << 28;
-/// Furthest that a gap is filled, cells.
-pub const MAX_FILL_CELLS: u32 = 100;
-
-/// How points become cells.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct GridSettings {
-    /// Side of a cell, m; without it, the size at which about three quarters of the cells hold a point.
-    pub cell_m: Option<f64>,
-    /// Which height a cell takes.
-    pub statistic: Statistic,
-    /// How far from a cell with points a gap is filled, cells; 0 fills none.
-    pub fill_cells: u32,
-    /// Take only points of class 2, ground. Withheld points and those of the noise classes 7 and 18 are never taken.
-    pub ground_only: bool,
-}
-
-/// The height of a cell, from those of its points.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub enum Statistic {
-    /// Their mean.
-    #[default]
-    Mean,
-    /// The 50th percentile.
-    Median,
-    /// A percentile, 0 to 100.
-    Percentile(f64),
-    /// The lowest.
-    Min,
-    /// The highest.
-    Max,
-}
-
-impl FromStr for Statistic {
-    type Err = String;
-
-    /// `mean`, `median`, `min`, `max`, or `p` and a percentage.
-    fn from_str(text: &str) -> Result<Self, String> {
-        let percentile = || text.strip_prefix('p')?.parse().ok().filter(|p| (0.0..=100.0).contains(p));
-        match text {
-            "mean" => Ok(Self::Mean),
-            "median" => Ok(Self::Median),
-            "min" => Ok(Self::Min),
-            "max" => Ok(Self::Max),
-            _ => percentile().map(Self::Percentile).ok_or_else(|| {
-                format!("is \"{text}\"; it must be mean, median, min, max, or p0 to p100 for a percentile")
-            }),
-        }
-    }
-}
-
-impl Statistic {
-    fn name(self) -> String {
-        match self {
-            Self::Mean => "mean".to_owned(),
-            Self::Median => "median".to_owned(),
-            Self::Percentile(p) => format!("percentile {p}"),
-            Self::Min => "lowest".to_owned(),
-            Self::Max => "highest".to_owned(),
-        }
-    }
-}
+use survey::{Chosen, survey};
 
 /// A gridded cloud.
 #[derive(Clone, Debug, PartialEq)]
@@ -149,7 +88,7 @@ fn square_cell(options: &ReadOptions) -> Result<Option<f64>, Refusal> {
 
 /// As [`read`], with the file open already.
 fn read_open(path: &Path, file: File, settings: &GridSettings) -> Result<Gridded, DemError> {
-    check(settings).map_err(|reason| DemError::Unfit { path: path.to_owned(), reason })?;
+    settings::check(settings).map_err(|reason| DemError::Unfit { path: path.to_owned(), reason })?;
     Cloud::open(path, file).and_then(|cloud| gridded(&cloud, settings)).map_err(|refusal| refusal.about(path))
 }
 
@@ -168,21 +107,6 @@ pub(super) fn claimed(mut file: File, cell_m: Option<f64>) -> Option<Claimed> {
 /// True for the first bytes of a point cloud.
 pub(super) fn looks_like(bytes: &[u8]) -> bool {
     bytes.starts_with(header::SIGNATURE)
-}
-
-fn check(settings: &GridSettings) -> Result<(), String> {
-    if let Some(cell) = settings.cell_m.filter(|cell| !(cell.is_finite() && *cell > 0.0)) {
-        return Err(format!("the cell size is {cell} m; it must be above 0"));
-    }
-    if let Statistic::Percentile(p) = settings.statistic
-        && !(0.0..=100.0).contains(&p)
-    {
-        return Err(format!("the percentile is {p}; it must be 0 to 100"));
-    }
-    if settings.fill_cells > MAX_FILL_CELLS {
-        return Err(format!("gaps are filled up to {} cells; at most {MAX_FILL_CELLS} can be", settings.fill_cells));
-    }
-    Ok(())
 }
 
 fn gridded(cloud: &Cloud, settings: &GridSettings) -> Result<Gridded, Refusal> {
@@ -221,69 +145,4 @@ fn gridded(cloud: &Cloud, settings: &GridSettings) -> Result<Gridded, Refusal> {
     };
     let dem = checked(Dem { grid: Grid::new(geometry, heights), info })?;
     Ok(Gridded { dem, counts: Grid::new(geometry, counts), filled })
-}
-
-/// The points of a cloud that are wanted.
-struct Chosen<'a> {
-    cloud: &'a Cloud,
-    ground_only: bool,
-}
-
-impl Chosen<'_> {
-    fn for_each(&self, mut f: impl FnMut(Point)) -> Result<(), Refusal> {
-        self.cloud.for_each(|point| {
-            if !point.is_noise() && (point.is_ground() || !self.ground_only) {
-                f(point);
-            }
-        })
-    }
-}
-
-/// Where the wanted points lie.
-#[derive(Clone, Copy, Debug)]
-struct Survey {
-    points: u64,
-    /// Lowest and highest x and y.
-    low: [f64; 2],
-    high: [f64; 2],
-}
-
-/// Looks at every point once; also returns what a user must know of those that are left out.
-fn survey(chosen: &Chosen<'_>) -> Result<(Survey, Vec<String>), Refusal> {
-    let cloud = chosen.cloud;
-    let (mut points, mut noise, mut other) = (0_u64, 0_u64, 0_u64);
-    let (mut low, mut high) = ([i32::MAX; 2], [i32::MIN; 2]);
-    cloud.for_each(|point| {
-        if point.is_noise() {
-            noise += 1;
-        } else if chosen.ground_only && !point.is_ground() {
-            other += 1;
-        } else {
-            points += 1;
-            for axis in 0..2 {
-                low[axis] = low[axis].min(point.stored[axis]);
-                high[axis] = high[axis].max(point.stored[axis]);
-            }
-        }
-    })?;
-    let total = cloud.claims.points;
-    if points == 0 && other > 0 {
-        return Err(Refusal::new(format!("none of its {total} points is of class 2, ground")));
-    }
-    if points == 0 {
-        return Err(Refusal::new(format!("all of its {total} points are withheld or noise")));
-    }
-    let place = |stored: [i32; 2]| [0, 1].map(|axis| cloud.coordinate(axis, f64::from(stored[axis])));
-    let survey = Survey { points, low: place(low), high: place(high) };
-    let mut notes = cloud.crs.unit_notes();
-    if cloud.crs == Crs::default() {
-        notes.push("the file names no reference system; coordinates are taken as metres".to_owned());
-    }
-    if noise > 0 {
-        notes.push(format!("{noise} points that are withheld or noise (classes 7 and 18) were left out"));
-    }
-    if other > 0 {
-        notes.push(format!("{other} points of other classes than ground (2) were left out"));
-    }
-    Ok((survey, notes))
 }

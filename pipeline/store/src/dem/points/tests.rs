@@ -1,5 +1,5 @@
 use super::*;
-use crate::dem::{self, ReadOptions, WriteOptions};
+use crate::dem::{self, Crs, ReadOptions, WriteOptions};
 use las::point::Classification;
 use las::{Builder, Color, Transform, Vector, Vlr, Writer};
 use proptest::prelude::*;

@@ -1,0 +1,72 @@
+//! Which points of a cloud are gridded, and where they lie.
+
+use super::cloud::{Cloud, Point};
+use crate::dem::crs::Crs;
+use crate::dem::raster::Refusal;
+
+/// The points of a cloud that are wanted.
+pub(super) struct Chosen<'a> {
+    pub cloud: &'a Cloud,
+    /// Only those of class 2, ground.
+    pub ground_only: bool,
+}
+
+impl Chosen<'_> {
+    /// Calls `f` with every point, in the order of the file.
+    pub fn for_each(&self, mut f: impl FnMut(Point)) -> Result<(), Refusal> {
+        self.cloud.for_each(|point| {
+            if !point.is_noise() && (point.is_ground() || !self.ground_only) {
+                f(point);
+            }
+        })
+    }
+}
+
+/// Where the wanted points lie.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Survey {
+    pub points: u64,
+    /// Lowest and highest x and y.
+    pub low: [f64; 2],
+    pub high: [f64; 2],
+}
+
+/// Looks at every point once; also returns what a user must know of those that are left out.
+pub(super) fn survey(chosen: &Chosen<'_>) -> Result<(Survey, Vec<String>), Refusal> {
+    let cloud = chosen.cloud;
+    let (mut points, mut noise, mut other) = (0_u64, 0_u64, 0_u64);
+    let (mut low, mut high) = ([i32::MAX; 2], [i32::MIN; 2]);
+    cloud.for_each(|point| {
+        if point.is_noise() {
+            noise += 1;
+        } else if chosen.ground_only && !point.is_ground() {
+            other += 1;
+        } else {
+            points += 1;
+            for axis in 0..2 {
+                low[axis] = low[axis].min(point.stored[axis]);
+                high[axis] = high[axis].max(point.stored[axis]);
+            }
+        }
+    })?;
+    let total = cloud.claims.points;
+    if points == 0 && other > 0 {
+        return Err(Refusal::new(format!("none of its {total} points is of class 2, ground")));
+    }
+    if points == 0 {
+        return Err(Refusal::new(format!("all of its {total} points are withheld or noise")));
+    }
+    let place = |stored: [i32; 2]| [0, 1].map(|axis| cloud.coordinate(axis, f64::from(stored[axis])));
+    let survey = Survey { points, low: place(low), high: place(high) };
+    let mut notes = cloud.crs.unit_notes();
+    if cloud.crs == Crs::default() {
+        notes.push("the file names no reference system; coordinates are taken as metres".to_owned());
+    }
+    if noise > 0 {
+        notes.push(format!("{noise} points that are withheld or noise (classes 7 and 18) were left out"));
+    }
+    if other > 0 {
+        notes.push(format!("{other} points of other classes than ground (2) were left out"));
+    }
+    Ok((survey, notes))
+}
