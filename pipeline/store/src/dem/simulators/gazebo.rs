@@ -11,8 +11,8 @@
 //! takes a relief of 1 m where the loader finds no brightest pixel, as gz-common 4 in pictures of 16 bit (`Image::MaxColor`).
 
 use super::levels::Levels;
+use super::parts::{Parts, SAME};
 use super::posts::Posts;
-use super::{Parts, SAME};
 use crate::dem::raster::Refusal;
 use crate::dem::{mesh, png};
 use serde_json::json;

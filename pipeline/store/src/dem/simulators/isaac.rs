@@ -1,8 +1,8 @@
 //! Isaac Sim, and other programs that read OpenUSD: a mesh in metres, z up, whose own triangles collide. Scene coordinates as
 //! they are; cells without data are holes.
 
+use super::parts::{Parts, SAME};
 use super::posts::Posts;
-use super::{Parts, SAME};
 use crate::dem::mesh;
 use crate::dem::raster::Refusal;
 use serde_json::json;

@@ -13,6 +13,7 @@ mod gazebo;
 mod isaac;
 mod levels;
 mod mujoco;
+mod parts;
 mod posts;
 mod unity;
 mod unreal;
@@ -23,6 +24,7 @@ mod tests;
 use super::mesh;
 use super::raster::{DemError, Refusal, save};
 use crate::atomic;
+use parts::Parts;
 use posts::Posts;
 use sastrugi_numeric::{Geometry, Grid};
 use sastrugi_schemas::study::Simulator;
@@ -75,24 +77,6 @@ pub struct Export {
     /// Sentences a user must know.
     pub notes: Vec<String>,
 }
-
-/// What the module of a simulator adds to what all exports have.
-struct Parts {
-    /// The program's name.
-    title: &'static str,
-    files: Vec<(String, Vec<u8>)>,
-    /// Rows of the matrix from scene coordinates (x, y, z, 1) to the program's.
-    scene_to_target: [[f64; 4]; 3],
-    /// Axes and unit of the program's coordinates.
-    axes: &'static str,
-    /// What the import asks for.
-    settings: Value,
-    /// What to do, in order.
-    steps: Vec<String>,
-}
-
-/// Scene coordinates as they are.
-const SAME: [[f64; 4]; 3] = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
 
 /// The sides, in posts, of which a simulator takes square terrains only; ascending.
 const fn sizes(simulator: Simulator) -> Option<&'static [usize]> {

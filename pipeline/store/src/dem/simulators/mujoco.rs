@@ -3,8 +3,8 @@
 //!
 //! The compiler scales the numbers to 0 to 1; `size` turns them into metres above the geom.
 
+use super::parts::{Parts, SAME};
 use super::posts::Posts;
-use super::{Parts, SAME};
 use serde_json::json;
 
 /// Thickness below the lowest post, m.

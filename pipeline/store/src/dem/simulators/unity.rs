@@ -4,8 +4,8 @@
 //! The editor's import divides levels by 65536 and multiplies them with the terrain's height (class ImportRawHeightmap of
 //! Unity's C# reference source); the engine keeps them in steps of 1/32766 of that height (`TerrainData`).
 
-use super::Parts;
 use super::levels::{Levels, rounded_up, to_millimetres};
+use super::parts::Parts;
 use super::posts::Posts;
 use serde_json::json;
 

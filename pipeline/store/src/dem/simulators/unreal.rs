@@ -5,8 +5,8 @@
 //! Technical Guide" (Unreal Engine 5). Level 32768 is height 0, and one level is 1/128 of the scale in centimetres (ibid., at
 //! scale 100 the levels reach from -256 to 256 m).
 
-use super::Parts;
 use super::levels::{Levels, rounded_up, to_millimetres};
+use super::parts::Parts;
 use super::posts::Posts;
 use crate::dem::png;
 use crate::dem::raster::Refusal;
