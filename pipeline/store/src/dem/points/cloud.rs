@@ -1,10 +1,10 @@
 //! A LAS or LAZ file as a stream of points.
 //!
 //! The decoder is `las` 0.11 (MIT) with `laz` 0.13 (Apache-2.0), pure Rust and maintained. It sees a file only after
-//! [`Claims`] found its numbers possible, reads no further than the points reach, and a panic of it is an error.
+//! [`DeclaredSize`] found its numbers possible, reads no further than the points reach, and a panic of it is an error.
 
 use super::crs;
-use super::header::{Claims, unreadable};
+use super::header::{DeclaredSize, unreadable};
 use crate::dem::crs::Crs;
 use crate::dem::raster::Refusal;
 use las::{PointDataBuilder, Reader};
@@ -27,7 +27,7 @@ const GROUND: u8 = 2;
 pub(super) struct Cloud {
     path: PathBuf,
     /// What the header says.
-    pub claims: Claims,
+    pub declared: DeclaredSize,
     /// Coordinate reference system.
     pub crs: Crs,
     /// Where the decoder must stop.
@@ -71,22 +71,22 @@ impl Cloud {
     /// Opens a file and checks what its header says.
     pub fn open(path: &Path, file: File) -> Result<Self, Refusal> {
         let mut file = BufReader::new(file);
-        let claims = Claims::read(&mut file)?;
+        let declared = DeclaredSize::read(&mut file)?;
         file.seek(SeekFrom::Start(0)).map_err(|e| unreadable(&e))?;
         let header = guarded(|| las::Header::new(&mut file))?;
-        let crs = crs::of_header(&header, claims.well_known_text)?;
-        let end = if claims.compressed {
+        let crs = crs::of_header(&header, declared.well_known_text)?;
+        let end = if declared.compressed {
             let record = header.vlrs().iter().find(|vlr| las::laz::is_laszip_vlr(vlr)).map(|vlr| vlr.data.as_slice());
-            claims.check_compression(&mut file, record)?
+            declared.check_compression(&mut file, record)?
         } else {
             u64::MAX
         };
-        Ok(Self { path: path.to_owned(), claims, crs, end })
+        Ok(Self { path: path.to_owned(), declared, crs, end })
     }
 
     /// The coordinate that a stored number stands for.
     pub fn coordinate(&self, axis: usize, stored: f64) -> f64 {
-        stored * self.claims.scale[axis] + self.claims.offset[axis]
+        stored * self.declared.scale[axis] + self.declared.offset[axis]
     }
 
     /// Easting and northing of a point.
@@ -102,13 +102,13 @@ impl Cloud {
         let mut reader = guarded(|| Reader::new(fenced))?;
         end.store(self.end, Ordering::Relaxed);
         let mut points = PointDataBuilder::new().for_header(reader.header()).build();
-        let size = points.record_len();
-        if size != usize::from(self.claims.point_bytes) || reader.header().number_of_points() != self.claims.points {
+        let (size, declared) = (points.record_len(), &self.declared);
+        if size != usize::from(declared.point_bytes) || reader.header().number_of_points() != declared.points {
             return Err(Refusal::new("changed while it was read"));
         }
         let at_a_time = (CHUNK_BYTES / size as u64).max(1);
-        let extended = self.claims.format >= 6;
-        let mut left = self.claims.points;
+        let extended = declared.format >= 6;
+        let mut left = declared.points;
         while left > 0 {
             let read = guarded(|| reader.fill_points(at_a_time.min(left), &mut points))?;
             if read == 0 {

@@ -29,9 +29,9 @@ const LAYERED: u16 = 3;
 /// First bytes of every LAS and LAZ file.
 pub(super) const SIGNATURE: &[u8; 4] = b"LASF";
 
-/// What the header says, checked.
+/// Number, size and scale of the points as the header declares them, held against the length of the file.
 #[derive(Clone, Debug)]
-pub(super) struct Claims {
+pub(super) struct DeclaredSize {
     /// Number of points, at least 1.
     pub points: u64,
     /// Bytes of a decoded point.
@@ -93,7 +93,7 @@ pub(super) fn unreadable(error: &io::Error) -> Refusal {
     }
 }
 
-impl Claims {
+impl DeclaredSize {
     /// Reads the header of a file and checks it.
     pub fn read(file: &mut (impl Read + Seek)) -> Result<Self, Refusal> {
         let file_bytes = file.seek(SeekFrom::End(0)).map_err(|e| unreadable(&e))?;
@@ -105,11 +105,11 @@ impl Claims {
         }
         let mut header = Header([0; HEADER_BYTES]);
         header.0[..bytes.len()].copy_from_slice(&bytes);
-        let claims = Self::check(&header, file_bytes)?;
+        let declared = Self::check(&header, file_bytes)?;
         if header.minor_version() == 4 && header.u64(235) > 0 && header.u32(243) > 0 {
-            claims.check_extended_record(file, header.u64(235))?;
+            declared.check_extended_record(file, header.u64(235))?;
         }
-        Ok(claims)
+        Ok(declared)
     }
 
     fn check(header: &Header, file_bytes: u64) -> Result<Self, Refusal> {
@@ -129,7 +129,7 @@ impl Claims {
             )));
         }
         let (format, compressed) = point_format(header.0[104])?;
-        let claims = Self {
+        let declared = Self {
             points: points(header, minor),
             point_bytes: header.u16(105),
             format,
@@ -141,9 +141,9 @@ impl Claims {
             data_start,
             file_bytes,
         };
-        claims.check_points()?;
-        claims.check_transform()?;
-        Ok(claims)
+        declared.check_points()?;
+        declared.check_transform()?;
+        Ok(declared)
     }
 
     fn check_points(&self) -> Result<(), Refusal> {

@@ -37,7 +37,7 @@ use super::checks::checked;
 use super::raster::{Claimed, Dem, DemError, DemInfo, Format, MAX_CELLS, ReadOptions, Refusal};
 use cloud::Cloud;
 use grid::Cells;
-use header::Claims;
+use header::DeclaredSize;
 use lattice::Lattice;
 use sastrugi_numeric::Grid;
 use std::fs::File;
@@ -94,7 +94,7 @@ fn read_open(path: &Path, file: File, settings: &GridSettings) -> Result<Gridded
 
 /// What the header of a cloud says it will be gridded to, with cells of a given size.
 pub(super) fn claimed(mut file: File, cell_m: Option<f64>) -> Option<Claimed> {
-    let Claims { points, extent, .. } = Claims::read(&mut file).ok()?;
+    let DeclaredSize { points, extent, .. } = DeclaredSize::read(&mut file).ok()?;
     let cells = match cell_m {
         Some(cell) => (extent[0] / cell + 1.0) * (extent[1] / cell + 1.0),
         // Without a size, three quarters of the cells hold a point.

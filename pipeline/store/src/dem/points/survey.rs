@@ -49,7 +49,7 @@ pub(super) fn survey(chosen: &Chosen<'_>) -> Result<(Survey, Vec<String>), Refus
             }
         }
     })?;
-    let total = cloud.claims.points;
+    let total = cloud.declared.points;
     if points == 0 && other > 0 {
         return Err(Refusal::new(format!("none of its {total} points is of class 2, ground")));
     }
