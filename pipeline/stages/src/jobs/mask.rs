@@ -1,6 +1,6 @@
 //! Stage `mask`: the files that say which cells of a DEM a fit takes, copied into the release; and their use.
 
-use super::original::Original;
+use super::original::{self, MASK_STAGE, Original};
 use crate::builder::{BuildError, Builder, InputPlace};
 use crate::job::{ItemRef, JobError, Work};
 use crate::operations::masks;
@@ -10,9 +10,6 @@ use sastrugi_numeric::Grid;
 use sastrugi_schemas::fit::MaskSource;
 use sastrugi_schemas::study::{Files, FitItem};
 use sastrugi_texture::noise::{self, ReferenceNoise};
-
-/// Name of the stage.
-pub const STAGE: &str = "mask";
 
 /// A mask of a fit.
 #[derive(Clone)]
@@ -68,8 +65,8 @@ impl Mask {
     ) -> Result<Self, BuildError> {
         let copy = Original::of(&format!("mask/{id}"), &builder.study.folder, &file)?;
         let (release_path, sha256) = (copy.release_path().to_owned(), copy.sha256().to_owned());
-        let node = copy.node(STAGE, id);
-        let source = MaskSource { file: super::original::name(&release_path).to_owned(), sha256, excludes };
+        let node = copy.node(MASK_STAGE, id);
+        let source = MaskSource { file: original::name(&release_path).to_owned(), sha256, excludes };
         let mask = Self { item: node.item.clone(), release_path: release_path.clone(), source };
         builder.inputs.push(InputPlace { key, release_path });
         builder.node(node)?;
@@ -78,7 +75,7 @@ impl Mask {
 
     /// Leaves the heights that the mask keeps.
     fn apply(&self, heights: &mut Grid, place: &Place, work: &Work<'_>) -> Result<(), JobError> {
-        let path = work.parent(&self.item, super::original::name(&self.release_path))?;
+        let path = work.parent(&self.item, original::name(&self.release_path))?;
         // Messages are part of the release: they name the file as it is called there.
         let name_it =
             |e: JobError| JobError { message: e.message.replace(&path.display().to_string(), &self.release_path), ..e };

@@ -1,7 +1,7 @@
 //! Stage `original`: the bytes of a measured file, taken into the release as they are.
 //!
 //! An item of its own, so that a release whose import failed still holds what it was made from. Masks are copied in the same
-//! way (stage `mask`).
+//! way (stage [`MASK_STAGE`]).
 
 use crate::builder::{BuildError, input_file};
 use crate::job::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work};
@@ -13,10 +13,12 @@ use std::path::{Path, PathBuf};
 
 /// Name of the stage.
 pub const STAGE: &str = "original";
+/// Name of the stage of masks.
+pub const MASK_STAGE: &str = "mask";
 
 /// True for stages that only take files into the release.
 pub fn only_copies(stage: &str) -> bool {
-    [STAGE, super::mask::STAGE].contains(&stage)
+    [STAGE, MASK_STAGE].contains(&stage)
 }
 
 /// A measured file with what lies beside it.
