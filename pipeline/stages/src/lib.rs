@@ -2,6 +2,7 @@
 //! cache and shards, and the verbs that work on single files.
 
 mod builder;
+mod documents;
 mod error;
 mod hypotheses;
 pub mod job;

@@ -1,5 +1,6 @@
 //! What a release says of itself, held against its bytes and against what its study gives here and now.
 
+use crate::documents::sources::Sources;
 use crate::error::Error;
 use crate::job::ItemRef;
 use crate::loaded::{Loaded, load};
@@ -7,7 +8,6 @@ use crate::runner::assemble::{artifacts, head, notes_of};
 use crate::runner::cache::{Cache, Record};
 use crate::runner::execute::{Limits, execute};
 use crate::runner::progress::Progress;
-use crate::runner::sources::Sources;
 use crate::splits::{self, Splits};
 use crate::studies::{RunRequest, run};
 use sastrugi_schemas::manifest::{Artifact, ItemNote, Manifest};

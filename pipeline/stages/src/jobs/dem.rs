@@ -3,12 +3,12 @@
 use super::original::{self, Original};
 use super::rasters::{raster_options, raster_packing};
 use crate::builder::{BuildError, Builder, HEIGHTS, Heightfield, InputPlace};
+use crate::documents::terms::{self, Objection};
 use crate::job::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work};
 use crate::operations::dem::{input_error, to_metres, window_of};
 use crate::operations::place::{PLACE, Place};
 use crate::revision::Room;
 use crate::runner::graph::Node;
-use crate::study::terms::{self, Objection};
 use sastrugi_schemas::study::{DemItem, GeoTiff};
 use sastrugi_store::dem::points::GridSettings;
 use sastrugi_store::dem::{self, Claimed, Dem, ReadOptions};

@@ -4,12 +4,12 @@
 //! lines on its files and the keys of its rows stay in memory.
 
 use super::cache::{Record, StoredFile, load_record};
-use super::documents::{self, Described};
 use super::execute::Failure;
 use super::lock;
 use super::progress::Progress;
-use super::sources::Sources;
 use super::tables::Fragments;
+use crate::documents::sources::Sources;
+use crate::documents::{self, Described};
 use crate::error::Error;
 use crate::job::ItemRef;
 use crate::splits::Splits;

@@ -2,7 +2,6 @@
 
 pub mod entry;
 pub mod keys;
-pub mod terms;
 pub mod text;
 
 pub use entry::{Entry, Expanded};

@@ -1,11 +1,11 @@
 //! Measured data behind the files of a release: what its makers ask for goes with everything that comes from it.
 
-use super::cache::Record;
+use super::terms::{self, Objection};
 use crate::error::Error;
 use crate::job::ItemRef;
 use crate::jobs::{dem, original};
+use crate::runner::cache::Record;
 use crate::study::Study;
-use crate::study::terms::{self, Objection};
 use sastrugi_schemas::manifest::{ItemNote, Source};
 use sastrugi_schemas::study::DemItem;
 use serde_json::Value;

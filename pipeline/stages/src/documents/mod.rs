@@ -3,11 +3,13 @@
 mod croissant;
 pub mod license;
 mod ro_crate;
+pub mod sources;
+pub mod terms;
 
 pub use croissant::croissant;
 pub use ro_crate::ro_crate;
 
-use super::execute::Failure;
+use crate::runner::execute::Failure;
 use sastrugi_schemas::manifest::{Artifact, Source};
 use sastrugi_schemas::study::StudyHead;
 use sastrugi_schemas::tables;
