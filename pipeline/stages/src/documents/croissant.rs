@@ -1,7 +1,8 @@
 //! `croissant.json`: every table in Croissant 1.1 (MLCommons, "Croissant Format Specification", version 1.1), so that data
 //! loaders find its columns with type, unit and description, and its files with their hashes.
 
-use super::{Described, add_terms, citation_line, license, map_files, map_words, page};
+use super::described::{Described, add_terms, citation_line, map_files, map_words, page};
+use super::spdx_list;
 use crate::jobs::{exports, original};
 use crate::splits::PARTS;
 use sastrugi_schemas::manifest::{Artifact, Source};
@@ -83,7 +84,7 @@ const LAYOUT: (&str, &[&str], &[&str], &str) = (
 );
 
 /// The text of `croissant.json`.
-pub fn croissant(described: &Described<'_>) -> Value {
+pub fn text(described: &Described<'_>) -> String {
     let head = described.head;
     let mut tables: Vec<Value> = tables::ALL.into_iter().filter_map(|table| record_set(table, described)).collect();
     if head.split.is_some() {
@@ -95,7 +96,7 @@ pub fn croissant(described: &Described<'_>) -> Value {
         "conformsTo": "http://mlcommons.org/croissant/1.1",
         "name": head.title,
         "description": if head.description.is_empty() { &head.title } else { &head.description },
-        "license": license::address(&head.license),
+        "license": spdx_list::address(&head.license),
         "creator": described.creators().map(creator).collect::<Vec<_>>(),
         "datePublished": head.date,
         "citeAs": citation_line(head),
@@ -109,7 +110,7 @@ pub fn croissant(described: &Described<'_>) -> Value {
     if !described.sources.is_empty() {
         dataset["isBasedOn"] = described.sources.iter().map(work).collect();
     }
-    dataset
+    format!("{dataset:#}\n")
 }
 
 fn creator((name, kind): (&str, &str)) -> Value {

@@ -1,89 +1,43 @@
-//! How the documents name a licence: by its identifier in the SPDX list, in the words of each format.
+//! `LICENSE`: the licence of the release, and those of the measured data in it.
 
-use super::quoted;
-use std::collections::BTreeSet;
+use super::described::{Described, authors, folded, page, source_line};
+use super::spdx_list;
+use std::fmt::Write as _;
 
-/// Identifiers that the Citation File Format 1.2.0 permits (`definitions.license-enum` of its `schema.json`,
-/// doi 10.5281/zenodo.5171937). It is the SPDX list of its day: later identifiers make a file invalid.
-const CITABLE: &str = include_str!("cff_1_2_0_licenses.txt");
-
-/// What the crate lists beside the licences: that nothing is said of one.
-const NO_LICENSE: &str = "NOASSERTION";
-
-/// The identifier of the SPDX list that a licence is, whatever its case.
-pub fn identifier(license: &str) -> Option<&'static str> {
-    let license = license.trim();
-    let names = spdx::identifiers::LICENSES.iter().map(|listed| listed.name);
-    names.into_iter().find(|name| name.eq_ignore_ascii_case(license) && *name != NO_LICENSE)
-}
-
-/// Where a licence can be read: its page in the SPDX list, or the licence as it is stated.
-pub fn address(license: &str) -> String {
-    identifier(license).map_or_else(|| license.to_owned(), |id| format!("https://spdx.org/licenses/{id}"))
-}
-
-/// True for an expression of nothing but identifiers of the SPDX list, as `MIT OR Apache-2.0`.
-pub fn is_listed(license: &str) -> bool {
-    let of_list = |e: spdx::Expression| {
-        e.requirements().all(|r| r.req.license.id().is_some_and(|id| identifier(id.name).is_some()))
+/// The text of `LICENSE`.
+pub fn text(described: &Described<'_>) -> String {
+    let (head, sources) = (described.head, described.sources);
+    let version = head.version.as_ref().map_or_else(String::new, |v| format!(", version {v}"));
+    let what = folded(&format!("{}{version} ({}) by {}", head.title, head.date, authors(head)));
+    let license = spdx_list::identifier(&head.license).unwrap_or_else(|| head.license.trim());
+    let mut text = match spdx_list::is_listed(&head.license) {
+        true => format!(
+            "SPDX-License-Identifier: {0}\n\n{what} is licensed under {0}. Its text is found by that identifier in the SPDX licence list.\n",
+            license,
+        ),
+        false => format!(
+            "{what} is licensed under:\n\n{}\n\nThe SPDX licence list does not have it; its terms are to be had from the creators.\n",
+            license
+        ),
     };
-    let choices = || license.split(" OR ").all(|choice| identifier(choice).is_some());
-    choices() || spdx::Expression::parse(license).is_ok_and(of_list)
+    if let Some(page) = page(head) {
+        let _ = writeln!(text, "{page}");
+    }
+    if !sources.is_empty() {
+        text.push_str(
+            "\nMeasured inputs in dem/ keep their own licences, and what comes from them names its source:\n\n",
+        );
+        sources.iter().for_each(|source| text.push_str(&format!("- {}\n", source_line(source))));
+    }
+    text
 }
 
-/// The lines of `CITATION.cff` on a licence: identifiers as far as the format has them, an address for another, or a comment.
-pub fn cited(license: &str) -> String {
-    let citable = |part: &str| identifier(part).filter(|id| CITABLE.split_whitespace().any(|known| known == *id));
-    let mut choices: Option<Vec<&str>> = license.split(" OR ").map(citable).collect();
-    let mut seen = BTreeSet::new();
-    choices.iter_mut().for_each(|all| all.retain(|id| seen.insert(*id)));
-    let address = address(license);
-    match choices.as_deref() {
-        Some([one]) => format!("license: {}\n", quoted(one)),
-        Some(several) => {
-            several.iter().fold("license:\n".to_owned(), |text, id| text + &format!("  - {}\n", quoted(id)))
-        }
-        None if is_address(&address) => format!("license-url: {}\n", quoted(&address)),
-        None => format!("# The format has no identifier for the licence {}; see the file LICENSE.\n", quoted(license)),
-    }
-}
-
-fn is_address(text: &str) -> bool {
-    let rest = text.strip_prefix("https://").or_else(|| text.strip_prefix("http://"));
-    rest.is_some_and(|rest| !rest.is_empty() && rest.bytes().all(|b| b.is_ascii_graphic()))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn val_licences_are_named_as_the_lists_have_them() {
-        assert_eq!(identifier("cc-by-4.0"), Some("CC-BY-4.0"));
-        assert_eq!(identifier("DL-DE-BY-2.0"), Some("DL-DE-BY-2.0"));
-        for other in ["NOASSERTION", "proprietary", "public-domain", "CC-BY-9.0", "MIT OR Apache-2.0", ""] {
-            assert_eq!(identifier(other), None, "{other}");
-        }
-        assert!(is_listed("MIT OR Apache-2.0") && is_listed("cc-by-4.0"));
-        assert!(is_listed("cc-by-4.0 OR MIT") && is_listed("GPL-2.0 OR MIT") && !is_listed("NOASSERTION OR MIT"));
-        assert!(!is_listed("proprietary") && !is_listed("LicenseRef-ours") && !is_listed("MIT OR ours"));
-    }
-
-    #[test]
-    fn val_what_a_citation_says_of_a_licence() {
-        for (license, lines) in [
-            ("CC-BY-4.0", "license: \"CC-BY-4.0\"\n"),
-            ("odbl-1.0", "license: \"ODbL-1.0\"\n"),
-            ("MIT OR Apache-2.0", "license:\n  - \"MIT\"\n  - \"Apache-2.0\"\n"),
-            ("CC-BY-4.0 OR cc-by-4.0", "license: \"CC-BY-4.0\"\n"),
-            ("DL-DE-BY-2.0", "license-url: \"https://spdx.org/licenses/DL-DE-BY-2.0\"\n"),
-            ("https://example.org/terms", "license-url: \"https://example.org/terms\"\n"),
-        ] {
-            assert_eq!(cited(license), lines);
-        }
-        for other in ["proprietary", "MIT AND Apache-2.0", "two\nlines", "https://", "https://a b"] {
-            let lines = cited(other);
-            assert!(lines.starts_with("# ") && lines.lines().count() == 1, "{lines}");
-        }
-    }
+/// Warning for a release under a licence that the SPDX list does not have.
+pub fn license_warning(license: &str) -> Option<String> {
+    let listed = spdx_list::is_listed(license);
+    (!listed).then(|| {
+        format!(
+            "[study] license \"{license}\" is not in the SPDX list; write its identifier, as CC-BY-4.0, if it has one"
+        )
+    })
 }

@@ -3,7 +3,8 @@
 //! made. Measured data and masks were there before, so that no action makes them. Folders stand for their files; `manifest.json`
 //! has the parents, stream and hash of each.
 
-use super::{Described, FOLDERS, add_terms, citation_line, license, page};
+use super::described::{Described, FOLDERS, add_terms, citation_line, page};
+use super::spdx_list;
 use crate::job::ItemRef;
 use crate::jobs::original;
 use sastrugi_schemas::manifest::{Artifact, PROGRAM as PROGRAM_NAME, Source};
@@ -27,7 +28,7 @@ const OWN_FILES: [(&str, &str, &str); 7] = [
 ];
 
 /// The text of `ro-crate-metadata.json`.
-pub fn ro_crate(described: &Described<'_>) -> Value {
+pub fn text(described: &Described<'_>) -> String {
     let stages = Stages::of(described);
     let mut parts: Vec<Value> = OWN_FILES.iter().map(own_file).collect();
     parts.extend(stages.entities(described));
@@ -42,7 +43,8 @@ pub fn ro_crate(described: &Described<'_>) -> Value {
     graph.extend(stages.actions());
     // Words of schema.org that came after the crate's context was frozen.
     let later = json!({ "sha256": "https://schema.org/sha256", "creditText": "https://schema.org/creditText" });
-    json!({ "@context": [format!("{CRATE}/context"), later], "@graph": graph })
+    let metadata = json!({ "@context": [format!("{CRATE}/context"), later], "@graph": graph });
+    format!("{metadata:#}\n")
 }
 
 fn descriptor() -> Value {
@@ -89,12 +91,12 @@ fn own_file((path, media, description): &(&str, &str, &str)) -> Value {
 
 /// A licence of the SPDX list by its page there, any other by the file that names it.
 fn license_id(license: &str) -> String {
-    license::identifier(license).map_or_else(|| "LICENSE".to_owned(), |_| license::address(license))
+    spdx_list::identifier(license).map_or_else(|| "LICENSE".to_owned(), |_| spdx_list::address(license))
 }
 
 /// The entity of a licence that is no file of the release.
 fn license_entity(license: &str) -> Option<Value> {
-    let name = license::identifier(license)?;
+    let name = spdx_list::identifier(license)?;
     let description = format!("The licence that the SPDX list calls {name}");
     Some(json!({ "@id": license_id(license), "@type": "CreativeWork", "name": name, "description": description }))
 }

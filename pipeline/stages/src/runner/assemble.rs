@@ -15,10 +15,7 @@ use crate::job::ItemRef;
 use crate::splits::Splits;
 use crate::study::Study;
 use sastrugi_schemas::manifest::{Artifact, FailedItem, ItemNote, Origin};
-use sastrugi_schemas::study::McapFlavour;
-use sastrugi_store::mcap::VIEWER_LAYOUT;
 use sastrugi_store::release::{self, Head, Incoming, Release, ReleaseBuilder};
-use serde_json::Value;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
@@ -54,11 +51,8 @@ pub fn assemble(contents: &Contents<'_>, dest: &Path, progress: &dyn Progress) -
         progress.phase(&format!("{}/{}: {}", note.stage, note.item, note.note));
         builder.note(note.clone());
     }
-    let license = &contents.study.head.license;
-    if !documents::license::is_listed(license) {
-        progress.phase(&format!(
-            "[study] license \"{license}\" is not in the SPDX list; write its identifier, as CC-BY-4.0, if it has one"
-        ));
+    if let Some(warning) = documents::license_warning(&contents.study.head.license) {
+        progress.phase(&warning);
     }
     progress.phase("writing tables");
     fragments.write(&mut builder, contents.splits)?;
@@ -216,24 +210,11 @@ fn damaged(folder: &Path, item: &ItemRef, file: &str) -> Error {
 fn add_documents(builder: &mut ReleaseBuilder, contents: &Contents<'_>, sources: &Sources) -> Result<(), Error> {
     let (head, failures) = (&contents.study.head, contents.failures);
     let described = Described { head, sources: &sources.list, artifacts: builder.artifacts(), failures };
-    let documents = [
-        ("study.toml", contents.text.to_owned()),
-        ("README.md", documents::readme(&described)),
-        ("CITATION.cff", documents::citation(&described)),
-        ("LICENSE", documents::license(&described)),
-        ("croissant.json", json_text(&documents::croissant(&described))?),
-        ("ro-crate-metadata.json", json_text(&documents::ro_crate(&described))?),
-    ];
-    let viewer = head.mcap == McapFlavour::Viewer && described.artifacts.iter().any(|a| a.path.ends_with(".mcap"));
-    let layout = viewer.then(|| ("mcap/foxglove-layout.json", VIEWER_LAYOUT.to_owned()));
-    for (path, text) in documents.into_iter().chain(layout) {
+    let study = ("study.toml", contents.text.to_owned());
+    for (path, text) in [study].into_iter().chain(documents::all(&described)) {
         builder.write_text(path, &text, Origin::default())?;
     }
     Ok(())
-}
-
-fn json_text(value: &Value) -> Result<String, Error> {
-    serde_json::to_string_pretty(value).map(|text| text + "\n").map_err(Error::failed)
 }
 
 fn add_report(builder: &mut ReleaseBuilder, progress: &dyn Progress) -> Result<(), Error> {

@@ -1,0 +1,119 @@
+//! `README.md`: a dataset card, whose head lets hubs show the tables.
+
+use super::described::{Described, FOLDERS, folded, map_files, map_words, page, quoted, source_line};
+use super::spdx_list;
+use sastrugi_schemas::manifest::Source;
+use std::fmt::Write as _;
+
+/// Names under which dataset hubs know licences, where they are not the SPDX identifier in lower case.
+const HUB_NAMES: [(&str, &str); 3] = [("PDDL-1.0", "pddl"), ("ODC-By-1.0", "odc-by"), ("ODbL-1.0", "odbl")];
+/// Identifiers that dataset hubs know in lower case.
+const HUB_IDENTIFIERS: [&str; 20] = [
+    "Apache-2.0",
+    "MIT",
+    "CC0-1.0",
+    "CC-BY-2.0",
+    "CC-BY-2.5",
+    "CC-BY-3.0",
+    "CC-BY-4.0",
+    "CC-BY-SA-3.0",
+    "CC-BY-SA-4.0",
+    "CC-BY-NC-2.0",
+    "CC-BY-NC-3.0",
+    "CC-BY-NC-4.0",
+    "CC-BY-ND-4.0",
+    "CC-BY-NC-ND-3.0",
+    "CC-BY-NC-ND-4.0",
+    "CC-BY-NC-SA-2.0",
+    "CC-BY-NC-SA-3.0",
+    "CC-BY-NC-SA-4.0",
+    "GPL-3.0",
+    "LGPL-3.0",
+];
+
+/// The text of `README.md`.
+pub fn text(described: &Described<'_>) -> String {
+    let head = described.head;
+    let mut text = format!("{}# {}\n\n", card(described), folded(&head.title));
+    if !head.description.is_empty() {
+        let _ = writeln!(text, "{}\n", head.description);
+    }
+    let version = head.version.as_ref().map_or_else(String::new, |v| format!(" version {v},"));
+    let page = page(head).map_or_else(String::new, |page| format!(" {page}"));
+    let _ = writeln!(
+        text,
+        "Study `{}`,{version} seed {}, {}. Licence: {}. Made with sastrugi {}; `sastrugi verify .` checks every file, and \
+         `sastrugi verify . --recompute all` makes it again and compares the bytes.{page}\n",
+        head.name,
+        head.seed,
+        head.date,
+        head.license,
+        env!("CARGO_PKG_VERSION")
+    );
+    text.push_str("| where | what |\n|---|---|\n| `study.toml` | the study: everything here follows from it |\n");
+    for (folder, what) in FOLDERS.iter().filter(|(folder, _)| described.has(folder)) {
+        let _ = writeln!(text, "| `{folder}` | {what} |");
+    }
+    for map in described.maps() {
+        let _ = writeln!(text, "| `{}` | map beside heights: {} |", map_files(map), map_words(map));
+    }
+    text.push_str(
+        "| `croissant.json` | the tables in Croissant, for data loaders |\n\
+         | `ro-crate-metadata.json` | which stage made what from what |\n\
+         | `manifest.json`, `SHA256SUMS` | what each file is made from, and its checksum |\n\n\
+         | table | a row is |\n|---|---|\n",
+    );
+    for table in described.tables() {
+        let _ = writeln!(text, "| `{}` | {} |", table.name, table.description);
+    }
+    if !described.sources.is_empty() {
+        text.push_str(&sources_section(described.sources));
+    }
+    if !described.failures.is_empty() {
+        let _ = writeln!(
+            text,
+            "\n{} items failed; `manifest.json` lists them with their parameters:\n",
+            described.failures.len()
+        );
+        for failure in described.failures {
+            let _ = writeln!(text, "- `{}`: {}", failure.item, failure.message);
+        }
+    }
+    text
+}
+
+/// The head of a dataset card: YAML between two lines of hyphens.
+fn card(described: &Described<'_>) -> String {
+    let head = described.head;
+    let mut text = format!("---\npretty_name: {}\n{}", quoted(&head.title), hub_license(&head.license));
+    text.push_str("tags:\n  - terrain\n  - elevation\n  - robotics\n  - synthetic\n  - sastrugi\n");
+    let mut tables = described.tables().peekable();
+    if tables.peek().is_some() {
+        text.push_str("configs:\n");
+    }
+    for table in tables {
+        let _ = writeln!(text, "  - config_name: {0}\n    data_files: \"tables/{0}/*.parquet\"", table.name);
+    }
+    text + "---\n\n"
+}
+
+/// Hubs know a list of licences by names of their own; others are named beside `other`.
+fn hub_license(license: &str) -> String {
+    let of_hub = |id: &str| {
+        let known = HUB_NAMES.iter().find(|(spdx, _)| *spdx == id).map(|(_, name)| (*name).to_owned());
+        known.or_else(|| HUB_IDENTIFIERS.contains(&id).then(|| id.to_lowercase()))
+    };
+    match spdx_list::identifier(license).and_then(of_hub) {
+        Some(name) => format!("license: {name}\n"),
+        None => format!("license: other\nlicense_name: {}\nlicense_link: LICENSE\n", quoted(license)),
+    }
+}
+
+/// Measured data with what their makers ask for.
+fn sources_section(sources: &[Source]) -> String {
+    let mut text = String::from(
+        "\n## Sources\n\nMeasured data keep their own terms; `manifest.json` says which rasters, fits and recordings come from which (`sources`).\n\n",
+    );
+    sources.iter().for_each(|source| text.push_str(&format!("- {}\n", source_line(source))));
+    text
+}
