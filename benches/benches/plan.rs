@@ -5,7 +5,8 @@
 
 use divan::Bencher;
 use divan::counter::ItemsCount;
-use sastrugi_stages::studies::{load_text, plan_of};
+use sastrugi_stages::loaded::load_text;
+use sastrugi_stages::studies::plan_of;
 use std::path::Path;
 
 const TERRAINS: [usize; 3] = [50, 5_000, 100_000];

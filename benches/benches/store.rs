@@ -4,6 +4,7 @@
 use divan::Bencher;
 use divan::counter::BytesCount;
 use sastrugi_numeric::{Geometry, Grid, Stream, Streams, Surface};
+use sastrugi_schemas::Record;
 use sastrugi_schemas::study::McapFlavour;
 use sastrugi_schemas::tables::SampleRow;
 use sastrugi_schemas::topics::{
