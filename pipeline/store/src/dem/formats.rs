@@ -14,6 +14,13 @@ pub const WRITTEN_ENDINGS: &str = ".tif, .asc, .hgt, .png, .npy, .obj, .glb and 
 /// What can be read, in words.
 pub(super) const READ_FORMATS: &str = "GeoTIFF, ESRI ASCII, .hgt, .npy, greyscale .png, .las and .laz";
 
+type GridPoints = fn(&Path, File, &ReadOptions, &GridSettings) -> Result<Dem, DemError>;
+type Stream = fn(&Path, &ReadOptions) -> Result<Dem, DemError>;
+type Parse = fn(&Path, Vec<u8>, &ReadOptions) -> Result<Dem, Refusal>;
+type Open = fn(&Path, &ReadOptions) -> Result<BlockReader, DemError>;
+type Claim = fn(&Path, File, &ReadOptions) -> Option<Claimed>;
+type Render = fn(&Path, &Grid, &Crs, &WriteOptions) -> Result<(Vec<u8>, Vec<String>), Refusal>;
+
 /// What the program does with a format.
 pub(super) struct Codec {
     format: Format,
@@ -24,17 +31,17 @@ pub(super) struct Codec {
     /// True for the first bytes of such a file.
     starts: fn(&[u8]) -> bool,
     /// Grids the points of a file; takes it open, at any place.
-    pub grid: Option<fn(&Path, File, &ReadOptions, &GridSettings) -> Result<Dem, DemError>>,
+    pub grid: Option<GridPoints>,
     /// Reads a raster without holding its bytes.
-    pub stream: Option<fn(&Path, &ReadOptions) -> Result<Dem, DemError>>,
+    pub stream: Option<Stream>,
     /// Reads a raster from all of its bytes.
-    pub parse: Option<fn(&Path, Vec<u8>, &ReadOptions) -> Result<Dem, Refusal>>,
+    pub parse: Option<Parse>,
     /// Opens a raster whose rows are decoded as they are asked for.
-    pub open: Option<fn(&Path, &ReadOptions) -> Result<BlockReader, DemError>>,
+    pub open: Option<Open>,
     /// What the header says of the size; takes the file open, behind its first bytes.
-    pub claimed: Option<fn(&Path, File, &ReadOptions) -> Option<Claimed>>,
+    pub claimed: Option<Claim>,
     /// The bytes of a file, and sentences on what it lost.
-    pub render: Option<fn(&Path, &Grid, &Crs, &WriteOptions) -> Result<(Vec<u8>, Vec<String>), Refusal>>,
+    pub render: Option<Render>,
     /// States metres.
     in_metres: bool,
 }
