@@ -72,7 +72,7 @@ fn prop_a_full_report_is_sound() {
     }
     // Three surfaces in one frame, each by its own name.
     let heights = &files["figures/heights-texture.svg"];
-    assert!(["measured residual", "treated alike", "as made"].iter().all(|name| heights.contains(name)));
+    assert!(["measured residual", "synthetic, residual", "as made"].iter().all(|name| heights.contains(name)));
     assert_eq!(summary.bytes, files.values().map(|t| t.len() as u64).sum::<u64>());
     assert!(page.contains("Settings differ"));
 }

@@ -153,7 +153,7 @@ impl Job for DemJob {
         let place = serde_json::to_vec(&place).map_err(JobError::new)?;
         work.write(PLACE, &place)?;
         let products = vec![Product::released(HEIGHTS, path, Some(content)), Product::internal(PLACE)];
-        Ok(Outcome { products, notes, ..Outcome::default() })
+        Ok(Outcome { products, notes })
     }
 }
 

@@ -158,7 +158,7 @@ impl Job for TerrainJob {
             products.push(Product::released("heights.png", format!("terrain/{}.png", self.id), None));
             notes.push(note);
         }
-        let mut outcome = Outcome { products, notes, ..Outcome::default() };
+        let mut outcome = Outcome { products, notes };
         self.exports.write(work, &self.id, &made.heights, &mut outcome)?;
         Ok(outcome)
     }

@@ -189,8 +189,8 @@ fn spectra(data: &Data, texture: &TerrainRow, fit: &str) -> Option<Figure> {
         what: "psd",
         title: "Spectra.",
         caption: "Radially averaged two-dimensional power spectral density.",
-        measured: "The moving average has taken the lowest frequencies out of the measured residual, and out of the texture \
-                   where it was treated alike.",
+        measured: "The moving average has taken the lowest frequencies out of both residuals: that of the DEM, and that of the \
+                   texture.",
     };
     Some(chart.figure(texture, &curves, plot, Numbers::select(&query, rows, &names)))
 }
