@@ -1,7 +1,7 @@
 //! The fit file (JSON): what `fit` writes and `texture` reads.
 
 use crate::coregistration::Minus;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
 
@@ -128,7 +128,7 @@ impl FitFile {
     }
 }
 
-/// What was found about a fit. A figure is absent where it was not looked for, or cannot be told.
+/// What was found about a fit. A figure is absent where it was not looked for, or is undefined.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Diagnostics {
@@ -141,7 +141,7 @@ pub struct Diagnostics {
     /// Rise of the sum of squares at three times the range, over the misfit that there is.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub chi2_rise_at_3b: Option<f64>,
-    /// Shortest lag at which the texture is told from the noise, m; absent where it is not at any lag.
+    /// Shortest lag at which the texture can be distinguished from the noise, m; absent where it cannot at any lag.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub effective_resolution_m: Option<f64>,
     /// Hurst exponent of the self-affine model, where fits at other windows disagree.
@@ -160,7 +160,7 @@ pub struct Diagnostics {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub isotropy_ratio: Option<f64>,
     /// Steps of the search.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(deserialize_with = "whole", skip_serializing_if = "Option::is_none")]
     pub iterations: Option<u64>,
     /// Longest lag of the bins, m.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -180,7 +180,7 @@ pub struct Diagnostics {
     /// Range of the fit without correction for detrending and trimming, m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub naive_range_m: Option<f64>,
-    /// The same in windows.
+    /// Naive range, in windows.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub naive_range_windows: Option<f64>,
     /// Standard deviation of the fit without correction, m.
@@ -196,11 +196,12 @@ pub struct Diagnostics {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub object_share: Option<f64>,
     /// Fits at half and twice the outer scale.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[serde(deserialize_with = "or_default", skip_serializing_if = "Vec::is_empty")]
     pub other_windows: Vec<OtherWindow>,
     /// Whether the search for the range ended at its bound.
+    #[serde(deserialize_with = "or_default")]
     pub range_at_search_bound: bool,
-    /// sigma^2 / b, m, of models that fall in a straight line from lag zero.
+    /// sigma^2 / b, m, of models that are linear in the lag near zero.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sigma2_over_range_m: Option<f64>,
     /// Largest over smallest sigma^2 / b of all windows.
@@ -213,7 +214,7 @@ pub struct Diagnostics {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub trimmed_share: Option<f64>,
     /// Window of the background in cells, east-west and north-south.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(deserialize_with = "two_whole", skip_serializing_if = "Option::is_none")]
     pub window_cells: Option<[usize; 2]>,
     /// Largest disagreement of fits at other windows, standard errors.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -223,17 +224,32 @@ pub struct Diagnostics {
     pub window_lacks_data_share: Option<f64>,
 }
 
+/// `null` as the default: files may be written by hand, or by programs that know no other absence.
+fn or_default<'de, T: Default + Deserialize<'de>, D: Deserializer<'de>>(value: D) -> Result<T, D::Error> {
+    Ok(Option::deserialize(value)?.unwrap_or_default())
+}
+
+/// A count, also as the float that other programs write.
+fn whole<'de, D: Deserializer<'de>>(value: D) -> Result<Option<u64>, D::Error> {
+    Ok(Option::<f64>::deserialize(value)?.map(|count| count as u64))
+}
+
+fn two_whole<'de, D: Deserializer<'de>>(value: D) -> Result<Option<[usize; 2]>, D::Error> {
+    Ok(Option::<[f64; 2]>::deserialize(value)?.map(|counts| counts.map(|count| count as usize)))
+}
+
 /// A fit of the same DEM at another window.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct OtherWindow {
-    /// Longest wave that is left, m.
-    pub outer_scale_m: f64,
+    /// Longest wavelength left in the residual, m.
+    pub outer_scale_m: Option<f64>,
     /// Fitted parameters.
-    pub parameters: BTreeMap<String, f64>,
+    pub parameters: BTreeMap<String, Option<f64>>,
     /// Generalised sum of squares per degree of freedom.
     pub misfit_chi2_per_freedom: Option<f64>,
     /// Root mean square height of the residual, on the cells that all windows have, m.
-    pub band_rms_m: f64,
+    pub band_rms_m: Option<f64>,
 }
 
 /// Name of sigma^2 / b among intervals.
@@ -444,6 +460,19 @@ pub struct GsTools {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Absent, null, floats for counts, keys that are not known: none of it keeps a file from being read.
+    #[test]
+    fn val_diagnostics_of_other_programs_are_read() {
+        let text = r#"{ "model": "exponential", "parameters": { "sigma_m": 1.0 }, "diagnostics": { "iterations": 12.0, "misfit_p": null,
+            "window_cells": [9.0, 11.0], "range_at_search_bound": null, "hurst": 0.5, "no such": [1],
+            "other_windows": [{ "outer_scale_m": 1.0, "band_rms_m": null, "parameters": { "range_m": null } }, {}] } }"#;
+        let found = serde_json::from_str::<FitFile>(text).unwrap().diagnostics;
+        assert_eq!((found.iterations, found.window_cells, found.hurst), (Some(12), Some([9, 11]), Some(0.5)));
+        assert_eq!((found.misfit_p, found.range_at_search_bound, found.other_windows.len()), (None, false, 2));
+        let again: Diagnostics = serde_json::from_str(&serde_json::to_string(&found).unwrap()).unwrap();
+        assert_eq!(again, found);
+    }
 
     fn intervals(range: [Option<f64>; 2], from_profile: bool) -> Option<Intervals> {
         let values = [("range_m".to_owned(), range), (SILL_OVER_RANGE.to_owned(), [Some(0.001), Some(0.002)])].into();

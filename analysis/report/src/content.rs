@@ -133,10 +133,14 @@ impl Numbers {
     }
 
     /// Columns of the rows of a table of the release that meet a condition (all where it is empty), with the names and units of the
-    /// contract; a name the table lacks is left out.
+    /// contract.
+    ///
+    /// # Panics
+    /// When the table has no column of such a name (a bug of the caller).
     pub fn select<'a, R: Record + 'a>(condition: &str, rows: impl IntoIterator<Item = &'a R>, names: &[&str]) -> Self {
         let all = R::TABLE.columns;
-        let indices: Vec<usize> = names.iter().filter_map(|n| all.iter().position(|c| c.name == *n)).collect();
+        let indices: Vec<usize> = names.iter().filter_map(|n| R::TABLE.position(n)).collect();
+        assert_eq!(indices.len(), names.len(), "table {} has not all columns of {names:?}", R::TABLE.name);
         let columns: Vec<(&str, &str)> = indices.iter().map(|&i| (all[i].name, all[i].unit)).collect();
         let quoted = |name: &str| if name == "group" { "\"group\"".to_owned() } else { name.to_owned() };
         let list = columns.iter().map(|c| quoted(c.0)).collect::<Vec<_>>().join(", ");
@@ -221,7 +225,7 @@ mod tests {
     #[test]
     fn val_selected_columns_keep_name_unit_and_order() {
         let row = PsdRow { surface_id: "a".into(), bin: 0, frequency_cycles_m: 0.5, psd_m4: f64::NAN, modes: 4 };
-        let numbers = Numbers::select("modes > 3", [&row], &["modes", "psd_m4", "no such column", "surface_id"]);
+        let numbers = Numbers::select("modes > 3", [&row], &["modes", "psd_m4", "surface_id"]);
         let names: Vec<&str> = numbers.columns.iter().map(|c| c.name.as_str()).collect();
         assert_eq!(names, ["modes", "psd_m4", "surface_id"]);
         assert_eq!(numbers.query, "select modes, psd_m4, surface_id from 'tables/psd/*.parquet' where modes > 3");

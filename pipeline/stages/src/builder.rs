@@ -1,9 +1,9 @@
 //! A study's graph under construction: what is there so far, and what later sections refer to.
 
 use crate::job::ItemRef;
+use crate::operations::drawn::Drawn;
 use crate::runner::graph::{Graph, InputFile, Node};
 use crate::study::{Entry, Study, StudyError};
-use sastrugi_mobility::missions::{Mission, MissionSettings};
 use sastrugi_numeric::{Geometry, Streams};
 use sastrugi_schemas::fit::Source;
 use sastrugi_schemas::study::Pairing;
@@ -11,7 +11,7 @@ use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-/// Endings that files of the release have beside an id.
+/// Suffixes that files of the release add to an id.
 const RESERVED: [&str; 5] = ["raw", "metric", "background", "residual", "mask"];
 
 /// Why a study has no graph.
@@ -53,49 +53,6 @@ pub struct Heightfield {
     pub cell_m: Option<f64>,
     /// Shape and place, where they are known before the run.
     pub geometry: Option<Geometry>,
-}
-
-/// Missions that a traverse can refer to.
-#[derive(Clone, Debug)]
-pub struct Drawn {
-    /// What is drawn on each heightfield.
-    pub lines: Vec<Lines>,
-    /// Missions on each.
-    pub count: usize,
-    /// Length, m.
-    pub length_m: f64,
-}
-
-/// The missions of one heightfield.
-#[derive(Clone, Debug)]
-pub struct Lines {
-    /// Heightfield.
-    pub heightfield: String,
-    /// Item that draws them.
-    pub item: ItemRef,
-    /// Random streams are named by this: the heightfield, or what it shares with others.
-    pub word: String,
-    /// Rules of the draw.
-    pub settings: MissionSettings,
-    /// Number of the replicates that share draws with this one, from 0.
-    pub shared: Option<u64>,
-}
-
-impl Lines {
-    /// Name of a mission's start and goal, for one-by-one comparison.
-    pub fn pair_id(&self, mission: &Mission) -> String {
-        match self.shared {
-            None => format!("{}-{:04}", self.item.id, mission.index + 1),
-            // The same draw is the same line on all that share it.
-            Some(_) => format!("{}-{:04}.{}", self.block(), mission.index + 1, mission.draws),
-        }
-    }
-
-    /// Name of what shares draws: `<missions>-<replicate>`.
-    fn block(&self) -> String {
-        let missions = self.item.id.split_once('@').map_or("", |(missions, _)| missions);
-        format!("{missions}-{:04}", self.shared.unwrap_or(0) + 1)
-    }
 }
 
 /// A graph under construction, with what later sections refer to.

@@ -86,6 +86,12 @@ impl Work<'_> {
         self.folder.file(file)
     }
 
+    /// An error of the item without the folder's path: messages are part of the release, which does not depend on where it is made.
+    fn without_folder(&self, error: JobError) -> JobError {
+        let folder = format!("{}/", self.folder.0.display());
+        if error.cause == Cause::Item { error.reworded(|words| words.replace(&folder, "")) } else { error }
+    }
+
     /// Writes an output of a few bytes.
     ///
     /// # Errors
@@ -105,7 +111,7 @@ pub struct Outcome {
 }
 
 impl Outcome {
-    /// Writes the item's rows of a table, sorted by key; nothing where there is none. A release has the rows of all items.
+    /// Writes the item's rows of a table, sorted by key. Without rows there is no file. The release merges the rows of all items.
     ///
     /// # Errors
     /// Rows that are not sorted, or a table that the item has written (bugs); the file cannot be written.
@@ -122,7 +128,7 @@ impl Outcome {
         if self.products.iter().any(|product| product.file == file) {
             return Err(JobError::new(format!("{file} was written twice")));
         }
-        let summary = write_table(&work.output(&file), rows, None).map_err(JobError::io)?;
+        let summary = write_table(&work.output(&file), rows, None).map_err(|e| work.without_folder(JobError::io(e)))?;
         self.products.push(Product::fragment(file, &R::TABLE, summary));
         Ok(())
     }

@@ -14,6 +14,7 @@ pub mod packing;
 pub mod registry;
 mod revision;
 pub mod runner;
+pub mod schema;
 pub mod splits;
 pub mod studies;
 pub mod study;

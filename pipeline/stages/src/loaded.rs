@@ -1,9 +1,10 @@
 //! A study read from its file: checked, with the graph of its items.
 
+use crate::builder::{BuildError, Builder, InputPlace};
 use crate::error::{Error, of_build};
-use crate::registry::{self, Plan};
+use crate::registry::{self, SECTIONS};
 use crate::runner::graph::Graph;
-use crate::splits::Splits;
+use crate::splits::{self, Splits};
 use crate::study::Study;
 use std::fs;
 use std::ops::Range;
@@ -46,7 +47,7 @@ pub fn load_text(text: &str, name: &str, folder: &Path) -> Result<Loaded, Error>
         text: text.to_owned(),
         error,
     })?;
-    let plan = registry::build(&study).map_err(|error| of_build(name, text, error))?;
+    let plan = build(&study).map_err(|error| of_build(name, text, error))?;
     if plan.graph.is_empty() {
         return Err(Error::Usage(format!("{name}: the study has no items; add [[terrain]], [[dem]] ...")));
     }
@@ -68,4 +69,27 @@ fn released_text(text: &str, study: &Study, plan: &Plan) -> String {
         text.replace_range(span, &path);
         text
     })
+}
+
+/// A study's items.
+struct Plan {
+    /// The graph.
+    graph: Graph,
+    /// Where input files go in the release.
+    inputs: Vec<InputPlace>,
+    /// Which terrains are for training, validation and test.
+    splits: Splits,
+}
+
+/// Builds the graph of a study. Input files are hashed, nothing else is read.
+///
+/// # Errors
+/// The first thing that is wrong with the study, or an input file that cannot be read.
+fn build(study: &Study) -> Result<Plan, BuildError> {
+    let mut builder = Builder::new(study);
+    for section in &SECTIONS {
+        (section.add)(&mut builder)?;
+    }
+    let splits = splits::draw(study, &builder.heightfields, &builder.graph)?;
+    Ok(Plan { graph: builder.graph, inputs: builder.inputs, splits })
 }

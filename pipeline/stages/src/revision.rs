@@ -16,7 +16,7 @@ pub enum Room {
     Statistics,
 }
 
-/// What every stage stands on: schemas, numeric, store, the jobs themselves and the locked dependencies.
+/// What every stage stands on: schemas, numeric, store, the jobs with their trait and operations, and the locked dependencies.
 const FOUNDATION: [&str; 7] = [
     env!("SASTRUGI_REVISION_SCHEMAS"),
     env!("SASTRUGI_REVISION_NUMERIC"),

@@ -8,10 +8,11 @@ use crate::runner::assemble::{artifacts, head, notes_of};
 use crate::runner::cache::{Cache, Record};
 use crate::runner::execute::{Limits, execute};
 use crate::runner::progress::Progress;
+use crate::runner::tables::table_of;
 use crate::splits::{self, Splits};
 use crate::studies::{RunRequest, run};
+use sastrugi_schemas::Table;
 use sastrugi_schemas::manifest::{Artifact, ItemNote, Manifest};
-use sastrugi_schemas::{Table, tables};
 use sastrugi_store::parquet::TableReader;
 use sastrugi_store::release::{self, Head, MANIFEST, Problem, ProblemKind, Release, ReleaseError, VerifyReport};
 use serde::Serialize;
@@ -286,9 +287,8 @@ fn compare_fragments(
 ) -> Result<Vec<Difference>, Error> {
     let mut differences = Vec::new();
     for file in &record.files {
-        let Some(table) = file.product.fragment.as_ref().and_then(|rows| tables::by_name(&rows.table)) else {
-            continue;
-        };
+        let Some(rows) = &file.product.fragment else { continue };
+        let table = table_of(&record.item, rows)?;
         let mut missing = BTreeSet::new();
         for row in TableReader::open(&folder.join(&file.product.file), table).map_err(Error::io)? {
             let mut cells = row.map_err(Error::io)?;
@@ -301,13 +301,13 @@ fn compare_fragments(
 }
 
 /// A difference when the release's table lacks one of these rows.
-fn compare_rows(release: &Release, table: &Table, rows: BTreeSet<String>) -> Result<Option<Difference>, Error> {
-    let mut missing = rows.clone();
+fn compare_rows(release: &Release, table: &Table, mut missing: BTreeSet<String>) -> Result<Option<Difference>, Error> {
+    let count = missing.len();
     for file in release.sealed_parts(table.name) {
         for row in TableReader::open(&file?, table).map_err(ReleaseError::from)? {
             missing.remove(&format!("{:?}", row.map_err(ReleaseError::from)?));
         }
     }
-    let problem = format!("computed again, {} of {} rows differ", missing.len(), rows.len());
+    let problem = format!("computed again, {} of {count} rows differ", missing.len());
     Ok((!missing.is_empty()).then(|| Difference { path: format!("tables/{}", table.name), problem }))
 }

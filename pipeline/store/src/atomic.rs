@@ -6,6 +6,7 @@ use std::fs::{self, File, TryLockError};
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, OnceLock};
 
 /// Start of the name of every file under construction; no artifact's name starts with a dot.
 const TEMPORARY_PREFIX: &str = ".sastrugi-partial-";
@@ -53,6 +54,27 @@ pub struct AtomicFile {
     temporary: PathBuf,
     path: PathBuf,
     in_draft: bool,
+    refused: Refused,
+}
+
+/// What the file system said when it first refused to write to a file: encoders turn such errors into words.
+#[derive(Clone, Debug, Default)]
+pub struct Refused(Arc<OnceLock<i32>>);
+
+impl Refused {
+    /// The error, if there was one.
+    pub fn error(&self) -> Option<io::Error> {
+        self.0.get().map(|code| io::Error::from_raw_os_error(*code))
+    }
+
+    fn note<T>(&self, result: io::Result<T>) -> io::Result<T> {
+        result.inspect_err(|e| {
+            if let Some(code) = e.raw_os_error() {
+                // Only the first is kept.
+                let _ = self.0.set(code);
+            }
+        })
+    }
 }
 
 impl AtomicFile {
@@ -66,7 +88,7 @@ impl AtomicFile {
         fs::create_dir_all(folder)?;
         let (file, temporary) = temporary_file(folder)?;
         let writer = Some(BufWriter::with_capacity(1 << 16, file));
-        Ok(Self { writer, temporary, path: path.to_owned(), in_draft })
+        Ok(Self { writer, temporary, path: path.to_owned(), in_draft, refused: Refused::default() })
     }
 
     /// Brings the file to disk and gives it its name.
@@ -83,6 +105,11 @@ impl AtomicFile {
         if self.in_draft { Ok(()) } else { sync_folder(folder_of(&self.path)) }
     }
 
+    /// To be asked for the file system's own words after an encoder has failed.
+    pub fn refused(&self) -> Refused {
+        self.refused.clone()
+    }
+
     fn writer(&mut self) -> io::Result<&mut BufWriter<File>> {
         self.writer.as_mut().ok_or_else(closed)
     }
@@ -90,10 +117,12 @@ impl AtomicFile {
 
 impl Write for AtomicFile {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.writer()?.write(bytes)
+        let written = self.writer()?.write(bytes);
+        self.refused.note(written)
     }
     fn flush(&mut self) -> io::Result<()> {
-        self.writer()?.flush()
+        let flushed = self.writer()?.flush();
+        self.refused.note(flushed)
     }
 }
 

@@ -8,7 +8,7 @@
 mod tests;
 
 use crate::PROGRAM;
-use crate::atomic::{AtomicFile, Target};
+use crate::atomic::{AtomicFile, Refused, Target};
 use crate::digest::ContentHash;
 use arrow_array::builder::{BooleanBuilder, Float32Builder, Float64Builder, Int64Builder, ListBuilder, StringBuilder};
 use arrow_array::types::{ArrowPrimitiveType, Float32Type, Float64Type};
@@ -92,6 +92,14 @@ impl TableError {
 
     fn unusable(path: &Path, reason: impl ToString) -> Self {
         Self::Unusable { path: path.to_owned(), reason: reason.to_string() }
+    }
+
+    /// An error of the encoder, or of the file system behind it.
+    fn encoding(path: &Path, source: ParquetError, refused: &Refused) -> Self {
+        match refused.error() {
+            Some(error) => Self::io(path, error),
+            None => Self::Encoding { path: path.to_owned(), source },
+        }
     }
 
     fn io(path: &Path, source: io::Error) -> Self {
@@ -202,10 +210,11 @@ pub struct TableWriter {
     /// Keys of the first row, and of the last one so far.
     ends: Option<[Vec<Cell>; 2]>,
     content: ContentHash,
+    refused: Refused,
 }
 
 impl TableWriter {
-    /// Starts a table in a file; without metadata for a file that is none of a release.
+    /// Starts a table in a file; `metadata` is `None` for files outside a release.
     ///
     /// # Errors
     /// The file cannot be made.
@@ -219,6 +228,7 @@ impl TableWriter {
         let encoding = |source| TableError::Encoding { path: path.to_owned(), source };
         let schema = schema(table);
         let file = AtomicFile::create(target).map_err(|e| TableError::io(path, e))?;
+        let refused = file.refused();
         let properties = properties(table, metadata).map_err(encoding)?;
         let writer = ArrowWriter::try_new(file, schema.clone(), Some(properties)).map_err(encoding)?;
         Ok(Self {
@@ -231,6 +241,7 @@ impl TableWriter {
             rows: 0,
             ends: None,
             content: content_hash(table),
+            refused,
         })
     }
 
@@ -263,7 +274,7 @@ impl TableWriter {
         let arrays = self.columns.iter_mut().map(ColumnBuilder::finish).collect();
         let batch = RecordBatch::try_new(self.schema.clone(), arrays).map_err(ParquetError::from);
         let written = batch.and_then(|batch| self.writer.write(&batch));
-        written.map_err(|source| TableError::Encoding { path: self.path.clone(), source })
+        written.map_err(|source| TableError::encoding(&self.path, source, &self.refused))
     }
 
     /// Completes the file and brings it to disk under its name.
@@ -274,8 +285,8 @@ impl TableWriter {
         if self.waiting > 0 {
             self.encode()?;
         }
-        let Self { path, writer, rows, ends, content, .. } = self;
-        let file = writer.into_inner().map_err(|source| TableError::Encoding { path: path.clone(), source })?;
+        let Self { path, writer, rows, ends, content, refused, .. } = self;
+        let file = writer.into_inner().map_err(|source| TableError::encoding(&path, source, &refused))?;
         file.commit().map_err(|e| TableError::io(&path, e))?;
         Ok(TableSummary { rows, ends: ends.unwrap_or_default(), content_sha256: content.finish() })
     }

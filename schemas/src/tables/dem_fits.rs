@@ -87,7 +87,7 @@ impl Record for DemFitRow {
         [self.file.to_cell()].into_iter().chain(inner).chain([self.error.to_cell()]).collect()
     }
 
-    /// The fit's own columns stand apart.
+    /// The fit is a nested object.
     fn to_json(&self) -> Value {
         let mut object = json!({ "file": self.file, "fit": self.fit.to_json() });
         if let (Value::Object(all), Value::Object(beside)) = (&mut object, self.beside.to_json()) {

@@ -86,7 +86,7 @@ pub struct Table {
     pub description: &'static str,
     /// Columns in order.
     pub columns: &'static [Column],
-    /// The key of which every value has a file of its own in a release; without one all rows are in one file.
+    /// Key column by which a release splits the table into files; `None`: one file.
     #[serde(skip)]
     pub file_per: Option<&'static str>,
 }
@@ -323,3 +323,29 @@ macro_rules! table {
     };
 }
 pub(crate) use table;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Keys pass through the records of the work area as JSON.
+    #[test]
+    fn val_cells_pass_through_json() {
+        let text = |word: &str| Cell::Text(word.to_owned());
+        let cells = [
+            Cell::Null,
+            Cell::Bool(true),
+            Cell::I64(i64::MAX),
+            Cell::I64(-1),
+            Cell::F64(1.0),
+            Cell::F64(-0.25),
+            text(""),
+            text("12"),
+            text("null"),
+            Cell::F32List(vec![0.5]),
+        ];
+        let text = serde_json::to_string(&cells).unwrap();
+        assert_eq!(text, "[null,true,9223372036854775807,-1,1.0,-0.25,\"\",\"12\",\"null\",[0.5]]");
+        assert_eq!(serde_json::from_str::<Vec<Cell>>(&text).unwrap(), cells);
+    }
+}

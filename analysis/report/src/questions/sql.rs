@@ -37,12 +37,12 @@ pub fn variants() -> String {
     format!("select variant, \"group\", traverse_id, {COMPARED} from 'tables/missions/*.parquet'")
 }
 
-/// The condition on the terrains of a group.
-pub fn of_group(group: &Group<TerrainRow>) -> String {
+/// The condition on the terrains of a group; `column` holds their ids.
+pub fn of_group(column: &str, group: &Group<TerrainRow>) -> String {
     let plain = if group.rows.iter().all(|t| t.variant.is_none()) { " and variant is null" } else { "" };
     let label = quoted(&group.label);
     format!(
-        "terrain_id in (select terrain_id from 'tables/terrains/*.parquet' where stage = 'terrain' and coalesce(\"group\", kind) = {label}{plain})"
+        "{column} in (select terrain_id from 'tables/terrains/*.parquet' where stage = 'terrain' and coalesce(\"group\", kind) = {label}{plain})"
     )
 }
 

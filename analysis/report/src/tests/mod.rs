@@ -77,6 +77,47 @@ fn prop_a_full_report_is_sound() {
     assert!(page.contains("Settings differ"));
 }
 
+/// What a plain query asks of a table are columns of that table.
+#[test]
+fn prop_conditions_name_columns_of_their_table() {
+    let (files, _) = report(&made_up::full(3, 48));
+    let mut checked = 0;
+    for (name, text) in files.iter().filter(|(name, _)| name.starts_with("data/")) {
+        let json: serde_json::Value = serde_json::from_str(text).unwrap();
+        let query = without_inner(json["query"].as_str().unwrap_or_default());
+        let Some((_, after)) = query.split_once("from 'tables/").filter(|_| !query.contains(" join ")) else {
+            continue;
+        };
+        let (table, condition) = after.split_once("/*.parquet'").unwrap();
+        let Some((_, condition)) = condition.split_once(" where ") else { continue };
+        let columns = sastrugi_schemas::tables::by_name(table).unwrap().columns;
+        let words = ["and", "or", "in", "is", "not", "null", "isfinite", "coalesce"];
+        let condition = condition.split(" group by ").next().unwrap();
+        let outside_of_quotes: String = condition.split('\'').step_by(2).collect();
+        let identifiers = outside_of_quotes.split(|c: char| !c.is_ascii_alphanumeric() && c != '_');
+        for word in identifiers.filter(|w| w.starts_with(|c: char| c.is_ascii_alphabetic()) && !words.contains(w)) {
+            assert!(
+                columns.iter().any(|column| column.name == word),
+                "{name}: {table} has no column {word}: {condition}"
+            );
+            checked += 1;
+        }
+    }
+    assert!(checked > 20, "{checked} columns");
+}
+
+/// A query without the queries inside of it.
+fn without_inner(query: &str) -> String {
+    let Some(start) = query.find("(select") else { return query.to_owned() };
+    let mut depth = 0;
+    let end = query[start..].find(|c: char| {
+        depth += i32::from(c == '(') - i32::from(c == ')');
+        depth == 0
+    });
+    let rest = end.map_or("", |end| &query[start + end + 1..]);
+    without_inner(&format!("{}{rest}", &query[..start]))
+}
+
 /// Every id on the page occurs once, and every link within it has a target.
 #[test]
 fn prop_ids_are_unique() {

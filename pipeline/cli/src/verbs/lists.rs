@@ -8,8 +8,8 @@ use clap::CommandFactory;
 use sastrugi_schemas::topics::ros2::ROS2;
 use sastrugi_schemas::topics::{self, Field, Topic};
 use sastrugi_schemas::{Kind, Table, tables};
-use sastrugi_stages::registry;
 use sastrugi_stages::study::keys::nearest;
+use sastrugi_stages::{registry, schema};
 use serde_json::{Value, json};
 
 /// `kinds`.
@@ -104,7 +104,7 @@ fn resolve<'a>(schema: &'a Value, root: &'a Value) -> &'a Value {
 pub fn schema(args: &Schema, common: &Common) -> Verdict {
     match args.name.as_deref() {
         None | Some("study") => {
-            let schema = registry::study_schema();
+            let schema = schema::study_schema();
             let text = serde_json::to_string_pretty(&schema).map_err(Failure::failed)?;
             print(common.json, &schema, &text)?;
         }

@@ -1,4 +1,4 @@
-//! The blocks that a raster is parted into.
+//! Partition of a raster into blocks.
 
 /// Blocks along either side.
 pub(super) const SIDE: usize = 4;

@@ -100,6 +100,8 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
             return Err(unknown_id(&entry, "dem", &item.dem, builder.heightfields.keys()).into());
         };
         check_noise_reference(item.noise_reference.is_some(), item.minus.is_some()).map_err(|e| entry.refuse(e))?;
+        let expanded = entry.expand(&item.id, None, &item.sweep, &params)?;
+        expanded.iter().try_for_each(|one| builder.claim(&entry, STAGE, &one.id))?;
         let masks = mask::add(builder, &entry, &item)?;
         let noise_reference = mask::add_noise_reference(builder, &entry, &item)?;
         let mask_sources = masks.iter().map(|m| m.source.clone()).collect();
@@ -107,8 +109,7 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
         let minus = item.minus.as_ref().map(|id| Subtrahend::of(builder, &entry, id)).transpose()?;
         let others = masks.iter().chain(&noise_reference).map(|m| &m.item).chain(minus.iter().map(|m| &m.dem));
         let parents: Vec<ItemRef> = [&field.item].into_iter().chain(others).cloned().collect();
-        for one in entry.expand(&item.id, None, &item.sweep, &params)? {
-            builder.claim(&entry, STAGE, &one.id)?;
+        for one in expanded {
             let raw: FitParameters = read_parameters(&one.params).map_err(|e| entry.refuse(e))?;
             let settings = FitSettings::try_from(raw).map_err(|e| entry.refuse(e))?;
             if noise_reference.is_some() {

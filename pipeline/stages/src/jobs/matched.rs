@@ -48,7 +48,7 @@ impl Matched {
         }
     }
 
-    /// What a texture of the method takes. Of a fit of the study that is known only as far as the method's parameters tell.
+    /// What a texture of the method takes. For a fit of the study, only what the method's parameters determine.
     ///
     /// # Errors
     /// A stated covariance that the method refuses.

@@ -1,9 +1,10 @@
 //! Stage `missions`: straight missions drawn on the closed class map of each heightfield.
 
 use super::roughness;
-use crate::builder::{BuildError, Builder, Drawn, Lines, common};
+use crate::builder::{BuildError, Builder, common};
 use crate::job::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work};
 use crate::operations::dem::input_error;
+use crate::operations::drawn::{Drawn, Lines};
 use crate::revision::Room;
 use crate::runner::graph::Node;
 use crate::study::Entry;

@@ -1,4 +1,4 @@
-//! One file per stage, each the glue between a kernel and the files of an item.
+//! One file per stage, the glue between a kernel and the files of an item, and what several of them share.
 
 pub mod dem;
 pub mod exports;

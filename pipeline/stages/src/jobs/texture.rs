@@ -278,6 +278,9 @@ fn methods(entry: &Entry<'_>, item: &TextureItem, kinds: &[Kind]) -> Result<Vec<
             let message = format!("`{key}` is `{other}`; known texture methods: {}", known.join(", "));
             Err(entry.error(key, message))
         }
+        None if (1..wanted.len()).any(|k| wanted[..k].contains(&wanted[k])) => {
+            Err(entry.error(key, "`methods` names a method twice"))
+        }
         None if wanted.is_empty() => Err(entry.error(key, "`methods` is empty; name at least one, or \"all\"")),
         None => Ok(wanted),
     }

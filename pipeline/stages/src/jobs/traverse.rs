@@ -2,9 +2,10 @@
 
 use super::dem as measured;
 use super::{missions, roughness};
-use crate::builder::{BuildError, Builder, HEIGHTS, Heightfield, Lines, unknown_id};
+use crate::builder::{BuildError, Builder, HEIGHTS, Heightfield, unknown_id};
 use crate::job::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work};
 use crate::operations::dem::input_error;
+use crate::operations::drawn::Lines;
 use crate::revision::Room;
 use crate::runner::graph::Node;
 use crate::study::entry::joined;

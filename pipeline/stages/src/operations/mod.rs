@@ -1,7 +1,8 @@
-//! What the jobs of a study and the verbs on single files do alike.
+//! Code that several jobs, or jobs and verbs, share.
 
 pub mod coregistration;
 pub mod dem;
+pub mod drawn;
 pub mod fits;
 pub mod masks;
 pub mod place;

@@ -4,6 +4,7 @@
 //! lines on its files and the keys of its rows stay in memory.
 
 use super::cache::{Record, StoredFile, load_record};
+use super::damage::damaged;
 use super::execute::Failure;
 use super::lock;
 use super::progress::Progress;
@@ -169,7 +170,7 @@ fn add_results(
         let record = record(folder)?;
         sources.trace(&record);
         add_artifacts(builder, &record, folder, sources)?;
-        fragments.add(&record, folder);
+        fragments.add(&record, folder)?;
         notes.extend(notes_of(&record));
     }
     notes.sort_by(|a, b| (&a.stage, &a.item).cmp(&(&b.stage, &b.item)));
@@ -198,13 +199,6 @@ fn add_artifacts(builder: &mut ReleaseBuilder, record: &Record, folder: &Path, s
         Some(((file, _), _)) => Err(damaged(folder, &record.item, &file.product.file)),
         None => Ok(()),
     }
-}
-
-/// A result that is not what it was when it was made is dropped, so that the next run makes it again.
-fn damaged(folder: &Path, item: &ItemRef, file: &str) -> Error {
-    let dropped = std::fs::remove_dir_all(folder).is_ok();
-    let advice = if dropped { "it was dropped; run again" } else { "remove it and run again" };
-    Error::Failed(format!("{item}: {file} was changed in the work area {}; {advice}", folder.display()))
 }
 
 fn add_documents(builder: &mut ReleaseBuilder, contents: &Contents<'_>, sources: &Sources) -> Result<(), Error> {

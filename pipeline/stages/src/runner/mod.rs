@@ -2,6 +2,7 @@
 
 pub mod assemble;
 pub mod cache;
+pub mod damage;
 pub mod execute;
 pub mod graph;
 mod lock;

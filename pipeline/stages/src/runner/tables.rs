@@ -1,65 +1,78 @@
 //! The tables of a release: the rows that items left, merged by key, whichever stage made them.
 //!
-//! Each item leaves one sorted file of rows for a table, its fragment. Fragments whose keys do not overlap follow one another as they
-//! are read, a batch at a time; overlapping ones are held together and sorted. Fragments with the same rows (the parameters of one run
-//! on many terrains) count once.
+//! Each item writes one sorted file of rows for a table, its fragment. Fragments with disjoint ranges of keys are copied one after the
+//! other, a batch at a time; overlapping ones are loaded together and sorted. Fragments with the same rows (the parameters of one run on
+//! many terrains) count once.
 
-use super::cache::{Record, StoredFile};
+use super::cache::Record;
+use super::damage::damaged;
 use crate::error::Error;
+use crate::job::{Fragment, ItemRef};
 use crate::splits::{self, Splits};
 use sastrugi_schemas::manifest::Origin;
 use sastrugi_schemas::tables::{self, compare_keys};
 use sastrugi_schemas::{Cell, Table};
+use sastrugi_store::digest;
 use sastrugi_store::parquet::TableReader;
 use sastrugi_store::release::{PartWriter, ReleaseBuilder, TablePart};
 use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// The fragments of all items.
 #[derive(Default)]
-pub struct Fragments(BTreeMap<String, OfTable>);
+pub struct Fragments(BTreeMap<&'static str, OfTable>);
 
 /// The fragments of one table.
 #[derive(Default)]
 struct OfTable {
     stages: BTreeSet<String>,
-    /// What the items were made from that leave no other file which could say so.
+    /// Parents of items that release no other file; the manifest names them with the table.
     parents: BTreeSet<String>,
-    fragments: Vec<Fragment>,
+    fragments: Vec<Found>,
 }
 
-struct Fragment {
-    /// Folder of the item's result.
-    folder: Arc<Path>,
+/// A fragment and where it is.
+struct Found {
+    result: Arc<Made>,
     file: String,
-    /// Hash of the rows.
-    content: Option<String>,
+    /// Hash of the file: equal rows have equal bytes.
+    sha256: String,
     /// Keys of the first and the last row.
     ends: [Vec<Cell>; 2],
 }
 
+/// A result.
+struct Made {
+    folder: PathBuf,
+    item: ItemRef,
+}
+
 impl Fragments {
     /// Takes the fragments of an item, whose result is in `folder`.
-    pub fn add(&mut self, record: &Record, folder: &Path) {
-        let folder: Arc<Path> = folder.into();
-        let files = record.files.iter();
-        let releases_no_file = files.clone().all(|file| file.product.release_path.is_none());
-        for (StoredFile { product, .. }, rows) in files.filter_map(|file| Some((file, file.product.fragment.as_ref()?)))
-        {
-            let of_table = self.0.entry(rows.table.clone()).or_default();
+    ///
+    /// # Errors
+    /// Rows of a table that is not known, or of more than one file of a table.
+    pub fn add(&mut self, record: &Record, folder: &Path) -> Result<(), Error> {
+        let result = Arc::new(Made { folder: folder.to_owned(), item: record.item.clone() });
+        let releases_no_file = record.files.iter().all(|file| file.product.release_path.is_none());
+        for file in &record.files {
+            let Some(rows) = &file.product.fragment else { continue };
+            let table = table_of(&record.item, rows)?;
+            let of_table = self.0.entry(table.name).or_default();
             of_table.stages.insert(record.item.stage.clone());
             if releases_no_file {
                 of_table.parents.extend(record.ingredients.parents.keys().cloned());
             }
-            of_table.fragments.push(Fragment {
-                folder: Arc::clone(&folder),
-                file: product.file.clone(),
-                content: product.content.clone(),
+            of_table.fragments.push(Found {
+                result: Arc::clone(&result),
+                file: file.product.file.clone(),
+                sha256: file.sha256.clone(),
                 ends: rows.ends.clone(),
             });
         }
+        Ok(())
     }
 
     /// Writes all tables, several files at a time.
@@ -92,11 +105,11 @@ impl OfTable {
     }
 
     /// The fragments of each file of the table, sorted by their keys, each once.
-    fn parts(mut self, table: &Table) -> BTreeMap<String, Vec<Fragment>> {
-        self.fragments.sort_by(Fragment::compare);
+    fn parts(mut self, table: &Table) -> BTreeMap<String, Vec<Found>> {
+        self.fragments.sort_by(Found::compare);
         self.fragments.dedup_by(|a, b| a.compare(b) == Ordering::Equal);
         let column = table.file_per.and_then(|key| table.position(key));
-        let mut parts: BTreeMap<String, Vec<Fragment>> = BTreeMap::new();
+        let mut parts: BTreeMap<String, Vec<Found>> = BTreeMap::new();
         for fragment in self.fragments {
             let name = match column.and_then(|column| fragment.ends[0].get(column)) {
                 Some(Cell::Text(value)) => value.clone(),
@@ -108,20 +121,44 @@ impl OfTable {
     }
 }
 
-impl Fragment {
+/// The table of a fragment.
+///
+/// # Errors
+/// A table that is not known, keys that are not the table's, or rows of more than one file of a table.
+pub fn table_of(item: &ItemRef, rows: &Fragment) -> Result<&'static Table, Error> {
+    let name = &rows.table;
+    let Some(table) = tables::by_name(name) else {
+        return Err(Error::Failed(format!("{item} left rows of an unknown table `{name}`")));
+    };
+    let column = table.file_per.and_then(|key| table.position(key));
+    let one_file = column.is_none_or(|column| rows.ends[0].get(column) == rows.ends[1].get(column));
+    if rows.ends.iter().all(|end| end.len() == table.key_count()) && one_file {
+        return Ok(table);
+    }
+    Err(Error::Failed(format!("{item} left rows of the table `{name}` whose keys do not fit it")))
+}
+
+impl Found {
     /// Orders by keys; equal are fragments with the same rows.
     fn compare(&self, other: &Self) -> Ordering {
         let of_end = |end: usize| compare_keys(&self.ends[end], &other.ends[end]);
-        of_end(0).then_with(|| of_end(1)).then_with(|| self.content.cmp(&other.content))
+        of_end(0).then_with(|| of_end(1)).then_with(|| self.sha256.cmp(&other.sha256))
     }
 
+    /// The rows; a file that is not what it was when it was made is an error.
     fn rows(&self, table: &Table) -> Result<TableReader, Error> {
-        TableReader::open(&self.folder.join(&self.file), table).map_err(Error::io)
+        let Made { folder, item } = &*self.result;
+        let path = folder.join(&self.file);
+        let (_, sha256) = digest::of_file(&path).map_err(|e| Error::at(&path, e))?;
+        match sha256 == self.sha256 {
+            true => TableReader::open(&path, table).map_err(Error::io),
+            false => Err(damaged(folder, item, &self.file)),
+        }
     }
 }
 
 /// Writes the rows of fragments that are sorted by their first keys.
-fn merge(table: &Table, fragments: &[Fragment], splits: &Splits, writer: &mut PartWriter<'_>) -> Result<(), Error> {
+fn merge(table: &Table, fragments: &[Found], splits: &Splits, writer: &mut PartWriter<'_>) -> Result<(), Error> {
     let mut push = |mut cells: Vec<Cell>| {
         splits::fill(table, &mut cells, splits);
         writer.push(cells).map_err(Error::from)
@@ -139,7 +176,7 @@ fn merge(table: &Table, fragments: &[Fragment], splits: &Splits, writer: &mut Pa
 }
 
 /// How many fragments from the first on overlap.
-fn overlapping(fragments: &[Fragment]) -> usize {
+fn overlapping(fragments: &[Found]) -> usize {
     let mut last = &fragments[0].ends[1];
     let mut count = 1;
     while let Some(next) = fragments.get(count).filter(|next| compare_keys(&next.ends[0], last) != Ordering::Greater) {
@@ -151,30 +188,37 @@ fn overlapping(fragments: &[Fragment]) -> usize {
     count
 }
 
-/// The rows of fragments together, sorted by key. Rows that are there twice are kept once; the writer refuses two rows of one key.
-fn sorted_rows(table: &Table, fragments: &[Fragment]) -> Result<Vec<Vec<Cell>>, Error> {
+/// The rows of fragments together, sorted by key. Rows that are there twice are kept once. (Every table has keys.)
+fn sorted_rows(table: &Table, fragments: &[Found]) -> Result<Vec<Vec<Cell>>, Error> {
     let mut rows = Vec::new();
     for fragment in fragments {
         for row in fragment.rows(table)? {
-            rows.push(row.map_err(Error::io)?);
+            rows.push((row.map_err(Error::io)?, &fragment.result.item));
         }
     }
     let keys = table.key_count();
-    rows.sort_by(|a, b| compare_keys(&a[..keys], &b[..keys]));
-    rows.dedup();
-    Ok(rows)
+    rows.sort_by(|(a, _), (b, _)| compare_keys(&a[..keys], &b[..keys]));
+    rows.dedup_by(|(a, _), (b, _)| a == b);
+    let contradict = |pair: &[(Vec<Cell>, _)]| compare_keys(&pair[0].0[..keys], &pair[1].0[..keys]) == Ordering::Equal;
+    let Some(pair) = rows.windows(2).find(|pair| contradict(pair)) else {
+        return Ok(rows.into_iter().map(|(row, _)| row).collect());
+    };
+    let mut items = [pair[0].1.to_string(), pair[1].1.to_string()];
+    items.sort();
+    let (key, items) = (serde_json::json!(pair[0].0[..keys]), items.join(" and "));
+    Err(Error::Failed(format!("table {}: different rows of the key {key}, from {items}", table.name)))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::job::{ItemRef, Outcome, Product};
+    use crate::job::{Outcome, Product};
+    use crate::runner::cache::StoredFile;
     use crate::runner::graph::Ingredients;
-    use sastrugi_schemas::Record as Row;
-    use sastrugi_schemas::tables::{CandidateCurveRow, ParameterRow};
+    use sastrugi_schemas::tables::{CandidateCurveRow, ParameterRow, SampleRow, TerrainRow};
+    use sastrugi_schemas::{ColumnType, Record as Row};
     use sastrugi_store::parquet::write_table;
     use sastrugi_store::release::{Head, Release};
-    use std::path::PathBuf;
 
     /// A work area and a release of it.
     struct Area {
@@ -196,14 +240,13 @@ mod tests {
             let path = folder.join("rows.parquet");
             let summary = write_table(path.as_path(), rows, None).unwrap();
             let mut outcome = Outcome::default();
-            let mut product = Product::internal("rows.parquet");
-            product.content = Some(summary.content_sha256);
-            product.fragment = Some(crate::job::Fragment { table: R::TABLE.name.to_owned(), ends: summary.ends });
-            outcome.products.push(product);
+            let fragment = Some(Fragment { table: R::TABLE.name.to_owned(), ends: summary.ends });
+            outcome.products.push(Product { fragment, ..Product::internal("rows.parquet") });
             if releases {
                 outcome.products.push(Product::released("a", "a".to_owned(), None));
             }
-            let stored = |product| StoredFile { product, bytes: 0, sha256: String::new() };
+            let (_, sha256) = digest::of_file(&path).unwrap();
+            let stored = |product| StoredFile { product, bytes: 0, sha256: sha256.clone() };
             let ingredients = Ingredients {
                 recipe: serde_json::Value::Null,
                 packing: serde_json::Value::Null,
@@ -219,10 +262,14 @@ mod tests {
                 files: outcome.products.into_iter().map(stored).collect(),
                 notes: Vec::new(),
             };
-            self.fragments.add(&record, &folder);
+            self.fragments.add(&record, &folder).unwrap();
         }
 
         fn release(&mut self) -> Result<Release, Error> {
+            self.release_with(&Splits::new())
+        }
+
+        fn release_with(&mut self, splits: &Splits) -> Result<Release, Error> {
             let head = Head {
                 name: "x".to_owned(),
                 study_sha256: String::new(),
@@ -232,7 +279,7 @@ mod tests {
             };
             let dest = self.folder.path().join("release");
             let mut builder = ReleaseBuilder::beside(&dest, head)?;
-            std::mem::take(&mut self.fragments).write(&mut builder, &Splits::new())?;
+            std::mem::take(&mut self.fragments).write(&mut builder, splits)?;
             Ok(builder.seal(&dest)?)
         }
     }
@@ -273,7 +320,7 @@ mod tests {
         let mut area = Area::new();
         ["50.0", "51.0"].into_iter().for_each(|mass| area.leave("traverse", of_run(mass), true));
         let error = area.release().unwrap_err().to_string();
-        assert!(error.contains("order of its keys"), "{error}");
+        assert!(error.contains("[\"run\",\"mass_kg\"], from traverse/1 and traverse/2"), "{error}");
     }
 
     #[test]
@@ -290,5 +337,77 @@ mod tests {
         let (curves, parameters) = (origin("candidate_curves"), origin("parameters"));
         assert_eq!((curves.stage.as_str(), curves.parents.len()), ("fit+texture", 0));
         assert_eq!((parameters.stage.as_str(), parameters.parents), ("traverse", vec!["fit/x".to_owned()]));
+    }
+
+    fn any<R: Row>(set: impl Fn(&str) -> Option<Cell>) -> R {
+        let cell = |column: &sastrugi_schemas::Column| match (set(column.name), column.column_type) {
+            (Some(cell), _) => cell,
+            (None, ColumnType::Text) => Cell::Text(String::new()),
+            (None, ColumnType::I64) => Cell::I64(0),
+            (None, ColumnType::Bool) => Cell::Bool(false),
+            (None, ColumnType::F64) => Cell::F64(0.0),
+            (None, ColumnType::F32List) => Cell::F32List(Vec::new()),
+            (None, ColumnType::F64List) => Cell::F64List(Vec::new()),
+        };
+        R::from_cells(R::TABLE.columns.iter().map(cell).collect()).unwrap()
+    }
+
+    /// Samples have a file for each terrain; terrains get their part of the split.
+    #[test]
+    fn val_files_by_key_and_splits_are_filled() {
+        let mut area = Area::new();
+        let of = |terrain: &'static str, mission: &'static str| -> SampleRow {
+            any(|name| match name {
+                "terrain_id" => Some(Cell::Text(terrain.to_owned())),
+                "mission_id" => Some(Cell::Text(mission.to_owned())),
+                _ => None,
+            })
+        };
+        area.leave("traverse", vec![of("b", "run-0001")], true);
+        area.leave("traverse", vec![of("a", "walk-0001")], true);
+        area.leave("traverse", vec![of("a", "run-0001")], true);
+        let terrain =
+            |id: &'static str| any::<TerrainRow>(|name| (name == "terrain_id").then(|| Cell::Text(id.to_owned())));
+        area.leave("roughness", vec![terrain("b")], true);
+        area.leave("roughness", vec![terrain("a")], true);
+        let release = area.release_with(&[("a".to_owned(), "test".to_owned())].into()).unwrap();
+        let names: Vec<String> = release
+            .table_files("samples")
+            .iter()
+            .map(|path| path.file_name().unwrap().to_string_lossy().into_owned())
+            .collect();
+        assert_eq!(names, ["part-a.parquet", "part-b.parquet"]);
+        let missions: Vec<String> = release.rows::<SampleRow>().unwrap().into_iter().map(|r| r.mission_id).collect();
+        assert_eq!(missions, ["run-0001", "walk-0001", "run-0001"]);
+        let splits: Vec<Option<String>> = release.rows::<TerrainRow>().unwrap().into_iter().map(|r| r.split).collect();
+        assert_eq!(splits, [Some("test".to_owned()), None]);
+    }
+
+    /// A file that changed since it was made is dropped with its item's result, so that the next run makes it again.
+    #[test]
+    fn val_a_changed_fragment_is_dropped() {
+        let mut area = Area::new();
+        area.leave("fit", vec![curve("a", 1, 0)], true);
+        let path = area.folder.path().join("1/rows.parquet");
+        let mut bytes = std::fs::read(&path).unwrap();
+        let middle = bytes.len() / 2;
+        bytes[middle] ^= 1;
+        std::fs::write(&path, bytes).unwrap();
+        let error = area.release().unwrap_err().to_string();
+        assert!(error.contains("fit/1: rows.parquet was changed") && !path.exists(), "{error}");
+    }
+
+    #[test]
+    fn val_rows_that_fit_no_table_are_refused() {
+        let item = ItemRef::new("fit", "a");
+        let text = |words: &[&str]| words.iter().map(|w| Cell::Text((*w).to_owned())).collect::<Vec<_>>();
+        let refused = |table: &str, first: &[&str], last: &[&str]| {
+            let rows = Fragment { table: table.to_owned(), ends: [text(first), text(last)] };
+            table_of(&item, &rows).err().map(|e| e.to_string()).unwrap_or_default()
+        };
+        assert!(refused("crests", &["a"], &["b"]).contains("fit/a left rows of an unknown table `crests`"));
+        assert!(refused("fits", &["a", "b"], &["b", "c"]).contains("do not fit it"));
+        assert!(refused("samples", &["a", "m", "0"], &["b", "m", "0"]).contains("do not fit it"));
+        assert_eq!(refused("fits", &["a"], &["b"]), "");
     }
 }

@@ -1,4 +1,4 @@
-//! The table of formats: how each is told, read and written. It names the formats; none of them knows it.
+//! The table of formats: how each is recognised, read and written. It imports the formats; none imports it.
 
 use super::blocks::BlockReader;
 use super::crs::Crs;
@@ -47,7 +47,7 @@ pub(super) struct Codec {
 }
 
 impl Codec {
-    /// A format that can do nothing yet.
+    /// An entry without capabilities.
     const fn new(format: Format, name: &'static str, endings: &'static [&'static str]) -> Self {
         Self {
             format,
@@ -65,7 +65,7 @@ impl Codec {
     }
 }
 
-/// One entry for each format. No start of a file is that of two.
+/// One entry for each format. No two formats match the same first bytes.
 static CODECS: [Codec; 9] = [
     Codec {
         starts: geotiff::looks_like,

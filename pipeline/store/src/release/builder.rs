@@ -333,7 +333,7 @@ fn remove_folder(folder: &Path) -> Result<(), ReleaseError> {
     }
 }
 
-/// A folder under construction, `.sastrugi-assembling-<dest>`. Unless it is put in place, it is removed with this value.
+/// A folder under construction, `.sastrugi-assembling-<dest>`: removed on drop unless it was put in place.
 #[derive(Debug)]
 pub struct Staging(PathBuf);
 
@@ -354,7 +354,7 @@ impl Staging {
         &self.0
     }
 
-    /// Gives the finished folder its name; what has the name is replaced, and is there until then.
+    /// Gives the finished folder its name. It replaces what has that name, which stays until then.
     ///
     /// # Errors
     /// The file system refused.

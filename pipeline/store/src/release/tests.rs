@@ -131,7 +131,7 @@ fn val_a_changed_table_description_is_found() {
     sealed(&dest);
     let path = dest.join("tables/psd/part-0000.parquet");
     let error = crate::parquet::check_table(&path, &CovarianceRow::TABLE).unwrap_err();
-    assert!(error.to_string().contains("terrain_id"), "{error}");
+    assert!(error.to_string().contains("surface_id"), "{error}");
     assert_eq!(crate::parquet::check_table(&path, &PsdRow::TABLE).unwrap(), 9000);
 }
 

@@ -1,4 +1,4 @@
-//! Lags in cells, as metres.
+//! Lags in cells converted to metres.
 
 /// A lag in cells as `[east, north]` in m: rows count southwards.
 pub fn lag_m([row, col]: [isize; 2], cell_m: [f64; 2]) -> [f64; 2] {

@@ -37,7 +37,7 @@ impl<'a> NullSurfaces<'a> {
         Self { case, cols, trusted, simulator }
     }
 
-    /// The one of these streams.
+    /// The surface drawn from these streams.
     pub fn one(&self, streams: &Streams) -> NullSurface {
         let mut surface = self.simulator.surface(streams);
         surface.iter_mut().zip(&self.trusted).filter(|(_, trusted)| !**trusted).for_each(|(z, _)| *z = f64::NAN);

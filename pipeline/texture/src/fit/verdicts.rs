@@ -254,10 +254,11 @@ pub fn candidates(estimates: &[Estimate], rings: &Estimator) -> Vec<Candidate> {
 
 /// A fit at another window as a diagnostic.
 pub fn other_window(at: &AtWindow) -> OtherWindow {
+    let parameters = at.estimate.covariance.parameters(&at.estimate.form);
     OtherWindow {
-        band_rms_m: at.rms_m,
+        band_rms_m: Some(at.rms_m),
         misfit_chi2_per_freedom: at.estimate.misfit_ratio(),
-        outer_scale_m: at.outer_scale_m,
-        parameters: at.estimate.covariance.parameters(&at.estimate.form),
+        outer_scale_m: Some(at.outer_scale_m),
+        parameters: parameters.into_iter().map(|(name, value)| (name, Some(value))).collect(),
     }
 }

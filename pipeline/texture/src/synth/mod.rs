@@ -1,6 +1,6 @@
 //! Synthetic texture: random fields with a given covariance. One folder per method.
 //!
-//! A method (a [`Kernel`]) makes one tile of a normal field (bumps: nearly normal). What methods have in common is done
+//! A method ([`Method`], its [`Kernel`] once the fit is bound) makes one tile of a normal field (bumps: nearly normal). What methods have in common is done
 //! around it, once ([`Texture`]): size and cells, anisotropy, a height distribution, repetition, and the comparison of the
 //! covariance that the method gives on average with the one that was asked for.
 //!
@@ -30,7 +30,7 @@ use serde::de::DeserializeOwned;
 use serde_json::Value;
 use tile::Tile;
 
-/// A method with checked parameters, before it is known what its textures match.
+/// A method with checked parameters, before the fit is known.
 pub trait Method: Send + Sync {
     /// Shape and cells of the texture; its south-west corner is the origin.
     fn geometry(&self) -> Geometry;
@@ -57,7 +57,7 @@ pub struct Cost {
     pub operations: f64,
 }
 
-/// A method and what its textures match, ready to make fields.
+/// A method bound to a fit, ready to generate fields.
 pub trait Synthesis: Send + Sync {
     /// Shape and cells of the texture; its south-west corner is the origin.
     fn geometry(&self) -> Geometry;

@@ -171,6 +171,11 @@ impl Tile {
         }
     }
 
+    /// The ratio of ranges that is asked for in place of the fit's.
+    pub fn stated_ratio(&self) -> Option<f64> {
+        self.parameters.ratio
+    }
+
     /// Whether an anisotropy other than the fit's is asked for.
     pub fn turns(&self) -> bool {
         self.parameters.ratio.is_some() || self.parameters.azimuth_deg.is_some()

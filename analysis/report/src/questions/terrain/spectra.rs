@@ -46,7 +46,7 @@ pub fn spectra(data: &Data, groups: &[Group<TerrainRow>]) -> Vec<Figure> {
         let rows: Vec<&PsdRow> = group.rows.iter().flat_map(|t| data.spectrum(&t.terrain_id)).collect();
         let names = ["surface_id", "bin", "frequency_cycles_m", "psd_m4", "modes"];
         let numbers = Numbers::select(
-            &format!("{} and frequency_cycles_m > 0 and psd_m4 > 0", sql::of_group(group)),
+            &format!("{} and frequency_cycles_m > 0 and psd_m4 > 0", sql::of_group("surface_id", group)),
             rows,
             &names,
         );
@@ -70,8 +70,12 @@ pub fn distributions(data: &Data, groups: &[Group<TerrainRow>]) -> Vec<Figure> {
             set::fixed(kurtosis, 2)
         );
         let rows: Vec<&HeightDistributionRow> = group.rows.iter().flat_map(|t| data.histogram(&t.terrain_id)).collect();
-        let names = ["terrain_id", "bin", "low_m", "high_m", "cells", "density_per_m"];
-        let numbers = Numbers::select(&format!("{} and isfinite(density_per_m)", sql::of_group(group)), rows, &names);
+        let names = ["surface_id", "bin", "low_m", "high_m", "cells", "density_per_m"];
+        let numbers = Numbers::select(
+            &format!("{} and isfinite(density_per_m)", sql::of_group("surface_id", group)),
+            rows,
+            &names,
+        );
         finish(id, format!("Heights, group {}.", group.name), &description.clone(), description, plot, numbers)
     };
     drawn.iter().map(figure).collect()

@@ -200,8 +200,8 @@ fn distributions(data: &Data, texture: &TerrainRow, fit: &str) -> Option<Figure>
     let id = slug(&format!("heights-{}", texture.terrain_id));
     let plot = (!curves.is_empty()).then(|| curves::distributions(&id, &curves, curves::ranges(&curves)))?;
     let rows = sides(fit, texture).into_iter().flat_map(|(_, id, _)| data.histogram(&id));
-    let names = ["terrain_id", "bin", "low_m", "high_m", "cells", "density_per_m"];
-    let query = format!("terrain_id in ({}) and isfinite(density_per_m)", ids(fit, texture));
+    let names = ["surface_id", "bin", "low_m", "high_m", "cells", "density_per_m"];
+    let query = format!("surface_id in ({}) and isfinite(density_per_m)", ids(fit, texture));
     let chart = Chart {
         what: "heights",
         title: "Heights.",

@@ -164,6 +164,9 @@ impl MethodParameters for FftMaParameters {
         if self.spectrum == SpectrumOf::Eq10 && self.covariance == CovarianceOf::Residual {
             return Err(not_of_a_surface());
         }
+        if self.spectrum == SpectrumOf::Eq10 && tile.stated_ratio().is_some_and(|ratio| ratio != 1.0) {
+            return Err(ParameterError::new("spectrum", "is `eq10`, which is isotropic; leave out `ratio`"));
+        }
         let cells = self.torus_of_any(tile).map(|n| n as f64);
         if cells[0] * cells[1] > CELLS_MAX as f64 {
             let message = format!(
@@ -177,7 +180,8 @@ impl MethodParameters for FftMaParameters {
 
     fn cost(&self, tile: &Tile) -> Cost {
         let [rows, cols] = self.torus_of_any(tile);
-        cost(rows * cols, tile.geometry.len(), 0)
+        // As for a measured covariance or a residual, which takes most.
+        cost(rows * cols, tile.geometry.len(), 1)
     }
 
     /// Refuses Eq. 10 of a covariance that is no isotropic exponential, a residual of a fit without a window, and cells that are no

@@ -69,17 +69,20 @@ impl MethodParameters for GaussiansParameters {
         self.scale_m.map(|scale_m| ParameterError::positive("scale_m", scale_m)).transpose()?;
         match (self.bumps, self.scale_m) {
             (Some(count), _) => check_count(count),
-            (None, Some(along_m)) => check_count(usual_count(tile, along_m, along_m)),
+            (None, Some(along_m)) => {
+                check_count(usual_count(tile, along_m, along_m * tile.stated_ratio().unwrap_or(1.0)))
+            }
             (None, None) => Ok(()),
         }
     }
 
     fn cost(&self, tile: &Tile) -> Cost {
-        // Without a scale, as for the narrowest bumps that the cells can show.
+        // Without a scale, assume the narrowest bumps that the cells resolve.
         let least_m = 2.0 * tile.geometry.cell[0].min(tile.geometry.cell[1]);
         let along_m = self.scale_m.unwrap_or(least_m);
-        let count = self.bumps.unwrap_or_else(|| usual_count(tile, along_m, along_m));
-        let class = Class { along_m, across_m: along_m, count, variance_m2: 1.0 };
+        let across_m = along_m * tile.stated_ratio().unwrap_or(1.0);
+        let count = self.bumps.unwrap_or_else(|| usual_count(tile, along_m, across_m)).min(COUNT_MAX);
+        let class = Class { along_m, across_m, count, variance_m2: 1.0 };
         cost(&Torus::new(tile.geometry, 0.0), &class, &tile.geometry)
     }
 

@@ -37,6 +37,8 @@ const SMALLEST_CELLS: f64 = 0.7;
 const LARGEST_SHARE: f64 = 0.5;
 /// Most classes.
 const CLASSES_MAX: usize = 64;
+/// Sizes that are assumed where the covariance is not known.
+const SIZES: f64 = 10.0;
 /// Most bumps of a class.
 const COUNT_MAX: f64 = 1e8;
 /// Lags along each direction that are compared.
@@ -95,7 +97,7 @@ impl MethodParameters for QuasiWaveletsParameters {
         true
     }
 
-    fn check(&self, _: &Tile) -> Result<(), ParameterError> {
+    fn check(&self, tile: &Tile) -> Result<(), ParameterError> {
         let &Self { size_ratio, packing, intermittency } = self;
         if !(0.3..=0.9).contains(&size_ratio) {
             return Err(ParameterError::new("size_ratio", format!("is {size_ratio}; it must lie in [0.3, 0.9]")));
@@ -108,16 +110,24 @@ impl MethodParameters for QuasiWaveletsParameters {
         if !(0.0..=2.0).contains(&intermittency) {
             return Err(ParameterError::new("intermittency", format!("is {intermittency}; it must lie in [0, 2]")));
         }
+        let least = self.least_count(tile);
+        if least > COUNT_MAX {
+            let message = format!("is {packing}: {least:.1e} bumps or more; the most is {COUNT_MAX:.0e}");
+            return Err(ParameterError::new("packing", message));
+        }
         Ok(())
     }
 
     fn cost(&self, tile: &Tile) -> Cost {
-        let [width_m, height_m] = tile.geometry.size();
-        // Without the covariance, as for one that reaches across the tile: that takes most sizes.
-        match classes(self, &tile.geometry, width_m.max(height_m), 1.0) {
-            Ok(classes) => cost(&Torus::new(tile.geometry, 0.0), &classes, &tile.geometry),
-            Err(_) => Cost { memory_bytes: 8 * tile.geometry.len() as u64, operations: 0.0 },
-        }
+        // The covariance is not known yet: assume one that takes as many sizes as there may be, each with the bumps of the smallest.
+        let [dx, dy] = tile.geometry.cell;
+        let along_m = SMALLEST_CELLS * dx.min(dy);
+        let across_m = along_m * tile.stated_ratio().unwrap_or(1.0);
+        let count = bumps(self.packing, &tile.geometry, along_m, across_m).min(COUNT_MAX) as u64;
+        let class = Class { along_m, across_m, count, variance_m2: 1.0 };
+        let Cost { memory_bytes, operations } =
+            cost(&Torus::new(tile.geometry, 0.0), std::slice::from_ref(&class), &tile.geometry);
+        Cost { memory_bytes, operations: SIZES * operations }
     }
 
     fn kernel(&self, tile: &Tile, wanted: &Covariance, _: &Wanted) -> Result<QuasiWavelets, ParameterError> {
@@ -127,6 +137,27 @@ impl MethodParameters for QuasiWaveletsParameters {
         classes.retain(|c| c.variance_m2 > 0.0);
         Ok(QuasiWavelets { covariance: wanted.clone(), tile: tile.geometry, torus, classes, white_m2 })
     }
+}
+
+impl QuasiWaveletsParameters {
+    /// Fewer bumps of the smallest size no covariance takes, as long as the number of sizes is not what ends them.
+    fn least_count(&self, tile: &Tile) -> f64 {
+        let ([width_m, height_m], [dx, dy]) = (tile.geometry.size(), tile.geometry.cell);
+        let smallest_m = SMALLEST_CELLS * dx.min(dy);
+        let largest_m = LARGEST_SHARE * width_m.max(height_m);
+        let sizes = libm::log(largest_m / smallest_m) / -libm::log(self.size_ratio);
+        if self.intermittency > 0.0 || sizes + 1.0 >= CLASSES_MAX as f64 {
+            return 0.0;
+        }
+        let along_m = smallest_m / self.size_ratio;
+        bumps(self.packing, &tile.geometry, along_m, along_m * tile.stated_ratio().unwrap_or(1.0))
+    }
+}
+
+/// Number of bumps that cover a tile as densely as that.
+fn bumps(packing: f64, tile: &Geometry, along_m: f64, across_m: f64) -> f64 {
+    let [width_m, height_m] = tile.size();
+    (packing * width_m * height_m / (along_m * across_m)).ceil()
 }
 
 fn cost(torus: &Torus, classes: &[Class], tile: &Geometry) -> Cost {
@@ -152,7 +183,7 @@ fn classes(
         let along_m = (largest_m * share).max(smallest_m);
         let across_m = along_m * ratio;
         let packing = parameters.packing * libm::exp(parameters.intermittency * libm::log(share));
-        let count = (packing * width_m * height_m / (along_m * across_m)).ceil();
+        let count = bumps(packing, tile, along_m, across_m);
         if count > COUNT_MAX {
             let message =
                 format!("is {}: {count:.1e} bumps of {along_m:.3} m; the most is {COUNT_MAX:.0e}", parameters.packing);
