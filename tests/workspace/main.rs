@@ -7,7 +7,7 @@ use std::process::Command;
 
 /// `docs/ARCHITECTURE.md`, "Who may import whom", as data.
 fn allowed() -> BTreeMap<&'static str, BTreeSet<&'static str>> {
-    let stages = "schemas numeric roughness statistics terrain texture mobility store report";
+    let stages = "schemas numeric roughness statistics terrain texture mobility navigation store report";
     let table = [
         ("schemas", ""),
         ("numeric", ""),
@@ -16,13 +16,17 @@ fn allowed() -> BTreeMap<&'static str, BTreeSet<&'static str>> {
         ("terrain", "numeric schemas roughness"),
         ("texture", "numeric schemas roughness statistics"),
         ("mobility", "numeric schemas roughness statistics"),
+        ("navigation", "numeric schemas roughness statistics"),
         ("store", "numeric schemas"),
         ("report", "statistics store numeric schemas"),
         ("stages", stages),
         ("cli", "stages report store schemas"),
         ("fixtures", "numeric"),
-        ("tests", "statistics fixtures"),
-        ("benches", "schemas numeric roughness statistics terrain texture mobility store stages report fixtures"),
+        ("tests", "schemas numeric statistics store fixtures"),
+        (
+            "benches",
+            "schemas numeric roughness statistics terrain texture mobility navigation store stages report fixtures",
+        ),
     ];
     table.into_iter().map(|(room, uses)| (room, uses.split_whitespace().collect())).collect()
 }

@@ -52,6 +52,23 @@ pub fn thin(grid: &Grid, step: usize) -> Grid {
     Grid::new(Geometry { rows, cols, cell, origin: g.origin }, values)
 }
 
+/// Means of whole blocks of `step` x `step` cells from the north-west corner on; cells that fill no block are left out. NaN where less
+/// than half of a block is known.
+pub fn block_means(grid: &Grid, step: usize) -> Grid {
+    let (g, step) = (grid.geometry, step.max(1));
+    let (rows, cols) = (g.rows / step, g.cols / step);
+    let mean = |row: usize, col: usize| {
+        let cells = (0..step).flat_map(|r| &grid.row(row * step + r)[col * step..][..step]);
+        let known = cells.filter(|z| !z.is_nan());
+        let (sum, count) = known.fold((0.0, 0usize), |(sum, count), z| (sum + z, count + 1));
+        if 2 * count >= step * step { sum / count as f64 } else { f64::NAN }
+    };
+    let values = (0..rows).into_par_iter().flat_map_iter(|r| (0..cols).map(move |c| mean(r, c))).collect();
+    let cell = g.cell.map(|cell| cell * step as f64);
+    let origin = [g.origin[0], g.origin[1] + (g.rows - rows * step) as f64 * g.cell[1]];
+    Grid::new(Geometry { rows, cols, cell, origin }, values)
+}
+
 /// The heights at `rows` x `cols` points that lie evenly between the grid's outer cell centres, the outer ones on them:
 /// bilinear, and the grid's own height, bit for bit, where a point is a cell centre. No data spreads to what lies beside it.
 ///
@@ -115,6 +132,26 @@ mod tests {
         assert!(largest < 1e-12, "{largest}");
         let plane = stretch(&Grid::filled(Geometry::square(129, 129, 0.5), -3.3), 253, 253);
         assert!(plane.values.iter().all(|z| *z == -3.3));
+    }
+
+    /// Means of blocks of a plane are the plane at their centres, and a block keeps its mean while half of it is known.
+    #[test]
+    fn val_block_means_of_a_plane() {
+        let g = Geometry { rows: 8, cols: 11, cell: [0.5, 0.25], origin: [3.0, -2.0] };
+        let plane = |x: f64, y: f64| 2.0 * x - 3.0 * y;
+        let values = (0..g.rows).flat_map(|r| (0..g.cols).map(move |c| plane(g.x(c), g.y(r)))).collect();
+        let mut grid = Grid::new(g, values);
+        let means = block_means(&grid, 3);
+        let m = means.geometry;
+        assert_eq!((m.rows, m.cols, m.cell), (2, 3, [1.5, 0.75]));
+        for (row, col) in [(0, 0), (1, 2)] {
+            assert!((means.at(row, col) - plane(m.x(col), m.y(row))).abs() < 1e-12);
+        }
+        assert_eq!(block_means(&grid, 1), grid);
+        (0..4).for_each(|k| grid.values[k % 3 + g.cols * (k / 3)] = f64::NAN);
+        assert!(block_means(&grid, 3).at(0, 0).is_finite());
+        grid.values[g.cols + 1] = f64::NAN;
+        assert!(block_means(&grid, 3).at(0, 0).is_nan());
     }
 
     #[test]

@@ -1,0 +1,129 @@
+//! Straight lines over a map: whether they may be travelled, and what that costs.
+//!
+//! A line between two nodes is cut into pieces of at most a quarter of a cell; heights between nodes are bilinear. It may be travelled if
+//! every piece is within the limits of slope and no cell that it touches is blocked, in full or at a corner (supercover). Every returned
+//! path is scored by this one integral, whatever found it, so that paths of different searches compare.
+
+use crate::clearance::Clearance;
+use crate::cost::CostModel;
+use crate::map::{Direction, Node, Point, TravelMap};
+
+#[cfg(test)]
+mod tests;
+
+/// Pieces for each cell.
+const PIECES: f64 = 4.0;
+/// Rounding of the slope of a piece, as a share: a step at the very limit stays within it when it is cut into pieces.
+const ROUNDING: f64 = 1e-9;
+/// A point this near to the side between two cells lies in both, cells: lines that mirror each other cost the same.
+const SIDE: f64 = 1e-9;
+
+/// What a line costs, and how steep it is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Travelled {
+    /// Cost, metres of level ground.
+    pub cost: f64,
+    /// Length on the ground, m.
+    pub length_m: f64,
+    /// Horizontal length, m.
+    pub horizontal_m: f64,
+    /// Steepest slopes uphill and downhill, rise over run, 0 or above.
+    pub steepest: [f64; 2],
+}
+
+impl Travelled {
+    /// Nothing yet.
+    pub const NONE: Self = Self { cost: 0.0, length_m: 0.0, horizontal_m: 0.0, steepest: [0.0; 2] };
+
+    /// Two lines one after the other.
+    pub fn then(self, next: Self) -> Self {
+        let steepest = [0, 1].map(|k| self.steepest[k].max(next.steepest[k]));
+        Self {
+            cost: self.cost + next.cost,
+            length_m: self.length_m + next.length_m,
+            horizontal_m: self.horizontal_m + next.horizontal_m,
+            steepest,
+        }
+    }
+}
+
+/// Ground with what travel over it costs.
+#[derive(Clone, Copy, Debug)]
+pub struct Ground<'a> {
+    /// The map.
+    pub map: &'a TravelMap,
+    /// Costs of travel.
+    pub costs: &'a CostModel,
+    /// Room for a team, where it has a width.
+    pub clearance: Option<&'a Clearance>,
+}
+
+impl Ground<'_> {
+    /// The straight line between two nodes; `None` where it may not be travelled.
+    pub fn line(&self, from: Node, to: Node) -> Option<Travelled> {
+        self.segment(self.map.point(from), self.map.point(to))
+    }
+
+    /// The straight line between two points, `[row, column]`; `None` where it may not be travelled or leaves the map.
+    pub fn segment(&self, start: Point, end: Point) -> Option<Travelled> {
+        if !self.map.is_free_along(start, end) {
+            return None;
+        }
+        let span = [end[0] - start[0], end[1] - start[1]];
+        let [dx, dy] = self.map.cell_m();
+        let count = libm::ceil(PIECES * span[0].abs().max(span[1].abs()));
+        let run_m = ((span[1] * dx) * (span[1] * dx) + (span[0] * dy) * (span[0] * dy)).sqrt() / count;
+        let along = direction_of(span);
+        let point = |k: f64| [0, 1].map(|axis| start[axis] + span[axis] * (k / count));
+        let mut travelled = Travelled::NONE;
+        let mut before_m = self.map.height_at_m(start)?;
+        for k in 0..count as usize {
+            let after_m = self.map.height_at_m(point((k + 1) as f64))?;
+            let rise_m = after_m - before_m;
+            let slope = rise_m / run_m;
+            let rounding = ROUNDING * slope.abs() + 8.0 * f64::EPSILON * before_m.abs().max(after_m.abs()) / run_m;
+            if !self.map.limits().allow((slope.abs() - rounding).max(0.0).copysign(slope)) {
+                return None;
+            }
+            travelled = travelled.then(Travelled {
+                cost: self.costs.piece(run_m, rise_m) * self.factor(point(k as f64 + 0.5), along),
+                length_m: (run_m * run_m + rise_m * rise_m).sqrt(),
+                horizontal_m: run_m,
+                steepest: [slope.max(0.0), (-slope).max(0.0)],
+            });
+            before_m = after_m;
+        }
+        Some(travelled)
+    }
+
+    /// Factor of the cost at a point: of its cell, or the mean of the free cells that share the side or corner it lies on.
+    fn factor(&self, point: Point, along: Direction) -> f64 {
+        if self.clearance.is_none() && !self.costs.has_factors() {
+            return 1.0;
+        }
+        let [rows, cols] = point.map(|at| [-SIDE, SIDE].map(|side| libm::floor(at + 0.5 + side) as usize));
+        let cells = rows.into_iter().flat_map(|row| cols.map(|col| self.map.node(row, col)));
+        let (count, sum) = cells.filter(|node| !self.map.is_blocked(*node)).fold((0.0, 0.0), |(count, sum), node| {
+            let room = self.clearance.map_or(1.0, |clearance| clearance.multiplier(node, along));
+            (count + 1.0, sum + self.costs.factor(node) * room)
+        });
+        sum / count
+    }
+
+    /// Straight lines from node to node; `None` where one may not be travelled.
+    pub fn path(&self, nodes: &[Node]) -> Option<Travelled> {
+        nodes.windows(2).try_fold(Travelled::NONE, |sum, pair| Some(sum.then(self.line(pair[0], pair[1])?)))
+    }
+}
+
+/// The one of the eight directions that a line is nearest to, `[rows, columns]`.
+fn direction_of([down, across]: [f64; 2]) -> Direction {
+    // Half of the angle between the directions: tan(22.5 degrees).
+    const HALF: f64 = 0.414_213_562_373_095_05;
+    let sign = |value: f64, other: f64| match value.abs() > HALF * other.abs() {
+        true if value > 0.0 => 1,
+        true => -1,
+        false => 0,
+    };
+    Direction { rows: sign(down, across), cols: sign(across, down) }
+}

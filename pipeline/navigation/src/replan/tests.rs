@@ -1,0 +1,84 @@
+use super::*;
+use crate::search::dijkstra;
+use crate::testing::{NEIGHBOURHOODS, Random, drawn, ends, limits, map_of, rough};
+
+fn settings(sensing_radius_m: f64, neighbourhood: Neighbourhood) -> WalkSettings {
+    WalkSettings { sensing_radius_m, slope: SlopeCost::THESIS, neighbourhood }
+}
+
+#[test]
+fn prop_walks_arrive_wherever_there_is_a_way_and_cost_no_less_than_with_full_knowledge() {
+    let mut random = Random(70);
+    let (mut arrived, mut detours) = (0, 0);
+    for k in 0..80 {
+        // Slopes that may be taken either way, so that no step is a trap.
+        let heights: Vec<f64> = (0..20 * 20).map(|_| 0.5 * random.unit()).collect();
+        let mut map = map_of(20, 20, limits(30.0, 30.0), |r, c| heights[20 * r + c]);
+        (0..400).filter(|_| random.unit() < 0.25).for_each(|node| map.block(node));
+        let Some(nodes) = ends(&map, &mut random) else { continue };
+        let [start, goal] = nodes.map(|node| map.place(node));
+        let [near, far] = [2.0 + (k % 3) as f64, 100.0]
+            .map(|radius_m| walk(&map, &settings(radius_m, NEIGHBOURHOODS[k % 2]), start, goal));
+        assert_eq!(near.is_ok(), far.is_ok());
+        let (Ok(near), Ok(far)) = (near, far) else { continue };
+        arrived += 1;
+        detours += usize::from(near.cost > near.informed_cost * (1.0 + 1e-9));
+        assert_eq!((near.path.first(), near.path.last()), (Some(&nodes[0]), Some(&nodes[1])));
+        assert!(near.cost >= near.informed_cost * (1.0 - 1e-12));
+        assert!((far.cost / far.informed_cost - 1.0).abs() < 1e-12 && far.replans == 0, "all is seen at once");
+        for pair in near.path.windows(2) {
+            assert!(Direction::ALL.iter().any(|d| map.accessible(pair[0], *d) == Some(pair[1])));
+        }
+    }
+    assert!(arrived > 40 && detours > 10, "{arrived} {detours}");
+}
+
+#[test]
+fn val_a_dead_end_is_walked_into_and_left_again() {
+    let map =
+        drawn(&["..........", ".######...", ".......#..", "S......#.G", ".......#..", ".######...", ".........."]);
+    let blind = walk(&map, &settings(1.5, Neighbourhood::Four), [3, 0], [3, 9]).unwrap();
+    assert_eq!(blind.informed_cost, 15.0);
+    assert_eq!(blind.cost, blind.travelled.cost);
+    assert!(blind.cost >= 15.0 + 2.0 * 5.0, "into the pocket and back: {}", blind.cost);
+    assert!(blind.replans > 3);
+    let sees_all = walk(&map, &settings(20.0, Neighbourhood::Four), [3, 0], [3, 9]).unwrap();
+    assert_eq!((sees_all.cost, sees_all.replans), (15.0, 0));
+}
+
+#[test]
+fn prop_every_plan_costs_what_a_fresh_search_over_the_known_cells_does() {
+    let mut random = Random(71);
+    for k in 0..10 {
+        let map = rough(18, 18, 0.2, 0.5, &mut random);
+        let Some(ends) = ends(&map, &mut random) else { continue };
+        let costs = CostModel::new(SlopeCost::THESIS, None, &map).unwrap();
+        let ground = Ground { map: &map, costs: &costs, clearance: None };
+        let grid = GridNetwork { ground, neighbourhood: NEIGHBOURHOODS[k % 2] };
+        let mut walker = Walker::new(grid, 2.5, ends);
+        while walker.at != walker.goal {
+            let found = walker.search.search(&walker.known);
+            let fresh = dijkstra::costs_to(&walker.known, walker.goal)[walker.at as usize];
+            let Some(found) = found else {
+                assert!(fresh.is_infinite());
+                break;
+            };
+            assert_eq!(found.cost.to_bits(), fresh.to_bits());
+            walker.at = found.path[1];
+            let changed = walker.known.sense(walker.at, 2.5);
+            walker.search.move_to(&walker.known, walker.at);
+            walker.search.changed(&walker.known, changed);
+        }
+    }
+}
+
+#[test]
+fn val_what_cannot_be_walked_is_refused() {
+    let map = drawn(&[".#.", ".#.", ".#."]);
+    let message =
+        |radius_m, goal| walk(&map, &settings(radius_m, Neighbourhood::Four), [0, 0], goal).unwrap_err().to_string();
+    assert!(message(1.0, [2, 0]).contains("`sensing_radius_m` is 1 m; it must be at least the diagonal of a cell"));
+    assert!(message(f64::NAN, [2, 0]).contains("NaN"));
+    assert!(message(2.0, [2, 2]).contains("none exists with four neighbours"));
+    assert!(message(2.0, [2, 1]).contains("blocked"));
+}
