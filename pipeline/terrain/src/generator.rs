@@ -108,13 +108,15 @@ pub struct Terrain {
     pub heights: Grid,
     /// Rasters on the same cells.
     pub maps: Vec<Map>,
+    /// Lines on the ground.
+    pub lines: Vec<Line>,
     /// Sentences that only making it could tell, such as figures that were measured on the way.
     pub notes: Vec<String>,
 }
 
 impl From<Grid> for Terrain {
     fn from(heights: Grid) -> Self {
-        Self { heights, maps: Vec::new(), notes: Vec::new() }
+        Self { heights, maps: Vec::new(), lines: Vec::new(), notes: Vec::new() }
     }
 }
 
@@ -133,6 +135,15 @@ impl Map {
         let nameless = MapKind { name: self.name, unit: "", description: "" };
         MAPS.into_iter().find(|kind| kind.name == self.name).unwrap_or(nameless)
     }
+}
+
+/// A polyline on the ground.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Line {
+    /// Name, its own among the lines of a terrain: `trail`, then `trail-2` ...
+    pub name: String,
+    /// Points `[x, y, z]` in the coordinates of the heights, z on the surface, m; of a closed line the last is the first.
+    pub points_m: Vec<[f64; 3]>,
 }
 
 /// Heights as 16-bit levels, as in a greyscale PNG: `height_m = (level - zero_level) * metres_per_level`.
@@ -181,6 +192,12 @@ pub enum TerrainError {
     Input {
         /// Its name in the parameters.
         surface: String,
+        /// What is wrong, and what would be right.
+        reason: String,
+    },
+    /// A trail that cannot be laid on the ground.
+    #[error("lay the trail: {reason}")]
+    Trail {
         /// What is wrong, and what would be right.
         reason: String,
     },

@@ -179,6 +179,6 @@ impl Generator for Cascade {
         let heights = level.map(|z| z * (self.raw.rms_height_m / rms));
         let notes = self.exponents_note(&heights).into_iter().collect();
         let maps = vec![Map { name: FLUX, values: self.cut(&flux) }];
-        Ok(Terrain { heights, maps, notes })
+        Ok(Terrain { heights, maps, lines: Vec::new(), notes })
     }
 }

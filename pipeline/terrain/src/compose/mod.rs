@@ -12,6 +12,7 @@
 //! | `mask` | `w z + (1 - w) outside_m` |
 //! | `clip` | z between `low_m` and `high_m` |
 //! | `scale_to_relief` | z about its mean, scaled so that highest less lowest is `relief_m` |
+//! | `trail` | z with a vehicle trail pressed into it: [`trail`] |
 //!
 //! A region is another generator or surface m: w rises as `3 t^2 - 2 t^3`, `t = (m - from) / (to - from)` kept to 0 to 1; `from` above
 //! `to` turns it round.
@@ -23,16 +24,20 @@
 //! where no process has any, where a blend puts another operand in place (w = 1), and outside of a mask. Maps of roughness do not go on:
 //! they are those of the operand alone, as is what notes say that begin with `process k alone` (k from 1).
 //!
+//! The centre line of every trail is a line of the surface (`trail`, `trail-2` ... in their order), its heights those of the finished
+//! surface; lines of operands go on.
+//!
 //! # Cost
 //! The generators', one after the other; three grids more.
 
 mod params;
 #[cfg(test)]
 mod tests;
+pub mod trail;
 
 pub use params::{Compose, Operation, RawCompose, RawProcess, RawRegion};
 
-use crate::generator::{Generator, InputSurface, MAPS, Map, Terrain, TerrainError};
+use crate::generator::{Generator, InputSurface, Line, MAPS, Map, Terrain, TerrainError};
 use params::{Operand, Part, Process, Region, Step};
 use sastrugi_numeric::{Geometry, Grid, Streams, Surface, ops, sums};
 use serde_json::Value;
@@ -108,6 +113,8 @@ struct Running<'a> {
     streams: Streams,
     inputs: &'a [Grid],
     maps: Vec<Map>,
+    /// Points `[x, y]` of the lines so far, m.
+    lines: Vec<Vec<[f64; 2]>>,
     notes: Vec<String>,
 }
 
@@ -126,7 +133,7 @@ impl Running<'_> {
         self.notes.extend(made.notes.iter().map(|note| part.note(number, note)));
         let placed = |values: Grid| Grid::new(self.geometry, values.values);
         let maps = made.maps.into_iter().map(|map| Map { values: placed(map.values), ..map }).collect();
-        Ok(Terrain { heights: placed(made.heights), maps, notes: Vec::new() })
+        Ok(Terrain { heights: placed(made.heights), maps, lines: made.lines, notes: Vec::new() })
     }
 
     /// The weights of a region, 1 everywhere without one.
@@ -161,11 +168,15 @@ impl Running<'_> {
         }
     }
 
-    fn apply(&mut self, z: Grid, number: usize, process: &Process) -> Result<Grid, TerrainError> {
+    fn apply(&mut self, mut z: Grid, number: usize, process: &Process) -> Result<Grid, TerrainError> {
         let streams = self.streams.child(&format!("process-{number}"));
         match &process.step {
             Step::Clip { low_m, high_m } => Ok(z.map(|v| v.clamp(*low_m, *high_m))),
             Step::ScaleToRelief { relief_m } => scaled_to_relief(&z, *relief_m),
+            Step::Trail(trail) => {
+                self.lines.push(trail.lay(&mut z)?);
+                Ok(z)
+            }
             Step::Mask { region, outside_m } => {
                 let weights = self.weights(Some(region), &streams, number)?;
                 self.clear_maps(&weights, |w| w == 0.0);
@@ -178,6 +189,8 @@ impl Running<'_> {
                     self.clear_maps(&weights, |w| w == 1.0);
                 }
                 self.lay_maps(made.maps, &weights);
+                self.lines
+                    .extend(made.lines.iter().map(|line| line.points_m.iter().map(|&[x, y, _]| [x, y]).collect()));
                 Ok(join.of(z, &made.heights.map(|v| v * factor), &weights))
             }
         }
@@ -198,6 +211,16 @@ impl params::Join {
             }
         }
     }
+}
+
+/// Lines on a surface; points beside its cells, or where it has no height, are left out.
+fn lines_on(heights: &Grid, lines: Vec<Vec<[f64; 2]>>) -> Vec<Line> {
+    let on_ground = |&[x, y]: &[f64; 2]| heights.height(x, y).map(|z| [x, y, z]);
+    let line = |(k, points_m): (usize, Vec<[f64; 2]>)| Line {
+        name: if k == 0 { "trail".to_owned() } else { format!("trail-{}", k + 1) },
+        points_m: points_m.iter().filter_map(on_ground).collect(),
+    };
+    lines.into_iter().enumerate().map(line).collect()
 }
 
 fn scaled_to_relief(z: &Grid, relief_m: f64) -> Result<Grid, TerrainError> {
@@ -242,12 +265,20 @@ impl Generator for Compose {
 
     fn generate(&self, streams: &Streams, inputs: &[Grid]) -> Result<Terrain, TerrainError> {
         let geometry = self.geometry;
-        let mut running = Running { geometry, streams: streams.clone(), inputs, maps: Vec::new(), notes: Vec::new() };
+        let mut running = Running {
+            geometry,
+            streams: streams.clone(),
+            inputs,
+            maps: Vec::new(),
+            lines: Vec::new(),
+            notes: Vec::new(),
+        };
         let mut heights = Grid::filled(geometry, 0.0);
         for (k, process) in self.processes.iter().enumerate() {
             heights = running.apply(heights, k + 1, process)?;
         }
         let maps = running.maps.into_iter().filter(|map| map.values.finite_count() > 0).collect();
-        Ok(Terrain { heights, maps, notes: running.notes })
+        let lines = lines_on(&heights, running.lines);
+        Ok(Terrain { heights, maps, lines, notes: running.notes })
     }
 }

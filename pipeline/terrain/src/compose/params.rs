@@ -1,5 +1,6 @@
 //! Parameters of a composition.
 
+use super::trail::{RawTrail, Trail};
 use crate::generator::{Generator, InputSurface};
 use crate::size::Size;
 use sastrugi_numeric::Geometry;
@@ -69,6 +70,8 @@ pub enum Operation {
     Clip,
     /// Heights are scaled to a relief.
     ScaleToRelief,
+    /// A vehicle trail is pressed into the heights.
+    Trail,
 }
 
 /// One process.
@@ -104,6 +107,9 @@ pub struct RawProcess {
     /// For `scale_to_relief`: highest less lowest height, m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub relief_m: Option<f64>,
+    /// For `trail`: where it leads and what it looks like; along ridges when absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub trail: Option<RawTrail>,
 }
 
 impl Default for RawProcess {
@@ -119,6 +125,7 @@ impl Default for RawProcess {
             low_m: None,
             high_m: None,
             relief_m: None,
+            trail: None,
         }
     }
 }
@@ -175,6 +182,7 @@ pub(super) enum Step {
     Mask { region: Region, outside_m: f64 },
     Clip { low_m: f64, high_m: f64 },
     ScaleToRelief { relief_m: f64 },
+    Trail(Box<Trail>),
 }
 
 /// A checked process.
@@ -195,7 +203,7 @@ impl Process {
                 std::iter::once((Part::Operand, operand)).chain(region).collect()
             }
             Step::Mask { region, .. } => vec![(Part::Region, &region.operand)],
-            Step::Clip { .. } | Step::ScaleToRelief { .. } => Vec::new(),
+            Step::Clip { .. } | Step::ScaleToRelief { .. } | Step::Trail(_) => Vec::new(),
         }
     }
 }
@@ -277,6 +285,11 @@ impl Whole {
                     ParameterError::new("relief_m", "is missing; `scale_to_relief` needs highest less lowest height, m")
                 })?;
                 Ok(Step::ScaleToRelief { relief_m: ParameterError::positive("relief_m", relief_m)? })
+            }
+            (Operation::Trail, _) => {
+                let geometry = Geometry { origin: self.origin_m, ..self.size.geometry() };
+                let trail = Trail::new(&raw.trail.clone().unwrap_or_default(), &geometry);
+                Ok(Step::Trail(Box::new(trail.map_err(|e| e.within("trail"))?)))
             }
         }
     }
@@ -391,6 +404,7 @@ fn refuse_foreign_keys(raw: &RawProcess) -> Result<(), ParameterError> {
         ("low_m", raw.low_m.is_some(), raw.operation == Operation::Clip),
         ("high_m", raw.high_m.is_some(), raw.operation == Operation::Clip),
         ("relief_m", raw.relief_m.is_some(), raw.operation == Operation::ScaleToRelief),
+        ("trail", raw.trail.is_some(), raw.operation == Operation::Trail),
     ];
     match given.into_iter().find(|(_, given, taken)| *given && !*taken) {
         Some((key, ..)) => {
@@ -423,6 +437,9 @@ fn finite(key: &str, value: f64) -> Result<f64, ParameterError> {
 fn notes(size: &Size, processes: &[Process]) -> Vec<String> {
     let mut notes: Vec<String> = size.note().into_iter().collect();
     for (k, process) in processes.iter().enumerate() {
+        if let Step::Trail(trail) = &process.step {
+            notes.extend(trail.note(size.cell_m).map(|note| format!("process {}: {note}", k + 1)));
+        }
         for (part, operand) in process.parts() {
             let Operand::Generator { generator, .. } = operand else { continue };
             let own = generator.notes().into_iter().filter(|note| size.note().as_ref() != Some(note));
@@ -432,8 +449,13 @@ fn notes(size: &Size, processes: &[Process]) -> Vec<String> {
     notes
 }
 
-/// Writes the full checked parameters of the generators into the raw ones.
+/// Writes the full checked parameters of the generators and trails into the raw ones.
 fn fill_in(parameters: &mut Value, processes: &[Process]) {
+    for (k, process) in processes.iter().enumerate() {
+        if let (Step::Trail(trail), Some(raw)) = (&process.step, parameters.pointer_mut(&format!("/processes/{k}"))) {
+            raw["trail"] = json!(trail.parameters);
+        }
+    }
     for operand in processes.iter().flat_map(Process::operands) {
         let Operand::Generator { generator, key } = operand else { continue };
         let pointer = format!("/{}", key.replace('.', "/"));

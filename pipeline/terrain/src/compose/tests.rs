@@ -260,3 +260,47 @@ proptest! {
         }
     }
 }
+
+/// The centre line of a trail comes with the surface, its heights those at the end; a second trail and those of an operand have names of
+/// their own. All parameters are written out, and read back to the same surface.
+#[test]
+fn val_trails_are_lines_of_the_surface() {
+    let small = json!({"width_m": 3.2, "turning_radius_m": 3.0});
+    let params = json!({"size_m": [30, 24], "cell_m": 0.2, "processes": [
+        {"kind": "spheroids", "factor": 0.05},
+        {"operation": "trail", "trail": small},
+        {"operation": "trail", "trail": {"follows": "loop", "loop_share": 0.35, "width_m": 3.2, "turning_radius_m": 3.0}},
+        {"operation": "clip", "high_m": 0.5},
+    ]});
+    let generator = crate::prepare(KIND, &params).unwrap();
+    let made = generator.generate(&streams(), &[]).unwrap();
+    assert_eq!(made.lines.iter().map(|line| line.name.as_str()).collect::<Vec<_>>(), ["trail", "trail-2"]);
+    for [x, y, z] in made.lines.iter().flat_map(|line| &line.points_m) {
+        assert_eq!(made.heights.height(*x, *y), Some(*z));
+    }
+    assert_eq!(made.lines[1].points_m.first(), made.lines[1].points_m.last());
+    assert!(
+        generator.notes().iter().any(|n| n.starts_with("process 2: ruts of 0.25 m are too narrow for cells of 0.2 m"))
+    );
+    let written = generator.parameters();
+    assert_eq!(written.pointer("/processes/1/trail/border_m"), Some(&json!(3.0)));
+    assert_eq!(crate::prepare(KIND, &written).unwrap().parameters(), written);
+    assert_eq!(crate::prepare(KIND, &written).unwrap().generate(&streams(), &[]).unwrap(), made);
+    let processes = json!([{"kind": "compose", "parameters": {"processes": params["processes"]}}]);
+    let nested = json!({"size_m": [30, 24], "cell_m": 0.2, "processes": processes});
+    let nested = crate::prepare(KIND, &nested).unwrap().generate(&streams(), &[]).unwrap();
+    assert_eq!(nested.lines.len(), 2);
+}
+
+#[test]
+fn val_trails_need_ground_and_their_own_operation() {
+    let refused = |processes: Value| {
+        let params = json!({"size_m": [30, 24], "cell_m": 0.2, "processes": processes});
+        crate::prepare(KIND, &params).err().unwrap().key
+    };
+    assert_eq!(refused(json!([{"operation": "trail"}])), "processes");
+    assert_eq!(refused(json!([{"kind": "spheroids", "trail": {}}])), "processes.0.trail");
+    assert_eq!(refused(json!([{"kind": "spheroids"}, {"operation": "trail", "factor": 2.0}])), "processes.1.factor");
+    let wide = json!([{"kind": "spheroids"}, {"operation": "trail", "trail": {"width_m": 30.0}}]);
+    assert!(refused(wide).starts_with("processes.1.trail."));
+}

@@ -224,7 +224,7 @@ impl Elaborate {
         let maps = planetary::maps(&world, self.geometry(), &patch);
         let heights = planetary::to_grid(self.geometry(), &patch.heights);
         let notes = texture.map_or_else(Vec::new, |t| self.texture_notes(&t, g));
-        Ok(Terrain { heights, maps, notes })
+        Ok(Terrain { heights, maps, lines: Vec::new(), notes })
     }
 
     fn texture_notes(&self, texture: &TextureFit, g: &Geometry) -> Vec<String> {

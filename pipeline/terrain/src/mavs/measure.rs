@@ -176,7 +176,7 @@ pub fn finish<F: Fn(&WaveBand) -> f64>(made: Made<F>, asked: Option<&Roughness>)
         map("rms-predicted", scale.map(|s| s * plain_rms_m))
     });
     let maps = predicted.into_iter().chain([map("rms-measured", measured.rms_map())]).collect();
-    Ok(Terrain { heights: heights.map(|z| factor * z), maps, notes })
+    Ok(Terrain { heights: heights.map(|z| factor * z), maps, lines: Vec::new(), notes })
 }
 
 /// Working memory of [`finish`] and of layers before it, bytes.

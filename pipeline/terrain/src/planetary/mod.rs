@@ -189,6 +189,6 @@ impl Generator for Planetary {
         let patch = world.tiled_patch(&self.window);
         let geometry = self.geometry();
         let maps = maps(&world, geometry, &patch);
-        Ok(Terrain { heights: to_grid(geometry, &patch.heights), maps, notes: Vec::new() })
+        Ok(Terrain { heights: to_grid(geometry, &patch.heights), maps, lines: Vec::new(), notes: Vec::new() })
     }
 }
