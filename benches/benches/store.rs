@@ -8,10 +8,11 @@ use sastrugi_schemas::Record;
 use sastrugi_schemas::study::McapFlavour;
 use sastrugi_schemas::tables::SampleRow;
 use sastrugi_schemas::topics::{
-    CommandSample, ImuSample, Recording, StateSample, VehicleOutline, WheelOutline, WheelSample, WheelState,
+    CommandSample, ImuSample, Member, MemberState, Recording, StateSample, TeamRecording, VehicleOutline, WheelOutline,
+    WheelSample, WheelState,
 };
 use sastrugi_store::dem::{self, Crs, WriteOptions};
-use sastrugi_store::mcap::{self, MissionMcap, TerrainView};
+use sastrugi_store::mcap::{self, MissionMcap, TeamMcap, TerrainView};
 use sastrugi_store::parquet::{TableMetadata, TableWriter};
 use std::collections::BTreeMap;
 use std::io::Write;
@@ -124,6 +125,63 @@ fn with_mission<T>(f: impl FnOnce(&MissionMcap) -> T) -> T {
         epoch_ns: 1_700_000_000_000_000_000,
         metadata: &metadata,
     })
+}
+
+/// A line of four abreast, as long as the mission, with a roadmap of 100000 vertices.
+fn team(dem: &Grid) -> TeamRecording {
+    let place = |x: f64, y: f64| [x, y, dem.height(x, y).unwrap_or(0.0)];
+    let state = |y: f64, time_s: f64| MemberState {
+        time_s,
+        position_m: place(5.0 + time_s, y),
+        heading_rad: 0.001 * time_s,
+        velocity_m_s: [1.0, 0.001 * time_s, 0.01],
+        slot: Some(1),
+        depth_error_m: Some(0.01 * y),
+        width_error_m: Some(0.02 * time_s),
+        target_distance_m: 40.0 - time_s,
+    };
+    let member = |number: i64| Member {
+        number,
+        name: format!("member_{number}"),
+        radius_m: 0.5,
+        states: (0..=20 * SECONDS).map(|n| state(22.0 + 2.0 * number as f64, n as f64 / 20.0)).collect(),
+    };
+    TeamRecording {
+        sample_rate_hz: 20.0,
+        members: (1..=4).map(member).collect(),
+        route_m: vec![place(5.0, 25.0), place(42.0, 25.0)],
+        search_path_m: vec![],
+        vertices_m: (0..100_000).map(|k| place(0.15 * f64::from(k % 330), 0.15 * f64::from(k / 330))).collect(),
+        boxes: vec![],
+        obstacles: vec![],
+        moving: vec![],
+        events: vec![],
+    }
+}
+
+fn team_37s(bencher: Bencher, flavour: McapFlavour) {
+    let (folder, dem, metadata) = (folder(), terrain(), BTreeMap::new());
+    let path = folder.path().join("a.mcap");
+    let terrain = TerrainView::new(&dem, None).expect("a terrain");
+    let recording = team(&dem);
+    let (start_m, goal_m, epoch_ns) = ([5.0, 25.0], [42.0, 25.0], 1_700_000_000_000_000_000);
+    let team =
+        TeamMcap { flavour, recording: &recording, terrain: &terrain, start_m, goal_m, epoch_ns, metadata: &metadata };
+    let (bytes, summary) = mcap::encode_team(&team).expect("a recording");
+    eprintln!("{} bytes", bytes.len());
+    bencher
+        .counter(BytesCount::new(summary.data_bytes))
+        .bench_local(|| mcap::write_team(&path, &team).expect("a file"));
+}
+
+#[divan::bench]
+fn mcap_team_of_4_37s(bencher: Bencher) {
+    team_37s(bencher, McapFlavour::Viewer);
+}
+
+#[divan::bench]
+fn mcap_team_of_4_37s_ros2(bencher: Bencher) {
+    team_37s(bencher, McapFlavour::Ros2);
 }
 
 fn folder() -> tempfile::TempDir {

@@ -125,7 +125,7 @@ fn floor_heights_of_all_rays(bencher: Bencher) {
     const STEPS: usize = 17_500;
     let course = Course::new(2.45);
     let dem = course.dem.to_f32();
-    let mission = course.missions[0];
+    let mission = &course.missions[0];
     let ahead = [0, 1].map(|axis| (mission.goal_m[axis] - mission.start_m[axis]) / STEPS as f64);
     bencher.counter(ItemsCount::new(STEPS)).bench_local(|| {
         let height = |k: usize| {

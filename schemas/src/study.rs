@@ -372,11 +372,86 @@ fn default_method() -> String {
 pub struct MissionsItem {
     /// Id, `[a-z0-9][a-z0-9.-]{0,63}`, unique in the study.
     pub id: String,
-    /// Ids of the terrains, textures or DEMs to draw missions on; the id of a replicated item stands for all of them.
+    /// What a mission follows (see `sastrugi kinds`): `straight` lines, `routed` paths or the `trail` of a terrain.
+    #[serde(default)]
+    pub kind: MissionKind,
+    /// Ids of the terrains, textures or DEMs to draw missions on; the id of a replicated item stands for all of them. Not for
+    /// `routed` missions, which have those of `of`.
+    #[serde(default)]
     pub terrains: Vec<String>,
+    /// For `routed` missions: id of the straight missions whose starts and goals they have.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub of: Option<String>,
     /// Explicit seed instead of the study's.
     #[serde(default)]
     pub seed: Option<u64>,
+}
+
+/// What a mission follows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum MissionKind {
+    /// The straight line from start to goal.
+    #[default]
+    Straight,
+    /// The planned route from the start to the goal of a straight mission.
+    Routed,
+    /// The trail that a terrain was given (`compose`, `operation = "trail"`).
+    Trail,
+}
+
+/// `[[route]]` around the parameters of a search.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RouteItem {
+    /// Id, `[a-z0-9][a-z0-9.-]{0,63}`, unique in the study; routes are named `<id>-0001` ...
+    pub id: String,
+    /// Ids of the terrains, textures or DEMs to plan on; the id of a replicated item stands for all of them.
+    pub terrains: Vec<String>,
+    /// Start, `[x, y]` in the terrain's coordinates, m; drawn when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub start: Option<[f64; 2]>,
+    /// Goal, `[x, y]` in the terrain's coordinates, m; drawn when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub goal: Option<[f64; 2]>,
+    /// Pairs of start and goal to draw on each terrain; 1 when absent. All route stages with the same rules draw the same pairs.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pairs: Option<u32>,
+    /// File, or list of files, relative to the study file, of what cannot be entered: GeoJSON with polygons in the terrain's
+    /// coordinates, or a raster that is not 0 there.
+    #[serde(default)]
+    pub obstacles: Files,
+    /// Vehicle whose limits of slope hold (see `sastrugi kinds`); `max_up_deg` and `max_down_deg` override them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub vehicle: Option<String>,
+    /// Id of a raster (a DEM or terrain) of factors above 0 for `cost = "raster"`, in the terrain's coordinates; NaN is blocked.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cost_raster: Option<String>,
+    /// Explicit seed of drawn pairs instead of the study's.
+    #[serde(default)]
+    pub seed: Option<u64>,
+    /// One stage per value of a parameter: `sweep.<parameter> = [...]`.
+    #[serde(default)]
+    pub sweep: BTreeMap<String, Vec<serde_json::Value>>,
+}
+
+/// `[[navigate]]` around the parameters of a team.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct NavigateItem {
+    /// Id, `[a-z0-9][a-z0-9.-]{0,63}`, unique in the study; runs are named `<id>-0001` ... by the number of their route.
+    pub id: String,
+    /// Id of the routes to follow.
+    pub route: String,
+    /// Runs along each route, `<id>-0001-01`, `<id>-0001-02` ..., which differ by their random draws; one run when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub count: Option<u32>,
+    /// Explicit seed instead of the study's.
+    #[serde(default)]
+    pub seed: Option<u64>,
+    /// One stage per value of a parameter: `sweep.<parameter> = [...]`.
+    #[serde(default)]
+    pub sweep: BTreeMap<String, Vec<serde_json::Value>>,
 }
 
 /// `[[traverse]]` around the parameters of a run.

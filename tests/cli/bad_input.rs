@@ -417,7 +417,7 @@ fn val_bad_masks_are_input_errors() {
     };
     fit("--mask", "nothing.geojson", &["nothing.geojson", "no such file"]);
     fit("--mask", "point.geojson", &["point.geojson", "holds a Point"]);
-    fit("--mask", "broken.geojson", &["broken.geojson", "no GeoJSON"]);
+    fit("--mask", "broken.geojson", &["broken.geojson", "not GeoJSON"]);
     fit("--mask", "metres.geojson", &["metres.geojson", "none of the DEM's cells", "coordinates"]);
     fit("--exclude", "all.geojson", &["all.geojson", "none of the DEM's cells"]);
     fit("--mask", "words.txt", &["words.txt", "no raster"]);

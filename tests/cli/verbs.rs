@@ -471,12 +471,13 @@ fn val_plan_says_what_is_stale_and_why() {
     assert_eq!(plan["stale"].as_array().unwrap().len(), 6);
 }
 
-/// Every topic of both flavours with its message, and own messages with their fields; one topic by its name.
+/// Every topic of both flavours, of missions and of teams, with its message, and own messages with their fields; one topic by its name.
 #[test]
 fn val_schema_tells_of_topics() {
     let folder = area();
     let all = ok_json(folder.path(), &["schema", "topics"]);
-    assert_eq!((all["viewer"].as_array().unwrap().len(), all["ros2"].as_array().unwrap().len()), (11, 9));
+    let count = |of: &str| all[of].as_array().unwrap().len();
+    assert_eq!(["viewer", "ros2", "team_viewer", "team_ros2"].map(count), [11, 9, 10, 10]);
     let wheels = ok(folder.path(), &["schema", "/wheels"]);
     assert!(
         wheels.contains("sastrugi.Wheels") && wheels.contains("torque_n_m") && wheels.contains("in steps of"),

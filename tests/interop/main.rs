@@ -6,6 +6,8 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may end where it stands")]
 
+mod team;
+
 use sastrugi_tests::{Called, area, called, program, sastrugi_in, small_study, write};
 use serde_json::Value;
 use std::path::{Path, PathBuf};

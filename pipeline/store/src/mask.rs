@@ -12,6 +12,7 @@ mod polygons;
 mod tests;
 
 use crate::dem::{self, DemError};
+use crate::geojson;
 use sastrugi_numeric::{Geometry, Grid};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -65,7 +66,7 @@ pub fn read_with(path: &Path, geometry: &Geometry, options: &MaskOptions) -> Res
     let unusable = |reason: String| MaskError::Unusable { path: path.to_owned(), reason };
     let bytes = fs::read(path).map_err(|e| DemError::reading(path, e))?;
     let mut keep = if looks_like_json(&bytes) {
-        polygons::parse(&bytes).map(|found| polygons::inside(&found, geometry)).map_err(unusable)?
+        geojson::polygons::parse(&bytes).map(|found| polygons::inside(&found, geometry)).map_err(unusable)?
     } else {
         drop(bytes);
         of_raster(&dem::read(path)?, geometry).map_err(unusable)?
@@ -79,6 +80,29 @@ pub fn read_with(path: &Path, geometry: &Geometry, options: &MaskOptions) -> Res
         return Err(unusable(format!("keeps none of the DEM's cells ({reach}); is it in the DEM's coordinates?")));
     }
     Ok(keep)
+}
+
+/// What a file of obstacles marks.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Obstacles {
+    /// Polygons, each with its rings (an outline and its holes, even-odd rule), in the DEM's own coordinates.
+    Polygons(Vec<Vec<Vec<[f64; 2]>>>),
+    /// `rows * cols` values from the north-west cell, true where a cell is marked.
+    Cells(Vec<bool>),
+}
+
+/// Reads obstacles for a grid: polygons of a GeoJSON file, or the cells that a raster marks.
+///
+/// # Errors
+/// A file that is missing or neither; a raster without a place and with another shape.
+pub fn read_obstacles(path: &Path, geometry: &Geometry) -> Result<Obstacles, MaskError> {
+    let unusable = |reason: String| MaskError::Unusable { path: path.to_owned(), reason };
+    let bytes = fs::read(path).map_err(|e| DemError::reading(path, e))?;
+    if looks_like_json(&bytes) {
+        return geojson::polygons::parse(&bytes).map(Obstacles::Polygons).map_err(unusable);
+    }
+    drop(bytes);
+    of_raster(&dem::read(path)?, geometry).map(Obstacles::Cells).map_err(unusable)
 }
 
 fn looks_like_json(bytes: &[u8]) -> bool {

@@ -60,6 +60,12 @@ super::table! {
         max_pitch_deg: f64 ["deg"],
         /// Largest absolute roll.
         max_roll_deg: f64 ["deg"],
+        /// Length of what the vehicle was to follow: the straight line, or the polyline of a routed mission or a trail.
+        line_length_m: f64 ["m"],
+        /// Root mean square of the distance from that line.
+        rms_cross_track_m: f64 ["m"],
+        /// Largest distance from that line.
+        max_cross_track_m: f64 ["m"],
         /// Share of the mission's line over cells of low roughness (class map before closing).
         line_share_low: f64 ["1"],
         /// Share of the mission's line over cells of semi roughness.

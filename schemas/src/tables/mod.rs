@@ -7,6 +7,9 @@ pub mod candidates;
 pub mod covariance;
 pub mod dem_fits;
 pub mod fits;
+pub mod formation_events;
+pub mod formation_samples;
+pub mod formations;
 pub mod height_distribution;
 pub mod likelihood_profile;
 pub mod logs;
@@ -15,6 +18,8 @@ pub mod parameters;
 pub mod profile_psd;
 pub mod psd;
 pub mod replicates;
+pub mod route_points;
+pub mod routes;
 pub mod samples;
 pub mod scoreboard;
 pub mod structure;
@@ -26,6 +31,9 @@ pub use candidates::CandidateRow;
 pub use covariance::CovarianceRow;
 pub use dem_fits::{BesideFit, DemFitRow};
 pub use fits::FitRow;
+pub use formation_events::FormationEventRow;
+pub use formation_samples::FormationSampleRow;
+pub use formations::FormationRow;
 pub use height_distribution::HeightDistributionRow;
 pub use likelihood_profile::LikelihoodProfileRow;
 pub use logs::LogRow;
@@ -34,6 +42,8 @@ pub use parameters::ParameterRow;
 pub use profile_psd::ProfilePsdRow;
 pub use psd::PsdRow;
 pub use replicates::ReplicateRow;
+pub use route_points::RoutePointRow;
+pub use routes::RouteRow;
 pub use samples::SampleRow;
 pub use scoreboard::{ScoreCovarianceRow, ScoreRow};
 pub use structure::StructureRow;
@@ -104,7 +114,7 @@ impl Table {
 }
 
 /// All tables, in the order of the report and of `schema`.
-pub const ALL: [&Table; 19] = [
+pub const ALL: [&Table; 24] = [
     &TerrainRow::TABLE,
     &SurfaceRow::TABLE,
     &FitRow::TABLE,
@@ -122,6 +132,11 @@ pub const ALL: [&Table; 19] = [
     &ReplicateRow::TABLE,
     &SampleRow::TABLE,
     &ParameterRow::TABLE,
+    &RouteRow::TABLE,
+    &RoutePointRow::TABLE,
+    &FormationRow::TABLE,
+    &FormationSampleRow::TABLE,
+    &FormationEventRow::TABLE,
     &LogRow::TABLE,
     &DemFitRow::TABLE,
 ];

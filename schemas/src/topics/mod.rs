@@ -1,4 +1,4 @@
-//! MCAP topics of a release and the recording of a mission that fills them.
+//! MCAP topics of a release and the recordings of a mission and of a team that fill them.
 //!
 //! ROS 2 flavour: see [`ros2`]. Viewer flavour: Foxglove's public protobuf messages where there is one, own protobuf messages (package `sastrugi`)
 //! for the rest. Each own message starts with field 1, `timestamp` (google.protobuf.Timestamp); the listed fields
@@ -10,6 +10,15 @@ pub mod imu;
 pub mod recording;
 pub mod ros2;
 pub mod state;
+pub mod team;
+pub mod team_box;
+pub mod team_events;
+pub mod team_graph;
+pub mod team_paths;
+pub mod team_route;
+pub mod team_shape;
+pub mod team_state;
+pub mod team_tf;
 pub mod terrain_grid;
 pub mod terrain_mesh;
 pub mod tf;
@@ -22,13 +31,14 @@ pub use recording::{
     CommandSample, Event, EventKind, ImuSample, Recording, StateSample, VehicleOutline, WheelOutline, WheelSample,
     WheelState,
 };
+pub use team::{DiscState, FormationBox, Member, MemberState, MovingDisc, TeamEvent, TeamEventKind, TeamRecording};
 
 use serde::Serialize;
 
 /// One topic: part of the contract with readers.
-#[derive(Clone, Copy, Debug, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Topic {
-    /// Name, as `/vehicle/state`.
+    /// Name, as `/vehicle/state`; with [`MEMBER`] in it, a topic of every member of a team.
     pub name: &'static str,
     /// Full name of its message, as `foxglove.SceneUpdate` or `sastrugi.VehicleState`.
     pub schema: &'static str,
@@ -38,8 +48,15 @@ pub struct Topic {
     pub fields: &'static [Field],
 }
 
+impl Topic {
+    /// Its name for a member of a team.
+    pub fn of_member(&self, member: &str) -> String {
+        self.name.replace(MEMBER, member)
+    }
+}
+
 /// One field of an own message.
-#[derive(Clone, Copy, Debug, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Field {
     /// Name, snake case, unit at the end.
     pub name: &'static str,
@@ -67,7 +84,10 @@ pub enum FieldKind {
     Texts,
 }
 
-/// All topics of the viewer flavour, in the order of their channels.
+/// What stands for a member's name in the name of a topic.
+pub const MEMBER: &str = "{member}";
+
+/// All topics of a mission in the viewer flavour, in the order of their channels.
 pub const VIEWER: [&Topic; 11] = [
     &terrain_mesh::TOPIC,
     &terrain_grid::TOPIC,
@@ -80,6 +100,20 @@ pub const VIEWER: [&Topic; 11] = [
     &wheels::TOPIC,
     &command::TOPIC,
     &events::TOPIC,
+];
+
+/// All topics of a team in the viewer flavour, in the order of their channels.
+pub const TEAM_VIEWER: [&Topic; 10] = [
+    &terrain_mesh::TOPIC,
+    &terrain_grid::TOPIC,
+    &team_shape::TOPIC,
+    &team_route::TOPIC,
+    &team_paths::TOPIC,
+    &team_graph::TOPIC,
+    &team_box::TOPIC,
+    &team_tf::TOPIC,
+    &team_state::TOPIC,
+    &team_events::TOPIC,
 ];
 
 /// A field; keeps the lists of the topics readable.

@@ -60,6 +60,64 @@ pub const EVENTS: Topic = topic(
     "start of the mission and its outcome, the name of the event as the logger's",
 );
 
-/// All topics of the ROS 2 flavour, in the order of their channels.
+/// Topic `/tf` of a team.
+pub const TEAM_TF: Topic =
+    topic("/tf", "tf2_msgs/msg/TFMessage", "map -> each member and each moving obstacle, at the sampling rate");
+/// Topic `/team/route`.
+pub const TEAM_ROUTE: Topic = topic(
+    "/team/route",
+    "nav_msgs/msg/Path",
+    "the planned route: its waypoints, and between them a pose a cell on the ground, at most 8192 of those; one \
+     message at the run's start",
+);
+/// Topic `/team/markers`.
+pub const TEAM_MARKERS: Topic = topic(
+    "/team/markers",
+    "visualization_msgs/msg/MarkerArray",
+    "members and moving obstacles in their frames; start, goal, obstacles, waypoints of the route, path of the search before it was \
+     smoothed, and vertices of the roadmap (evenly spaced ones in their order where there are more than 16384) in the frame terrain; \
+     one message at the run's start",
+);
+/// Topic `/team/box`.
+pub const TEAM_BOX: Topic = topic(
+    "/team/box",
+    "visualization_msgs/msg/MarkerArray",
+    "bounding box of the formation in the frame terrain, another colour where it is squeezed; whenever it changes",
+);
+/// Topic `/member_1/odom` and its like.
+pub const MEMBER_ODOM: Topic = topic(
+    "/{member}/odom",
+    "nav_msgs/msg/Odometry",
+    "true pose of the member in map and its motion in its own frame (mean yaw rate since the sample before), at the sampling rate; \
+     covariances are 0",
+);
+/// Topic `/member_1/path` and its like.
+pub const MEMBER_PATH: Topic = topic(
+    "/{member}/path",
+    "nav_msgs/msg/Path",
+    "the whole path that the member drove, two poses per second, in one message at the run's start",
+);
+/// Topic `/events` of a team.
+pub const TEAM_EVENTS: Topic = topic(
+    "/events",
+    "rcl_interfaces/msg/Log",
+    "what happened to the team or, with its name at the head of the message, to a member; the kind of event as the logger's name",
+);
+
+/// All topics of a mission in the ROS 2 flavour, in the order of their channels.
 pub const ROS2: [&Topic; 9] =
     [&TF_STATIC, &TERRAIN, &TERRAIN_POINTS, &TF, &ODOM, &IMU, &JOINT_STATES, &CMD_VEL, &EVENTS];
+
+/// All topics of a team in the ROS 2 flavour, in the order of their channels, those of a member for each in turn.
+pub const TEAM_ROS2: [&Topic; 10] = [
+    &TF_STATIC,
+    &TERRAIN,
+    &TERRAIN_POINTS,
+    &TEAM_TF,
+    &TEAM_ROUTE,
+    &TEAM_MARKERS,
+    &TEAM_BOX,
+    &MEMBER_ODOM,
+    &MEMBER_PATH,
+    &TEAM_EVENTS,
+];

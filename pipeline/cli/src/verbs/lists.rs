@@ -5,7 +5,7 @@ use crate::args::{Arguments, Common, Completions, Kinds, Schema};
 use crate::failure::{Code, Failure};
 use crate::output::{columns, print};
 use clap::CommandFactory;
-use sastrugi_schemas::topics::ros2::ROS2;
+use sastrugi_schemas::topics::ros2::{ROS2, TEAM_ROS2};
 use sastrugi_schemas::topics::{self, Field, Topic};
 use sastrugi_schemas::{Kind, Table, tables};
 use sastrugi_stages::study::keys::nearest;
@@ -115,13 +115,27 @@ pub fn schema(args: &Schema, common: &Common) -> Verdict {
         Some("topics") => {
             let of = |flavour: &str, topics: &[&Topic]| {
                 let described: Vec<String> = topics.iter().map(|t| describe_topic(t)).collect();
-                format!("mcap = \"{flavour}\"\n\n{}", described.join("\n\n"))
+                format!("{flavour}\n\n{}", described.join("\n\n"))
             };
-            let text = [of("viewer", &topics::VIEWER), of("ros2", &ROS2)].join("\n\n");
-            print(common.json, &json!({ "viewer": topics::VIEWER, "ros2": ROS2 }), &text)?;
+            let text = [
+                of("mcap = \"viewer\"", &topics::VIEWER),
+                of("mcap = \"ros2\"", &ROS2),
+                of("mcap = \"viewer\", teams", &topics::TEAM_VIEWER),
+                of("mcap = \"ros2\", teams", &TEAM_ROS2),
+            ];
+            let all = json!({
+                "viewer": topics::VIEWER,
+                "ros2": ROS2,
+                "team_viewer": topics::TEAM_VIEWER,
+                "team_ros2": TEAM_ROS2,
+            });
+            print(common.json, &all, &text.join("\n\n"))?;
         }
         Some(name) if name.starts_with('/') => {
-            let found: Vec<&Topic> = topics::VIEWER.into_iter().chain(ROS2).filter(|t| t.name == name).collect();
+            let all = topics::VIEWER.into_iter().chain(ROS2).chain(topics::TEAM_VIEWER).chain(TEAM_ROS2);
+            let mut found: Vec<&Topic> = all.filter(|t| t.name == name).collect();
+            // Missions and teams share the terrain's.
+            found.dedup();
             if found.is_empty() {
                 return Err(Failure::usage(format!("there is no topic `{name}`; `sastrugi schema topics` lists them")));
             }

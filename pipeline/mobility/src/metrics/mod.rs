@@ -9,6 +9,7 @@
 //! | body pitch and roll rate | recorded angular velocity about the body's y and x, root mean square |
 //! | path length | sum of plan distances between samples |
 //! | efficiency | plan distance between first and last sample over path length |
+//! | cross-track error | distance from each sample's foot on the line or polyline, root mean square and largest |
 //!
 //! The `gradient` differentiator takes central differences, one-sided at the ends, once for rates and twice for the
 //! acceleration. A heave of frequency `w` is attenuated by `sinc^2(w / 2f)` by second differences and by `sinc^2(w / f)`
@@ -21,8 +22,10 @@ pub mod log;
 mod rows;
 #[cfg(test)]
 mod tests;
+mod tracking;
 
-pub use rows::{MissionLabels, mission_row, replicate_row, sample_rows};
+pub use rows::{MissionLabels, mission_row, progress_m, replicate_row, sample_rows};
+pub use tracking::{CrossTrack, cross_track};
 
 use sastrugi_numeric::sums;
 use sastrugi_schemas::topics::StateSample;

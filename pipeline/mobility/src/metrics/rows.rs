@@ -1,5 +1,6 @@
 //! A recorded mission as rows of the tables `missions` and `samples`.
 
+use super::tracking::{cross_track, window_m};
 use super::{Differentiator, EulerAngles, Metrics};
 use crate::missions::{Difficulty, Mission, class_at};
 use sastrugi_numeric::Grid;
@@ -46,6 +47,7 @@ pub fn mission_row(
     let metrics = Metrics::of(&recording.states, recording.sample_rate_hz, differentiator);
     let outcome = recording.events.last();
     let success = outcome.is_some_and(|event| event.kind == EventKind::Success);
+    let tracked = cross_track(mission, recording);
     MissionRow {
         terrain_id: labels.terrain_id.clone(),
         mission_id: mission.id(),
@@ -73,6 +75,9 @@ pub fn mission_row(
         rms_body_roll_rate_deg_s: metrics.rms_body_roll_rate_rad_s.to_degrees(),
         max_pitch_deg: metrics.max_pitch_rad.to_degrees(),
         max_roll_deg: metrics.max_roll_rad.to_degrees(),
+        line_length_m: mission.course_length_m(),
+        rms_cross_track_m: tracked.rms_m,
+        max_cross_track_m: tracked.max_m,
         line_share_low: difficulty.shares[0],
         line_share_semi: difficulty.shares[1],
         line_share_high: difficulty.shares[2],
@@ -114,8 +119,12 @@ pub fn replicate_row(
     }
 }
 
-/// The farthest that a sample came along the mission's line, at most its length, m.
+/// The farthest that a sample came along the mission's line or polyline, at most its length, m.
 pub fn progress_m(mission: &Mission, recording: &Recording) -> f64 {
+    if let Some(line) = &mission.line {
+        let feet = line.feet(&recording.states, window_m(recording));
+        return feet.last().map_or(0.0, |foot| foot.along_m);
+    }
     let along = recording.states.iter().map(|s| mission.along_m([s.position_m[0], s.position_m[1]]));
     along.fold(0.0, f64::max).min(mission.length_m())
 }

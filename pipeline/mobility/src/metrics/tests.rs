@@ -1,5 +1,5 @@
 use super::*;
-use crate::missions::Mission;
+use crate::missions::{Mission, Polyline};
 use sastrugi_numeric::{Geometry, Grid};
 use sastrugi_schemas::topics::{CommandSample, Recording, VehicleOutline, WheelSample, WheelState};
 use std::f64::consts::{SQRT_2, TAU};
@@ -150,4 +150,22 @@ fn val_samples_hold_wheels_and_controller() {
     assert_eq!((first.wheel_contact_y_m[0], first.wheel_contact_z_m[0]), (2.0, 3.0));
     assert!(last.cross_track_m.is_nan() && last.chassis_force_n.is_nan());
     assert!(last.wheel_normal_force_n.is_empty() && last.wheel_contact_z_m.is_empty());
+}
+
+/// A vehicle that weaves about its line as a sine, and one beside it; beyond the ends the error is the distance to them.
+#[test]
+fn val_cross_track_error_of_a_sine() {
+    let at = |y: &dyn Fn(f64) -> f64| -> Vec<StateSample> {
+        let plain = states(|_| 0.0, |_| 0.0, |_| 0.0);
+        let moved = |s: StateSample| StateSample { position_m: [s.position_m[0], y(s.position_m[0]), 0.0], ..s };
+        plain.into_iter().map(moved).collect()
+    };
+    let line = Polyline::new(&[[0.0, 0.0], [11.0, 0.0], [40.0, 0.0]]).unwrap();
+    let weaving = CrossTrack::of(&at(&|x| 0.1 * libm::sin(TAU * x / 8.0)), &line, 1.5);
+    assert!((weaving.rms_m - 0.1 / SQRT_2).abs() < 1e-4 && (weaving.max_m - 0.1).abs() < 1e-9, "{weaving:?}");
+    let beside = CrossTrack::of(&at(&|_| -0.3), &line, 1.5);
+    assert!((beside.rms_m - 0.3).abs() < 1e-12 && (beside.max_m - 0.3).abs() < 1e-12, "{beside:?}");
+    let short = Polyline::new(&[[0.0, 0.0], [38.0, 0.0]]).unwrap();
+    assert!((CrossTrack::of(&at(&|_| 0.0), &short, 1.5).max_m - 2.0).abs() < 1e-9);
+    assert!(CrossTrack::of(&[], &line, 1.5).rms_m.is_nan());
 }

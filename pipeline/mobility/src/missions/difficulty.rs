@@ -1,4 +1,4 @@
-//! How difficult the ground under a mission's line is, before anything drives there.
+//! How difficult the ground under a mission's line or polyline is, before anything drives there.
 //!
 //! The line is looked at in the middle of equal intervals of at most half a cell: class shares count them, the slope is that
 //! of the bilinear surface, and the band RMS is the standard deviation of the heights less their centred moving average over
@@ -24,17 +24,14 @@ impl Difficulty {
     /// average over `window_m`.
     pub fn along(dem: &Grid, classes: &Grid<u8>, mission: &Mission, window_m: f64) -> Self {
         let cell_m = dem.geometry.cell[0].min(dem.geometry.cell[1]);
-        let intervals = (2.0 * mission.length_m() / cell_m).ceil().max(1.0);
-        let at = |k: usize| {
-            let share = (k as f64 + 0.5) / intervals;
-            [0, 1].map(|axis| mission.start_m[axis] + share * (mission.goal_m[axis] - mission.start_m[axis]))
-        };
-        let points: Vec<[f64; 2]> = (0..intervals as usize).map(at).collect();
+        let intervals = (2.0 * mission.course_length_m() / cell_m).ceil().max(1.0);
+        let points: Vec<[f64; 2]> =
+            (0..intervals as usize).map(|k| mission.course_at((k as f64 + 0.5) / intervals)).collect();
         let surface: Vec<Option<(f64, f64, f64)>> =
             points.iter().map(|&[x, y]| dem.height_and_gradient(x, y)).collect();
         let slopes = surface.iter().flatten().map(|&(_, dx, dy)| (dx * dx + dy * dy).sqrt());
         let heights: Vec<f64> = surface.iter().map(|s| s.map_or(f64::NAN, |(z, ..)| z)).collect();
-        let half = (0.5 * window_m * intervals / mission.length_m()).round() as usize;
+        let half = (0.5 * window_m * intervals / mission.course_length_m()).round() as usize;
         Self {
             shares: shares(classes, &points),
             max_slope: slopes.fold(f64::NAN, f64::max),
@@ -102,6 +99,18 @@ mod tests {
         let d = Difficulty::along(&wave, &classes(|_| 0), &mission, 0.8);
         assert!((d.band_rms_m / (0.1 * FRAC_1_SQRT_2) - 1.0).abs() < 0.03, "{}", d.band_rms_m);
         assert!(Difficulty::along(&wave, &classes(|_| 0), &mission, 0.1).band_rms_m < 0.01);
+    }
+
+    /// A polyline is looked at along itself: east in the plane's steepest direction, then north along its contour.
+    #[test]
+    fn val_a_polyline_is_judged_along_itself() {
+        let line = crate::missions::Polyline::new(&[[2.0, 2.0], [10.0, 2.0], [10.0, 8.0]]).unwrap();
+        let map = classes(|x| if x < 6.0 { 0 } else { 2 });
+        let d = Difficulty::along(&grid(|x, _| 0.3 * x), &map, &Mission::along(0, line), 0.5);
+        for (found, expected) in d.shares.into_iter().zip([4.0 / 14.0, 0.0, 10.0 / 14.0]) {
+            assert!((found - expected).abs() < 0.005, "{:?}", d.shares);
+        }
+        assert!((d.max_slope - 0.3).abs() < 1e-9);
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! Random straight missions (Majhor and Bos, section 2.3).
+//! Missions: random straight ones (Majhor and Bos, section 2.3), and those that follow a polyline.
 //!
 //! The start is a cell centre drawn uniformly from the low-roughness cells of the closed class map that lie more than a
 //! border from the edge. The heading is uniform over the circle. The goal lies one mission length away along the heading;
@@ -12,12 +12,15 @@
 //! that its missions are what they would be alone, and where two accept the same draw they share the mission.
 //! [`ReplicateSettings`] perturbs the start of a drawn mission.
 //!
+//! [`Mission::along`] makes a mission that follows a [`Polyline`] instead.
+//!
 //! Cost: one pass over the map and a few draws per mission; memory: sixteen bytes per cell
 //! inside the border.
 
 mod difficulty;
 mod params;
 mod perturb;
+mod polyline;
 #[cfg(test)]
 mod tests;
 
@@ -25,12 +28,13 @@ pub use difficulty::Difficulty;
 pub(crate) use difficulty::class_at;
 pub use params::{MissionParameters, MissionSettings};
 pub use perturb::{ReplicateParameters, ReplicateSettings};
+pub use polyline::{Foot, Polyline, PolylineError};
 
 use sastrugi_numeric::{Geometry, Grid, Stream, Streams};
 use sastrugi_schemas::RoughnessClass;
 
-/// A straight mission.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+/// A mission: straight from start to goal, or along a polyline.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Mission {
     /// Number of the mission on its terrain, from 0.
     pub index: usize,
@@ -43,6 +47,9 @@ pub struct Mission {
     pub heading_rad: f64,
     /// Draws of start and heading that were needed, at least 1.
     pub draws: u32,
+    /// What the vehicle follows to the goal; the straight line when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub line: Option<Polyline>,
 }
 
 impl Mission {
@@ -54,7 +61,13 @@ impl Mission {
     /// The straight mission between two points, facing the goal.
     pub fn between(index: usize, start_m: [f64; 2], goal_m: [f64; 2]) -> Self {
         let bearing = libm::atan2(goal_m[1] - start_m[1], goal_m[0] - start_m[0]);
-        Self { index, start_m, goal_m, heading_rad: normalized(bearing), draws: 1 }
+        Self { index, start_m, goal_m, heading_rad: normalized(bearing), draws: 1, line: None }
+    }
+
+    /// The mission along a polyline from its first point to its last, facing along it.
+    pub fn along(index: usize, line: Polyline) -> Self {
+        let (start_m, goal_m) = (line.point_at(0.0), line.point_at(line.length_m()));
+        Self { index, start_m, goal_m, heading_rad: normalized(line.bearing_rad()), draws: 1, line: Some(line) }
     }
 
     /// Distance from start to goal, m.
@@ -62,7 +75,20 @@ impl Mission {
         distance(self.start_m, self.goal_m)
     }
 
-    /// Distance of a point along the line from the start, m; negative behind it.
+    /// Length of what the vehicle follows, m: of the polyline, or the distance from start to goal.
+    pub fn course_length_m(&self) -> f64 {
+        self.line.as_ref().map_or_else(|| self.length_m(), Polyline::length_m)
+    }
+
+    /// The point at a share (0 to 1) of the way that the vehicle follows, m.
+    pub fn course_at(&self, share: f64) -> [f64; 2] {
+        match &self.line {
+            Some(line) => line.point_at(share * line.length_m()),
+            None => [0, 1].map(|axis| self.start_m[axis] + share * (self.goal_m[axis] - self.start_m[axis])),
+        }
+    }
+
+    /// Distance of a point along the straight line from the start, m; negative behind it.
     pub fn along_m(&self, [x, y]: [f64; 2]) -> f64 {
         let [dx, dy] = [0, 1].map(|axis| self.goal_m[axis] - self.start_m[axis]);
         ((x - self.start_m[0]) * dx + (y - self.start_m[1]) * dy) / self.length_m()
@@ -187,7 +213,7 @@ impl<'a> Field<'a> {
             let length_m = self.settings.length_m();
             let goal_m = [start_m[0] + length_m * cos, start_m[1] + length_m * sin];
             if is_low(self.classes, start) && self.is_goal(goal_m) {
-                return Ok(Mission { index, start_m, goal_m, heading_rad, draws });
+                return Ok(Mission { index, start_m, goal_m, heading_rad, draws, line: None });
             }
         }
         Err(MissionError::DrawsExhausted {

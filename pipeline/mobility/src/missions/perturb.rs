@@ -83,7 +83,7 @@ impl ReplicateSettings {
     /// Replicate `replicate` (from 0) of a mission; the first is the mission itself.
     pub fn start(&self, mission: &Mission, replicate: usize, streams: &Streams) -> Mission {
         if replicate == 0 {
-            return *mission;
+            return mission.clone();
         }
         let name = format!("replicate-{:04}", replicate + 1);
         let mut stream = streams.child(&mission.id()).child(&name).stream("start");
@@ -94,7 +94,7 @@ impl ReplicateSettings {
         Mission {
             start_m: [mission.start_m[0] + radius_m * cos, mission.start_m[1] + radius_m * sin],
             heading_rad: normalized(mission.heading_rad + turn_rad),
-            ..*mission
+            ..mission.clone()
         }
     }
 }

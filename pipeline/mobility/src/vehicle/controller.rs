@@ -1,15 +1,18 @@
-//! Pure pursuit of the straight line from start to goal (Coulter, 1992).
+//! Pure pursuit of what a mission follows (Coulter 1992, CMU-RI-TR-92-01): the straight line from start to goal, or a polyline.
 //!
-//! The look-ahead point lies on the line, `lookahead` beyond the foot of the vehicle, and not beyond the goal. With `a`
+//! The look-ahead point lies on the line, `lookahead` beyond the foot of the vehicle along it, and not beyond the goal. (Coulter takes
+//! the point of the path at that distance from the vehicle; measured along the path there is always just one.) With `a`
 //! the bearing of that point relative to the vehicle and `d` its distance, the arc through it asks for the yaw rate
 //! `gain * speed * 2 sin a / d`. When the point falls behind the vehicle (`|a|` above `turn_start`) the vehicle turns on
 //! the spot, or on its smallest circle where it cannot, always in the direction in which it began, until `|a|` is below
 //! `turn_stop`. Speed and yaw rate change no
 //! faster than the vehicle's limits allow.
+//!
+//! The foot on a polyline never goes back, and never beyond the look-ahead point of the one before ([`Polyline::foot`]).
 
 use super::actuation::{Command, Limits};
 use super::settings::TraverseSettings;
-use crate::missions::Mission;
+use crate::missions::{Foot, Mission, Polyline};
 use std::f64::consts::{PI, TAU};
 
 /// Pose of the base_link origin in plan.
@@ -20,13 +23,60 @@ pub(crate) struct PlanPose {
     pub yaw: f64,
 }
 
+/// What a vehicle follows.
+#[derive(Clone, Debug)]
+enum Course {
+    Straight {
+        start: [f64; 2],
+        direction: [f64; 2],
+        length: f64,
+    },
+    /// A polyline, and the foot of the vehicle on it.
+    Along {
+        line: Polyline,
+        foot_m: f64,
+    },
+}
+
+impl Course {
+    fn of(mission: &Mission) -> Self {
+        if let Some(line) = &mission.line {
+            return Self::Along { line: line.clone(), foot_m: 0.0 };
+        }
+        let length = mission.length_m();
+        let direction = [0, 1].map(|axis| (mission.goal_m[axis] - mission.start_m[axis]) / length);
+        Self::Straight { start: mission.start_m, direction, length }
+    }
+
+    /// The look-ahead point of a vehicle, and its cross-track error, m.
+    fn aim(&self, at: [f64; 2], lookahead_m: f64) -> ([f64; 2], f64) {
+        match self {
+            Self::Straight { start, direction: [cos, sin], length } => {
+                let from_start = [at[0] - start[0], at[1] - start[1]];
+                let along = from_start[0] * cos + from_start[1] * sin;
+                let ahead = (along + lookahead_m).min(*length);
+                ([start[0] + ahead * cos, start[1] + ahead * sin], from_start[1] * cos - from_start[0] * sin)
+            }
+            Self::Along { line, foot_m } => {
+                let Foot { along_m, cross_track_m } = line.foot(at, *foot_m, lookahead_m);
+                (line.point_at(along_m + lookahead_m), cross_track_m)
+            }
+        }
+    }
+
+    /// Takes the vehicle to be at a point from now on.
+    fn advance(&mut self, at: [f64; 2], lookahead_m: f64) {
+        if let Self::Along { line, foot_m } = self {
+            *foot_m = line.foot(at, *foot_m, lookahead_m).along_m;
+        }
+    }
+}
+
 /// Steering of one mission.
 #[derive(Clone, Debug)]
 pub(crate) struct Controller {
-    start: [f64; 2],
+    course: Course,
     goal: [f64; 2],
-    direction: [f64; 2],
-    length: f64,
     /// Sign of the turn on the spot that is under way; 0 while following the line.
     turning: f64,
     /// Commands in force.
@@ -35,27 +85,17 @@ pub(crate) struct Controller {
 
 impl Controller {
     pub(crate) fn new(mission: &Mission) -> Self {
-        let length = mission.length_m();
-        Self {
-            start: mission.start_m,
-            goal: mission.goal_m,
-            direction: [0, 1].map(|axis| (mission.goal_m[axis] - mission.start_m[axis]) / length),
-            length,
-            turning: 0.0,
-            command: Command::default(),
-        }
+        Self { course: Course::of(mission), goal: mission.goal_m, turning: 0.0, command: Command::default() }
     }
 
     /// Looks at the pose without changing the commands in force; returns the distance of the look-ahead point, m.
     pub(crate) fn observe(&mut self, pose: PlanPose, settings: &TraverseSettings) -> f64 {
-        let from_start = [pose.x - self.start[0], pose.y - self.start[1]];
-        let [cos, sin] = self.direction;
-        let along = from_start[0] * cos + from_start[1] * sin;
-        let ahead = (along + settings.lookahead_m()).min(self.length);
-        let target = [self.start[0] + ahead * cos - pose.x, self.start[1] + ahead * sin - pose.y];
-        self.command.cross_track_m = from_start[1] * cos - from_start[0] * sin;
+        let at = [pose.x, pose.y];
+        let (aim, cross_track_m) = self.course.aim(at, self.lookahead_m(settings));
+        let target = [aim[0] - pose.x, aim[1] - pose.y];
+        self.command.cross_track_m = cross_track_m;
         self.command.heading_error_rad = wrapped(libm::atan2(target[1], target[0]) - pose.yaw);
-        self.command.distance_to_goal_m = self.distance_to_goal_m([pose.x, pose.y]);
+        self.command.distance_to_goal_m = self.distance_to_goal_m(at);
         length(target)
     }
 
@@ -64,8 +104,26 @@ impl Controller {
         length([self.goal[0] - at[0], self.goal[1] - at[1]])
     }
 
+    /// What is left of the way from a point to the goal, m: the distance, or more of a polyline that leads round.
+    pub(crate) fn left_m(&self, at: [f64; 2], settings: &TraverseSettings) -> f64 {
+        let distance_m = self.distance_to_goal_m(at);
+        match &self.course {
+            Course::Straight { .. } => distance_m,
+            Course::Along { line, foot_m } => {
+                let foot = line.foot(at, *foot_m, self.lookahead_m(settings));
+                distance_m.max(line.length_m() - foot.along_m)
+            }
+        }
+    }
+
+    fn lookahead_m(&self, settings: &TraverseSettings) -> f64 {
+        settings.lookahead_m(self.command.speed_m_s)
+    }
+
     /// Looks at the pose and sets the commands for the coming `period_s`.
     pub(crate) fn update(&mut self, pose: PlanPose, settings: &TraverseSettings, limits: &Limits, period_s: f64) {
+        let lookahead_m = self.lookahead_m(settings);
+        self.course.advance([pose.x, pose.y], lookahead_m);
         let distance = self.observe(pose, settings);
         self.switch(settings);
         let (speed, yaw_rate) = self.wanted(distance, settings, limits);

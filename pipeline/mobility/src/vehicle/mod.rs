@@ -35,6 +35,7 @@ mod model;
 mod params;
 mod settings;
 mod simulation;
+mod slopes;
 mod surface;
 #[cfg(test)]
 mod tests;
@@ -48,7 +49,9 @@ pub use params::{
     RockerBogieParameters, SkidSteerParameters, SuspensionParameters, TyreParameters, VehicleParameters,
     WheelParameters,
 };
+pub(crate) use settings::LOOKAHEAD_WHEELBASES;
 pub use settings::{ControllerParameters, TraverseParameters, TraverseSettings};
+pub use slopes::SlopeAbility;
 pub use surface::{ClassSurfaceParameters, SurfaceError, SurfaceLayers, SurfaceMap, SurfaceParameters, SurfacePreset};
 pub(crate) use surface::{MATERIALS, Material};
 pub use traverse::{TraverseError, drive};

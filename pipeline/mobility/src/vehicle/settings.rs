@@ -11,7 +11,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
-/// A vehicle over straight missions.
+/// A vehicle over missions.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct TraverseParameters {
@@ -50,13 +50,17 @@ pub struct TraverseParameters {
     pub differentiator: Differentiator,
 }
 
-/// Pure pursuit of the straight line.
+/// Pure pursuit of the straight line or polyline.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ControllerParameters {
     /// Distance along the line from the vehicle's foot point to the point it steers for, m; three wheelbases when absent
     /// (assumed).
     pub lookahead_m: Option<f64>,
+    /// Time in which the commanded speed covers the look-ahead distance, s, where that is more than `lookahead_m`; the distance does not
+    /// grow with speed when absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lookahead_time_s: Option<f64>,
     /// Factor on the yaw rate of the pursuit arc (assumed: 1, the plain arc).
     pub steering_gain: f64,
     /// Bearing of the point beyond which the vehicle turns on the spot, deg (assumed: the point is behind).
@@ -92,7 +96,14 @@ impl Default for TraverseParameters {
 
 impl Default for ControllerParameters {
     fn default() -> Self {
-        Self { lookahead_m: None, steering_gain: 1.0, turn_start_deg: 90.0, turn_stop_deg: 30.0, turn_rate_rad_s: 1.0 }
+        Self {
+            lookahead_m: None,
+            lookahead_time_s: None,
+            steering_gain: 1.0,
+            turn_start_deg: 90.0,
+            turn_stop_deg: 30.0,
+            turn_rate_rad_s: 1.0,
+        }
     }
 }
 
@@ -170,7 +181,7 @@ impl TraverseParameters {
 }
 
 /// Look-ahead distance over wheelbase.
-const LOOKAHEAD_WHEELBASES: f64 = 3.0;
+pub(crate) const LOOKAHEAD_WHEELBASES: f64 = 3.0;
 /// Longest mission and settling that is accepted, s.
 const TIME_MAX_S: f64 = 86_400.0;
 /// Highest step rate that is accepted, Hz.
@@ -179,6 +190,7 @@ const STEP_RATE_MAX_HZ: u32 = 100_000;
 impl ControllerParameters {
     fn check(&self) -> Result<(), ParameterError> {
         self.lookahead_m.map_or(Ok(0.0), |v| ParameterError::positive("lookahead_m", v))?;
+        self.lookahead_time_s.map_or(Ok(0.0), |v| ParameterError::positive("lookahead_time_s", v))?;
         ParameterError::positive("steering_gain", self.steering_gain)?;
         ParameterError::positive("turn_rate_rad_s", self.turn_rate_rad_s)?;
         ParameterError::between("turn_start_deg", self.turn_start_deg, 0.0, 180.0)?;
@@ -205,8 +217,9 @@ impl TraverseSettings {
         &self.parameters.controller
     }
 
-    pub(crate) fn lookahead_m(&self) -> f64 {
-        self.lookahead_m
+    /// Look-ahead distance at a commanded speed, m.
+    pub(crate) fn lookahead_m(&self, speed_m_s: f64) -> f64 {
+        self.lookahead_m.max(self.parameters.controller.lookahead_time_s.unwrap_or(0.0) * speed_m_s)
     }
 
     pub(crate) fn speed_m_s(&self) -> f64 {

@@ -1,3 +1,5 @@
+mod following;
+
 use super::drive::Servo;
 use super::simulation::Simulation;
 use super::traverse::settled;

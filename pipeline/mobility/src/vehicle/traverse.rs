@@ -51,8 +51,9 @@ pub fn drive(
         return Err(TraverseError::NoSurface);
     }
     let (start_m, goal_m) = (mission.start_m, mission.goal_m);
-    let length_m = mission.length_m();
-    if !(length_m.is_finite() && length_m > 0.0 && mission.heading_rad.is_finite()) {
+    let length_m = mission.course_length_m();
+    let finite = start_m.iter().chain(&goal_m).chain([&mission.heading_rad]).all(|v| v.is_finite());
+    if !(finite && length_m.is_finite() && length_m > 0.0) {
         return Err(TraverseError::NoLine { start_m, goal_m });
     }
     Ok(match settled(ground, vehicle, settings, mission) {
@@ -194,13 +195,11 @@ impl<'a> Run<'a> {
         mission: &Mission,
     ) -> Self {
         let (position, imu_velocity) = simulation.body.base(vehicle);
-        let text = format!(
-            "at ({:.2}, {:.2}, {:.2}) m, goal {:.2} m away",
-            position[0],
-            position[1],
-            position[2],
-            mission.length_m()
-        );
+        let way = match &mission.line {
+            None => format!("goal {:.2} m away", mission.length_m()),
+            Some(line) => format!("{:.2} m to follow", line.length_m()),
+        };
+        let text = format!("at ({:.2}, {:.2}, {:.2}) m, {way}", position[0], position[1], position[2]);
         let mut recording = empty(vehicle, settings.parameters());
         recording.events.push(Event { time_s: 0.0, kind: EventKind::Start, text });
         Self {
@@ -333,7 +332,7 @@ impl<'a> Run<'a> {
             let text = format!("pitch or roll beyond {} deg at ({x:.2}, {y:.2}) m", rules.tip_deg);
             return Some((EventKind::Tipped, text));
         }
-        let left_m = self.controller.distance_to_goal_m([x, y]);
+        let left_m = self.controller.left_m([x, y], self.settings);
         if left_m <= rules.goal_tolerance_m {
             return Some((EventKind::Success, format!("within {left_m:.3} m of the goal")));
         }

@@ -1,6 +1,7 @@
-use super::polygons::{Polygon, inside, oracle};
+use super::polygons::{inside, oracle};
 use super::*;
 use crate::dem::{Crs, WriteOptions};
+use crate::geojson::polygons::Polygon;
 use proptest::prelude::*;
 use sha2::{Digest, Sha256};
 use std::collections::BTreeSet;
@@ -128,15 +129,15 @@ fn val_what_is_no_mask_is_refused() {
     let far = polygon_text("[[50, 50], [60, 50], [60, 60], [50, 50]]");
     let all = polygon_text("[[-1, -1], [9, -1], [9, 9], [-1, 9], [-1, -1]]");
     let refused = [
-        ("{", "is no GeoJSON"),
+        ("{", "is not GeoJSON"),
         ("{\"a\": 1}", "lacks its \"type\""),
         ("{\"type\": \"Topology\"}", "holds a Topology"),
-        ("{\"type\": \"Point\", \"coordinates\": [1, 2]}", "holds a Point; a mask is made of Polygon and MultiPolygon"),
+        ("{\"type\": \"Point\", \"coordinates\": [1, 2]}", "holds a Point; only Polygon and MultiPolygon are read"),
         ("{\"type\": \"FeatureCollection\"}", "\"features\" is missing"),
         ("{\"type\": \"FeatureCollection\", \"features\": []}", "holds no polygon"),
-        ("{\"type\": \"Polygon\", \"coordinates\": 3}", "\"coordinates\" is missing or no list"),
+        ("{\"type\": \"Polygon\", \"coordinates\": 3}", "\"coordinates\" is missing or not a list"),
         (&polygon_text("[[0, 0], [1, 1]]"), "has 2 positions"),
-        (&polygon_text("[[0, 0], [1, \"a\"], [2, 2]]"), "no list of [x, y] positions"),
+        (&polygon_text("[[0, 0], [1, \"a\"], [2, 2]]"), "not a list of [x, y] positions"),
         (&far, "keeps none of the DEM's cells (x 0 to 4, y 0 to 4)"),
     ];
     for (text, words) in refused {

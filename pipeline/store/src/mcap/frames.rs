@@ -11,6 +11,10 @@ pub(super) const MAP: &str = "map";
 pub(super) const BASE: &str = "base_link";
 /// Quaternion of no rotation.
 pub(super) const IDENTITY: [f64; 4] = [0.0, 0.0, 0.0, 1.0];
+/// Colour of a start.
+pub(super) const START: [u8; 3] = [0x2c, 0xa0, 0x5a];
+/// Colour of a goal.
+pub(super) const GOAL: [u8; 3] = [0xc8, 0x32, 0x32];
 /// Ground without a class.
 const GREY: [u8; 3] = [0x9a, 0x9a, 0x94];
 

@@ -1,4 +1,4 @@
-//! MCAP recordings of missions in two flavours, which never mix in a file: for viewers (Foxglove's messages and our own, in
+//! MCAP recordings of missions and of teams in two flavours, which never mix in a file: for viewers (Foxglove's messages and our own, in
 //! protobuf) and for ROS 2 (CDR). The topics are those of `sastrugi_schemas::topics`.
 //!
 //! Messages stand in the order of their time; chunks are compressed with Zstandard on one thread and carry checksums;
@@ -9,12 +9,14 @@ mod log;
 mod mesh;
 mod protobuf;
 mod ros2;
+mod team;
 mod viewer;
 
 #[cfg(test)]
 mod tests;
 
 pub use log::read_log;
+pub use team::{TeamMcap, encode_team, write_team};
 
 use crate::PROGRAM;
 use crate::atomic::{self, Target};
@@ -24,7 +26,7 @@ use mcap::records::{MessageHeader, Metadata};
 use mcap::{Compression, WriteOptions, Writer};
 use sastrugi_numeric::Grid;
 use sastrugi_schemas::study::McapFlavour;
-use sastrugi_schemas::topics::{Recording, Topic};
+use sastrugi_schemas::topics::{self, Recording, Topic};
 use std::collections::BTreeMap;
 use std::io::{self, Cursor};
 use std::path::{Path, PathBuf};
@@ -76,7 +78,7 @@ impl McapError {
     }
 }
 
-/// A terrain as its missions' recordings show it: what is the same for all of them is worked out once.
+/// A terrain as the recordings on it show it: what is the same for all of them is worked out once.
 #[derive(Clone, Debug)]
 pub struct TerrainView<'a> {
     dem: &'a Grid,
@@ -100,6 +102,12 @@ impl<'a> TerrainView<'a> {
         }
         let range_m = dem.range().unwrap_or((0.0, 0.0));
         Ok(Self { dem, classes, range_m, grid: OnceLock::new(), grid_map: OnceLock::new() })
+    }
+
+    /// Whole metres near the south-west corner and the lowest height.
+    fn origin_m(&self) -> [f64; 3] {
+        let [x, y] = self.dem.geometry.origin;
+        [x, y, self.range_m.0].map(f64::floor)
     }
 
     fn grid(&self) -> &fox::Grid {
@@ -136,8 +144,8 @@ pub struct MissionMcap<'a> {
 pub struct McapSummary {
     /// Number of messages.
     pub messages: u64,
-    /// Number of messages of each of the flavour's topics.
-    pub counts: Vec<u64>,
+    /// The channels with their numbers of messages.
+    pub channels: Vec<ChannelSummary>,
     /// Time of the first message, ns since 1970-01-01 UTC.
     pub start_ns: u64,
     /// Time of the last message, ns since 1970-01-01 UTC.
@@ -148,16 +156,25 @@ pub struct McapSummary {
     pub content_sha256: String,
 }
 
-/// What a flavour is made of.
+/// What was written on a channel.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ChannelSummary {
+    /// Name of the topic in the file.
+    pub name: String,
+    /// The topic.
+    pub topic: &'static Topic,
+    /// Number of messages.
+    pub messages: u64,
+}
+
+/// How a flavour puts messages into a file.
 struct Flavour {
     profile: &'static str,
     message_encoding: &'static str,
     schema_encoding: &'static str,
-    topics: &'static [&'static Topic],
     /// The definition of a topic's messages.
     schema: fn(&Topic) -> Result<Vec<u8>, McapError>,
     channel_metadata: fn(&Topic) -> BTreeMap<String, String>,
-    messages: fn(&MissionMcap, &mut Timeline) -> Result<(), McapError>,
 }
 
 impl Flavour {
@@ -169,36 +186,71 @@ impl Flavour {
     }
 }
 
+/// A topic under the name that it has in a file.
+struct Channel {
+    name: String,
+    topic: &'static Topic,
+}
+
+impl Channel {
+    fn of(topic: &'static Topic) -> Self {
+        Self { name: topic.name.to_owned(), topic }
+    }
+
+    /// A topic that every member of a team has.
+    fn of_member(topic: &'static Topic, member: &str) -> Self {
+        Self { name: topic.of_member(member), topic }
+    }
+}
+
 /// A message before it gets its place in the file.
 struct Pending {
-    /// Position of its topic in the flavour's list.
-    topic: usize,
+    /// Position of its channel in the list.
+    channel: usize,
     log_time: u64,
     data: Vec<u8>,
 }
 
-/// Messages of a mission, in no particular order.
+/// Messages of a recording, in no particular order.
 struct Timeline {
-    topics: &'static [&'static Topic],
+    channels: Vec<Channel>,
     epoch_ns: u64,
     pending: Vec<Pending>,
 }
 
 impl Timeline {
-    /// Adds a message at a time since the mission's start, made for its time in ns since 1970-01-01 UTC.
+    fn new(channels: Vec<Channel>, epoch_ns: u64) -> Self {
+        Self { channels, epoch_ns, pending: vec![] }
+    }
+
+    /// Adds a message at a time since the recording's start, made for its time in ns since 1970-01-01 UTC.
     fn add(
         &mut self,
         topic: &Topic,
         time_s: f64,
         data: impl FnOnce(u64) -> Result<Vec<u8>, McapError>,
     ) -> Result<(), McapError> {
-        // A negative or NaN time becomes the epoch.
-        let log_time = self.epoch_ns.saturating_add((time_s * 1e9).round() as u64);
-        let topic = self.topics.iter().position(|t| t.name == topic.name);
-        let topic = topic.ok_or_else(|| McapError::unfit("a topic is not listed"))?;
-        self.pending.push(Pending { topic, log_time, data: data(log_time)? });
+        self.add_to(topic.name, time_s, data)
+    }
+
+    /// As [`Self::add`], by the name of the channel.
+    fn add_to(
+        &mut self,
+        name: &str,
+        time_s: f64,
+        data: impl FnOnce(u64) -> Result<Vec<u8>, McapError>,
+    ) -> Result<(), McapError> {
+        let channel = self.channels.iter().position(|channel| channel.name == name);
+        let channel = channel.ok_or_else(|| McapError::unfit("a topic is not listed"))?;
+        let log_time = log_time(self.epoch_ns, time_s);
+        self.pending.push(Pending { channel, log_time, data: data(log_time)? });
         Ok(())
     }
+}
+
+/// A time since the recording's start in ns since 1970-01-01 UTC; a negative or NaN one becomes the start.
+fn log_time(epoch_ns: u64, time_s: f64) -> u64 {
+    epoch_ns.saturating_add((time_s * 1e9).round() as u64)
 }
 
 /// Writes a mission to a file.
@@ -206,8 +258,10 @@ impl Timeline {
 /// # Errors
 /// See [`McapError`].
 pub fn write_mission<'a>(target: impl Into<Target<'a>>, mission: &MissionMcap<'_>) -> Result<McapSummary, McapError> {
-    let target = target.into();
-    let (bytes, summary) = encode_mission(mission)?;
+    write(target.into(), encode_mission(mission)?)
+}
+
+fn write(target: Target<'_>, (bytes, summary): (Vec<u8>, McapSummary)) -> Result<McapSummary, McapError> {
     atomic::write(target, &bytes).map_err(|source| McapError::Io { path: target.path.to_owned(), source })?;
     Ok(summary)
 }
@@ -280,11 +334,23 @@ pub fn bag_metadata(file: &str, summary: &McapSummary) -> String {
 /// As [`write_mission`], without the file system.
 pub fn encode_mission(mission: &MissionMcap) -> Result<(Vec<u8>, McapSummary), McapError> {
     check(mission)?;
-    let flavour = Flavour::of(mission.flavour);
-    let mut timeline = Timeline { topics: flavour.topics, epoch_ns: mission.epoch_ns, pending: vec![] };
-    (flavour.messages)(mission, &mut timeline)?;
-    let mut messages = timeline.pending;
-    messages.sort_by_key(|m| (m.log_time, m.topic));
+    let (listed, messages): (&[&'static Topic], fn(&MissionMcap, &mut Timeline) -> _) = match mission.flavour {
+        McapFlavour::Viewer => (&topics::VIEWER, viewer::messages),
+        McapFlavour::Ros2 => (&topics::ros2::ROS2, ros2::messages),
+    };
+    let mut timeline = Timeline::new(listed.iter().map(|topic| Channel::of(topic)).collect(), mission.epoch_ns);
+    messages(mission, &mut timeline)?;
+    encode(Flavour::of(mission.flavour), timeline, mission.metadata)
+}
+
+/// Messages and metadata records as the bytes of an MCAP file.
+fn encode(
+    flavour: &Flavour,
+    timeline: Timeline,
+    metadata: &BTreeMap<String, BTreeMap<String, String>>,
+) -> Result<(Vec<u8>, McapSummary), McapError> {
+    let Timeline { channels, pending: mut messages, .. } = timeline;
+    messages.sort_by_key(|m| (m.log_time, m.channel));
     let options = WriteOptions::new()
         .profile(flavour.profile)
         .library(PROGRAM)
@@ -293,27 +359,29 @@ pub fn encode_mission(mission: &MissionMcap) -> Result<(Vec<u8>, McapSummary), M
         .compression_threads(0)
         .chunk_size(Some(CHUNK_BYTES));
     let mut writer = options.create(Cursor::new(Vec::new()))?;
-    let channels = flavour.topics.iter().map(|topic| add_channel(&mut writer, flavour, topic));
-    let channels = channels.collect::<Result<Vec<_>, _>>()?;
+    let ids = channels.iter().map(|channel| add_channel(&mut writer, flavour, channel));
+    let ids = ids.collect::<Result<Vec<_>, _>>()?;
     let mut content = ContentHash::new("messages");
-    // Counted by topic: the messages of one instant then differ in little but their data.
-    let mut counts = vec![0; flavour.topics.len()];
-    for Pending { topic, log_time, data } in &messages {
-        let (channel_id, sequence) = (channels[*topic], counts[*topic] as u32);
+    // Counted by channel: the messages of one instant then differ in little but their data.
+    let mut counts = vec![0; channels.len()];
+    for Pending { channel, log_time, data } in &messages {
+        let (channel_id, sequence) = (ids[*channel], counts[*channel] as u32);
         let header = MessageHeader { channel_id, sequence, log_time: *log_time, publish_time: *log_time };
-        counts[*topic] += 1;
+        counts[*channel] += 1;
         writer.write_to_known_channel(&header, data)?;
-        content.text(flavour.topics[*topic].name);
+        content.text(&channels[*channel].name);
         content.u64(*log_time);
         content.bytes(data);
     }
-    for (name, metadata) in mission.metadata {
+    for (name, metadata) in metadata {
         writer.write_metadata(&Metadata { name: name.clone(), metadata: metadata.clone() })?;
     }
     writer.finish()?;
+    let counted = channels.into_iter().zip(counts);
+    let counted = counted.map(|(Channel { name, topic }, messages)| ChannelSummary { name, topic, messages });
     let summary = McapSummary {
         messages: messages.len() as u64,
-        counts,
+        channels: counted.collect(),
         start_ns: messages.first().map_or(0, |m| m.log_time),
         end_ns: messages.last().map_or(0, |m| m.log_time),
         data_bytes: messages.iter().map(|m| m.data.len() as u64).sum(),
@@ -334,7 +402,8 @@ fn check(mission: &MissionMcap) -> Result<(), McapError> {
     Ok(())
 }
 
-fn add_channel(writer: &mut Writer<Cursor<Vec<u8>>>, flavour: &Flavour, topic: &Topic) -> Result<u16, McapError> {
+fn add_channel(writer: &mut Writer<Cursor<Vec<u8>>>, flavour: &Flavour, channel: &Channel) -> Result<u16, McapError> {
+    let topic = channel.topic;
     let schema = writer.add_schema(topic.schema, flavour.schema_encoding, &(flavour.schema)(topic)?)?;
-    Ok(writer.add_channel(schema, topic.name, flavour.message_encoding, &(flavour.channel_metadata)(topic))?)
+    Ok(writer.add_channel(schema, &channel.name, flavour.message_encoding, &(flavour.channel_metadata)(topic))?)
 }

@@ -1,7 +1,7 @@
-//! Viewer flavour: the topics of `sastrugi_schemas::topics::VIEWER` in protobuf.
+//! Viewer flavour of missions: the topics of `sastrugi_schemas::topics::VIEWER` in protobuf.
 
-use super::frames::{BASE, IDENTITY, MAP, class_rgb, corridor, rotated, wheel_rotation};
-use super::mesh::{self, Patch};
+use super::frames::{BASE, GOAL, IDENTITY, MAP, START, class_rgb, corridor, rotated, wheel_rotation};
+use super::mesh::{self, Patch, Square};
 use super::protobuf::{self, Value};
 use super::{Flavour, McapError, MissionMcap, TerrainView, Timeline};
 use foxglove::Encode;
@@ -11,7 +11,7 @@ use prost::Message;
 use sastrugi_numeric::{Geometry, Grid, Surface};
 use sastrugi_schemas::RoughnessClass;
 use sastrugi_schemas::topics::{
-    self, CommandSample, Event, EventKind, ImuSample, Recording, StateSample, Topic, VIEWER, WheelSample, WheelState,
+    self, CommandSample, Event, EventKind, ImuSample, Recording, StateSample, Topic, WheelSample, WheelState,
 };
 use std::collections::BTreeMap;
 
@@ -42,10 +42,8 @@ pub(super) const FLAVOUR: Flavour = Flavour {
     profile: "",
     message_encoding: "protobuf",
     schema_encoding: "protobuf",
-    topics: &VIEWER,
     schema,
     channel_metadata: |topic| BTreeMap::from([("description".to_owned(), topic.description.to_owned())]),
-    messages,
 };
 
 fn schema(topic: &Topic) -> Result<Vec<u8>, McapError> {
@@ -67,11 +65,13 @@ pub(super) fn public_schema(topic: &Topic) -> Option<Vec<u8>> {
 }
 
 /// Puts all messages of a mission on the timeline.
-fn messages(mission: &MissionMcap, out: &mut Timeline) -> Result<(), McapError> {
+pub(super) fn messages(mission: &MissionMcap, out: &mut Timeline) -> Result<(), McapError> {
     let recording = mission.recording;
-    out.add(&topics::terrain_mesh::TOPIC, 0.0, |t| Ok(terrain_mesh(mission, timestamp(t)?).encode_to_vec()))?;
+    out.add(&topics::terrain_mesh::TOPIC, 0.0, |t| {
+        Ok(terrain_mesh(mission.terrain, &corridor(mission), timestamp(t)?).encode_to_vec())
+    })?;
     out.add(&topics::terrain_grid::TOPIC, 0.0, |t| {
-        Ok(fox::Grid { timestamp: Some(timestamp(t)?), ..mission.terrain.grid().clone() }.encode_to_vec())
+        Ok(terrain_from_above(mission.terrain, timestamp(t)?).encode_to_vec())
     })?;
     out.add(&topics::vehicle_shape::TOPIC, 0.0, |t| Ok(vehicle_shape(mission, timestamp(t)?).encode_to_vec()))?;
     out.add(&topics::vehicle_path::TOPIC, 0.0, |t| Ok(vehicle_path(recording, timestamp(t)?).encode_to_vec()))?;
@@ -107,7 +107,7 @@ fn messages(mission: &MissionMcap, out: &mut Timeline) -> Result<(), McapError> 
     Ok(())
 }
 
-fn timestamp(log_time: u64) -> Result<Timestamp, McapError> {
+pub(super) fn timestamp(log_time: u64) -> Result<Timestamp, McapError> {
     let seconds = u32::try_from(log_time / 1_000_000_000);
     let seconds = seconds.map_err(|_| McapError::unfit(format!("{log_time} ns is beyond the year 2106")))?;
     Ok(Timestamp::new(seconds, (log_time % 1_000_000_000) as u32))
@@ -162,7 +162,7 @@ pub(super) fn wheel_values(names: &[String], sample: &WheelSample) -> Vec<Value>
     ]
 }
 
-fn in_steps(value: f64, steps: f64) -> f64 {
+pub(super) fn in_steps(value: f64, steps: f64) -> f64 {
     (value * steps).round() / steps
 }
 
@@ -246,14 +246,14 @@ fn vehicle_shape(mission: &MissionMcap, time: Timestamp) -> fox::SceneUpdate {
         }],
         ..entity(time, MAP, id, false)
     };
-    let markers =
-        [marker("start", mission.start_m, [0x2c, 0xa0, 0x5a]), marker("goal", mission.goal_m, [0xc8, 0x32, 0x32])];
+    let markers = [marker("start", mission.start_m, START), marker("goal", mission.goal_m, GOAL)];
     fox::SceneUpdate { deletions: vec![], entities: std::iter::once(body).chain(wheels).chain(markers).collect() }
 }
 
-fn terrain_mesh(mission: &MissionMcap, time: Timestamp) -> fox::SceneUpdate {
-    let &TerrainView { dem, classes, range_m: (low_m, high_m), .. } = mission.terrain;
-    let patches = mesh::terrain(dem, classes, mesh::base(low_m, high_m), &corridor(mission));
+/// The terrain as triangles, in full wherever one of the squares lies.
+pub(super) fn terrain_mesh(terrain: &TerrainView<'_>, near: &[Square], time: Timestamp) -> fox::SceneUpdate {
+    let &TerrainView { dem, classes, range_m: (low_m, high_m), .. } = terrain;
+    let patches = mesh::terrain(dem, classes, mesh::base(low_m, high_m), near);
     let triangles = patches.into_iter().map(triangle_list).collect();
     let entity = fox::SceneEntity { triangles, ..entity(time, MAP, "terrain", false) };
     fox::SceneUpdate { deletions: vec![], entities: vec![entity] }
@@ -269,6 +269,11 @@ fn triangle_list(patch: Patch) -> fox::TriangleListPrimitive {
         colors: if uniform { vec![] } else { colours.collect() },
         indices: patch.triangles.into_flattened(),
     }
+}
+
+/// The terrain seen from above.
+pub(super) fn terrain_from_above(terrain: &TerrainView<'_>, time: Timestamp) -> fox::Grid {
+    fox::Grid { timestamp: Some(time), ..terrain.grid().clone() }
 }
 
 /// The terrain seen from above, without its time.
@@ -312,7 +317,7 @@ fn grid_corner(g: &Geometry, rows: usize, step: usize, z: f64) -> [f64; 3] {
     [g.origin[0], north - (rows * step) as f64 * g.cell[1], z]
 }
 
-fn entity(time: Timestamp, frame: &str, id: &str, frame_locked: bool) -> fox::SceneEntity {
+pub(super) fn entity(time: Timestamp, frame: &str, id: &str, frame_locked: bool) -> fox::SceneEntity {
     fox::SceneEntity {
         timestamp: Some(time),
         frame_id: frame.to_owned(),
@@ -326,7 +331,7 @@ fn class_colour(code: u8) -> Color {
     colour(class_rgb(code), 1.0)
 }
 
-fn colour(rgb: [u8; 3], a: f64) -> Color {
+pub(super) fn colour(rgb: [u8; 3], a: f64) -> Color {
     let [r, g, b] = rgb.map(|v| f64::from(v) / 255.0);
     Color { r, g, b, a }
 }
@@ -335,14 +340,14 @@ fn pose_of(state: &StateSample) -> Pose {
     pose(state.position_m, state.orientation)
 }
 
-fn pose(position: [f64; 3], orientation: [f64; 4]) -> Pose {
+pub(super) fn pose(position: [f64; 3], orientation: [f64; 4]) -> Pose {
     Pose { position: Some(vector(position)), orientation: Some(quaternion(orientation)) }
 }
 
-fn vector([x, y, z]: [f64; 3]) -> Vector3 {
+pub(super) fn vector([x, y, z]: [f64; 3]) -> Vector3 {
     Vector3 { x, y, z }
 }
 
-fn quaternion([x, y, z, w]: [f64; 4]) -> Quaternion {
+pub(super) fn quaternion([x, y, z, w]: [f64; 4]) -> Quaternion {
     Quaternion { x, y, z, w }
 }

@@ -1,12 +1,15 @@
 //! `metadata.yaml` of a bag, in the format of version 5 ("Humble"), which later distributions read too.
 
-use super::super::McapSummary;
+use super::super::{ChannelSummary, McapSummary};
 use sastrugi_schemas::topics::Topic;
-use sastrugi_schemas::topics::ros2::{ROS2, TERRAIN, TERRAIN_POINTS, TF_STATIC};
+use sastrugi_schemas::topics::ros2::{MEMBER_PATH, TEAM_MARKERS, TEAM_ROUTE, TERRAIN, TERRAIN_POINTS, TF_STATIC};
+
+/// Topics with one message, at the start.
+const LASTING: [&Topic; 6] = [&TF_STATIC, &TERRAIN, &TERRAIN_POINTS, &TEAM_ROUTE, &TEAM_MARKERS, &MEMBER_PATH];
 
 /// What a bag's player offers for a topic. What is said once at the start stays for those who come late.
 pub(super) fn quality_of_service(topic: &Topic) -> String {
-    let lasting = [TF_STATIC, TERRAIN, TERRAIN_POINTS].iter().any(|t| t.name == topic.name);
+    let lasting = LASTING.contains(&topic);
     // history 1: keep last; reliability 1: reliable; durability 1: transient local, 2: volatile; the rest is without limit.
     let durability = if lasting { 1 } else { 2 };
     let depth = if lasting { 1 } else { 10 };
@@ -21,7 +24,7 @@ pub(super) fn quality_of_service(topic: &Topic) -> String {
 pub(in super::super) fn metadata(file: &str, summary: &McapSummary) -> String {
     let duration_ns = summary.end_ns.saturating_sub(summary.start_ns);
     let (start_ns, messages) = (summary.start_ns, summary.messages);
-    let topics: String = ROS2.iter().zip(&summary.counts).map(|(topic, count)| topic_entry(topic, *count)).collect();
+    let topics: String = summary.channels.iter().map(topic_entry).collect();
     format!(
         "rosbag2_bagfile_information:\n  version: 5\n  storage_identifier: mcap\n  duration:\n    nanoseconds: {duration_ns}\n  \
          starting_time:\n    nanoseconds_since_epoch: {start_ns}\n  message_count: {messages}\n  \
@@ -40,12 +43,12 @@ pub(in super::super) fn names(metadata: &str) -> Vec<String> {
     entries.map(|name| name.trim().trim_matches(['"', '\'']).to_owned()).collect()
 }
 
-fn topic_entry(topic: &Topic, count: u64) -> String {
-    let quality = quality_of_service(topic).replace('\n', "\\n");
+fn topic_entry(channel: &ChannelSummary) -> String {
+    let quality = quality_of_service(channel.topic).replace('\n', "\\n");
     format!(
         "    - topic_metadata:\n        name: {}\n        type: {}\n        serialization_format: cdr\n        \
-         offered_qos_profiles: \"{quality}\"\n      message_count: {count}\n",
-        topic.name, topic.schema
+         offered_qos_profiles: \"{quality}\"\n      message_count: {}\n",
+        channel.name, channel.topic.schema, channel.messages
     )
 }
 
@@ -57,7 +60,7 @@ mod tests {
     fn val_the_names_of_a_bags_files() {
         let summary = McapSummary {
             messages: 1,
-            counts: vec![0; ROS2.len()],
+            channels: vec![ChannelSummary { name: "/terrain".to_owned(), topic: &TERRAIN, messages: 1 }],
             start_ns: 0,
             end_ns: 1,
             data_bytes: 1,

@@ -2,7 +2,7 @@
 //! and constants of each .msg file with their packages written out. Later distributions read the same bytes.
 
 /// Name and fields of every message used, also those inside of others.
-const DEFINITIONS: [(&str, &str); 24] = [
+const DEFINITIONS: [(&str, &str); 33] = [
     (
         "builtin_interfaces/Time",
         "int32 sec\n\
@@ -169,6 +169,83 @@ const DEFINITIONS: [(&str, &str); 24] = [
          uint16 outer_start_index\n\
          uint16 inner_start_index",
     ),
+    (
+        "builtin_interfaces/Duration",
+        "int32 sec\n\
+         uint32 nanosec",
+    ),
+    (
+        "std_msgs/ColorRGBA",
+        "float32 r\n\
+         float32 g\n\
+         float32 b\n\
+         float32 a",
+    ),
+    (
+        "geometry_msgs/PoseStamped",
+        "std_msgs/Header header\n\
+         geometry_msgs/Pose pose",
+    ),
+    (
+        "nav_msgs/Path",
+        "std_msgs/Header header\n\
+         geometry_msgs/PoseStamped[] poses",
+    ),
+    (
+        "sensor_msgs/CompressedImage",
+        "std_msgs/Header header\n\
+         string format\n\
+         uint8[] data",
+    ),
+    (
+        "visualization_msgs/UVCoordinate",
+        "float32 u\n\
+         float32 v",
+    ),
+    (
+        "visualization_msgs/MeshFile",
+        "string filename\n\
+         uint8[] data",
+    ),
+    (
+        "visualization_msgs/Marker",
+        "int32 ARROW=0\n\
+         int32 CUBE=1\n\
+         int32 SPHERE=2\n\
+         int32 CYLINDER=3\n\
+         int32 LINE_STRIP=4\n\
+         int32 LINE_LIST=5\n\
+         int32 CUBE_LIST=6\n\
+         int32 SPHERE_LIST=7\n\
+         int32 POINTS=8\n\
+         int32 TEXT_VIEW_FACING=9\n\
+         int32 MESH_RESOURCE=10\n\
+         int32 TRIANGLE_LIST=11\n\
+         int32 ADD=0\n\
+         int32 MODIFY=0\n\
+         int32 DELETE=2\n\
+         int32 DELETEALL=3\n\
+         std_msgs/Header header\n\
+         string ns\n\
+         int32 id\n\
+         int32 type\n\
+         int32 action\n\
+         geometry_msgs/Pose pose\n\
+         geometry_msgs/Vector3 scale\n\
+         std_msgs/ColorRGBA color\n\
+         builtin_interfaces/Duration lifetime\n\
+         bool frame_locked\n\
+         geometry_msgs/Point[] points\n\
+         std_msgs/ColorRGBA[] colors\n\
+         string texture_resource\n\
+         sensor_msgs/CompressedImage texture\n\
+         visualization_msgs/UVCoordinate[] uv_coordinates\n\
+         string text\n\
+         string mesh_resource\n\
+         visualization_msgs/MeshFile mesh_file\n\
+         bool mesh_use_embedded_materials",
+    ),
+    ("visualization_msgs/MarkerArray", "visualization_msgs/Marker[] markers"),
 ];
 
 /// What stands between two definitions.

@@ -169,3 +169,93 @@ pub(super) struct PointField {
     pub datatype: u8,
     pub count: u32,
 }
+
+/// `nav_msgs/Path`.
+#[derive(Serialize)]
+pub(in super::super) struct Path {
+    pub header: Header,
+    pub poses: Vec<PoseStamped>,
+}
+
+/// The shapes of a [`Marker`] that are used, by their numbers.
+#[derive(Clone, Copy)]
+pub(in super::super) enum MarkerKind {
+    Cylinder = 3,
+    LineStrip = 4,
+    Spheres = 7,
+    Points = 8,
+    Triangles = 11,
+}
+
+/// `visualization_msgs/Marker`; `visualization_msgs/MarkerArray` is a list of them.
+#[derive(Serialize)]
+pub(in super::super) struct Marker {
+    pub header: Header,
+    pub ns: String,
+    pub id: i32,
+    pub kind: i32,
+    pub action: i32,
+    pub position: [f64; 3],
+    pub orientation: [f64; 4],
+    pub scale: [f64; 3],
+    pub rgba: [f32; 4],
+    pub lifetime: (i32, u32),
+    pub frame_locked: bool,
+    pub points: Vec<[f64; 3]>,
+    pub colors: Vec<[f32; 4]>,
+    pub texture_resource: String,
+    pub texture: CompressedImage,
+    pub uv_coordinates: Vec<[f32; 2]>,
+    pub text: String,
+    pub mesh_resource: String,
+    pub mesh_file: MeshFile,
+    pub mesh_use_embedded_materials: bool,
+}
+
+impl Marker {
+    /// A marker of one colour without points, the only one of its name, at the origin of its frame and there until it is replaced.
+    pub(in super::super) fn new(header: Header, kind: MarkerKind, ns: &str, scale: [f64; 3], rgb: [u8; 3]) -> Self {
+        let [r, g, b] = rgb.map(|v| f32::from(v) / 255.0);
+        Self {
+            texture: CompressedImage {
+                header: Header { sec: 0, nanosec: 0, frame_id: String::new() },
+                format: String::new(),
+                data: vec![],
+            },
+            header,
+            ns: ns.to_owned(),
+            id: 0,
+            kind: kind as i32,
+            action: 0,
+            position: [0.0; 3],
+            orientation: super::IDENTITY,
+            scale,
+            rgba: [r, g, b, 1.0],
+            lifetime: (0, 0),
+            frame_locked: false,
+            points: vec![],
+            colors: vec![],
+            texture_resource: String::new(),
+            uv_coordinates: vec![],
+            text: String::new(),
+            mesh_resource: String::new(),
+            mesh_file: MeshFile { filename: String::new(), data: vec![] },
+            mesh_use_embedded_materials: false,
+        }
+    }
+}
+
+/// `sensor_msgs/CompressedImage`.
+#[derive(Serialize)]
+pub(in super::super) struct CompressedImage {
+    pub header: Header,
+    pub format: String,
+    pub data: Vec<u8>,
+}
+
+/// `visualization_msgs/MeshFile`.
+#[derive(Serialize)]
+pub(in super::super) struct MeshFile {
+    pub filename: String,
+    pub data: Vec<u8>,
+}

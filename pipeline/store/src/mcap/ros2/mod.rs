@@ -11,32 +11,26 @@ pub(super) use bag::{metadata as bag_metadata, names as bag_names};
 pub(super) use message::GridMap;
 
 use super::frames::{BASE, IDENTITY, MAP, class_rgb, corridor, rotated, wheel_rotation};
-use super::{Flavour, McapError, MissionMcap, TerrainView, Timeline, mesh};
+use super::mesh::{self, Square};
+use super::{Flavour, McapError, MissionMcap, TerrainView, Timeline};
 use message::{
     Covariance, Dimension, Float32MultiArray, Header, Imu, JointState, Log, Odometry, PointCloud2, PointField, Pose,
     TransformStamped, TwistStamped, encode,
 };
 use sastrugi_numeric::{Grid, Surface};
 use sastrugi_schemas::RoughnessClass;
-use sastrugi_schemas::topics::ros2::{self, ROS2};
+use sastrugi_schemas::topics::ros2;
 use sastrugi_schemas::topics::{
     CommandSample, Event, EventKind, ImuSample, Recording, StateSample, Topic, VehicleOutline, WheelSample,
 };
 use std::collections::BTreeMap;
 
 /// The flavour.
-pub(super) const FLAVOUR: Flavour = Flavour {
-    profile: "ros2",
-    message_encoding: "cdr",
-    schema_encoding: "ros2msg",
-    topics: &ROS2,
-    schema,
-    channel_metadata,
-    messages,
-};
+pub(super) const FLAVOUR: Flavour =
+    Flavour { profile: "ros2", message_encoding: "cdr", schema_encoding: "ros2msg", schema, channel_metadata };
 
 /// Frame that the points of the cloud count from.
-const TERRAIN: &str = "terrain";
+pub(super) const TERRAIN: &str = "terrain";
 /// Most cells along a side of the grid map.
 const GRID_CELLS: usize = 128;
 /// Bytes of a point of the cloud: x, y, z, colour.
@@ -44,7 +38,7 @@ const POINT_BYTES: u32 = 16;
 /// `sensor_msgs/PointField`: single precision.
 const FLOAT32: u8 = 7;
 /// Covariances of zero: the simulation knows no error. Readers of `sensor_msgs/Imu` take them for unknown ones.
-const EXACT: Covariance = [[0.0; 6]; 6];
+pub(super) const EXACT: Covariance = [[0.0; 6]; 6];
 
 fn schema(topic: &Topic) -> Result<Vec<u8>, McapError> {
     let text = definitions::of_schema(topic.schema);
@@ -60,13 +54,9 @@ fn channel_metadata(topic: &Topic) -> BTreeMap<String, String> {
 }
 
 /// Puts all messages of a mission on the timeline.
-fn messages(mission: &MissionMcap, out: &mut Timeline) -> Result<(), McapError> {
+pub(super) fn messages(mission: &MissionMcap, out: &mut Timeline) -> Result<(), McapError> {
     let recording = mission.recording;
-    out.add(&ros2::TF_STATIC, 0.0, |t| encode(&vec![terrain_frame(mission.terrain, t)?]))?;
-    out.add(&ros2::TERRAIN, 0.0, |t| {
-        encode(&GridMap { header: header(MAP, t)?, ..mission.terrain.grid_map().clone() })
-    })?;
-    out.add(&ros2::TERRAIN_POINTS, 0.0, |t| encode(&terrain_points(mission, t)?))?;
+    terrain_messages(mission.terrain, &corridor(mission), out)?;
     let wheels = recording.wheels.iter().map(Some).chain(std::iter::repeat(None));
     for (state, wheels) in recording.states.iter().zip(wheels) {
         out.add(&ros2::TF, state.time_s, |t| encode(&transforms(recording, state, wheels, t)?))?;
@@ -84,19 +74,30 @@ fn messages(mission: &MissionMcap, out: &mut Timeline) -> Result<(), McapError> 
     recording.events.iter().try_for_each(|event| out.add(&ros2::EVENTS, event.time_s, |t| encode(&log(event, t)?)))
 }
 
+/// Puts the terrain on the timeline, its cloud in full wherever one of the squares lies.
+pub(super) fn terrain_messages(
+    terrain: &TerrainView<'_>,
+    near: &[Square],
+    out: &mut Timeline,
+) -> Result<(), McapError> {
+    out.add(&ros2::TF_STATIC, 0.0, |t| encode(&vec![terrain_frame(terrain, t)?]))?;
+    out.add(&ros2::TERRAIN, 0.0, |t| encode(&GridMap { header: header(MAP, t)?, ..terrain.grid_map().clone() }))?;
+    out.add(&ros2::TERRAIN_POINTS, 0.0, |t| encode(&terrain_points(terrain, near, t)?))
+}
+
 /// Seconds and nanoseconds of a time in ns.
-fn stamp(log_time: u64) -> Result<(i32, u32), McapError> {
+pub(super) fn stamp(log_time: u64) -> Result<(i32, u32), McapError> {
     let seconds = i32::try_from(log_time / 1_000_000_000);
     let seconds = seconds.map_err(|_| McapError::unfit(format!("{log_time} ns is beyond the year 2038 of ROS 2")))?;
     Ok((seconds, (log_time % 1_000_000_000) as u32))
 }
 
-fn header(frame: &str, log_time: u64) -> Result<Header, McapError> {
+pub(super) fn header(frame: &str, log_time: u64) -> Result<Header, McapError> {
     let (sec, nanosec) = stamp(log_time)?;
     Ok(Header { sec, nanosec, frame_id: frame.to_owned() })
 }
 
-fn transform(
+pub(super) fn transform(
     parent: &str,
     child: &str,
     position: [f64; 3],
@@ -107,14 +108,8 @@ fn transform(
     Ok(TransformStamped { header: header(parent, log_time)?, child_frame_id: child.to_owned(), transform })
 }
 
-/// Where points count from: whole metres near the south-west corner and the lowest height.
-fn terrain_origin(terrain: &TerrainView<'_>) -> [f64; 3] {
-    let [x, y] = terrain.dem.geometry.origin;
-    [x, y, terrain.range_m.0].map(f64::floor)
-}
-
 fn terrain_frame(terrain: &TerrainView<'_>, log_time: u64) -> Result<TransformStamped, McapError> {
-    transform(MAP, TERRAIN, terrain_origin(terrain), IDENTITY, log_time)
+    transform(MAP, TERRAIN, terrain.origin_m(), IDENTITY, log_time)
 }
 
 fn transforms(
@@ -188,12 +183,12 @@ fn log(event: &Event, log_time: u64) -> Result<Log, McapError> {
 }
 
 /// The corners of `/terrain/mesh`: every cell along the path, coarser elsewhere.
-fn terrain_points(mission: &MissionMcap, log_time: u64) -> Result<PointCloud2, McapError> {
-    let TerrainView { dem, classes, .. } = mission.terrain;
-    let origin = terrain_origin(mission.terrain);
+fn terrain_points(terrain: &TerrainView<'_>, near: &[Square], log_time: u64) -> Result<PointCloud2, McapError> {
+    let TerrainView { dem, classes, .. } = terrain;
+    let origin = terrain.origin_m();
     let mut data = Vec::new();
     let mut points = 0;
-    for (row, col) in mesh::nodes(&dem.geometry, &corridor(mission)) {
+    for (row, col) in mesh::nodes(&dem.geometry, near) {
         let z = dem.at(row, col);
         if !z.is_finite() {
             continue;

@@ -1,0 +1,69 @@
+//! Table `formations`.
+
+super::table! {
+    /// One row per run of a team.
+    "formations" FormationRow {
+        keys {
+            /// Id of the terrain.
+            terrain_id: String,
+            /// Id of the run on that terrain: that of the navigate stage, the route's number and the run's, `<id>-0001-01`.
+            run_id: String,
+        }
+        /// Label of the terrain.
+        group: Option<String> [""],
+        /// What differs from the study's plain run: the swept parameters of terrain, route and run; null for the plain one.
+        variant: Option<String> [""],
+        /// `train`, `validation` or `test` (`[study] split`); null where the study does not split its terrains, or leaves this one out.
+        split: Option<String> [""],
+        /// Route that the team followed.
+        route_id: String [""],
+        /// Id of the navigate stage.
+        stage_id: String [""],
+        /// Formation: `column`, `line`, `wedge` or `custom`.
+        formation: String [""],
+        /// Members at the start.
+        members: i64 ["1"],
+        /// Members lost on the way.
+        lost: i64 ["1"],
+        /// Distance between neighbouring slots; null for custom slots.
+        spacing_m: f64 ["m"],
+        /// `arrived`, `stuck`, `timeout`, `team_lost` or `no_path`.
+        outcome: String [""],
+        /// Member that was stuck; null otherwise.
+        stuck_member: Option<i64> [""],
+        /// Time from the start to the outcome.
+        time_s: f64 ["s"],
+        /// Length of the route in plan.
+        route_length_m: f64 ["m"],
+        /// Mean length driven by a member, in plan.
+        path_length_m: f64 ["m"],
+        /// Mean absolute error of the distance behind the predecessor, over followers and time.
+        depth_error_m: f64 ["m"],
+        /// Mean absolute error of the distance to the side of the predecessor.
+        width_error_m: f64 ["m"],
+        /// Largest mean depth error of a follower.
+        worst_depth_error_m: f64 ["m"],
+        /// Largest mean width error of a follower.
+        worst_width_error_m: f64 ["m"],
+        /// Share of time and followers with both errors at most 20 % of the spacing.
+        in_range: f64 ["1"],
+        /// Share of time and followers with both errors at most 40 % of the spacing.
+        tolerable: f64 ["1"],
+        /// Least distance between two members' centres.
+        least_separation_m: f64 ["m"],
+        /// Steps that a member waited, over all members.
+        waits: i64 ["1"],
+        /// Steps that a member went sideways, over all members.
+        dodges: i64 ["1"],
+        /// Waypoints with too little room for the formation, even compressed.
+        squeezed: i64 ["1"],
+        /// Searches of a new route on the way.
+        replans: i64 ["1"],
+        /// Recorded samples of each member.
+        samples: i64 ["1"],
+        /// Rate of the recorded samples.
+        sample_rate_hz: f64 ["Hz"],
+        /// MCAP recording in the release.
+        path: String [""],
+    }
+}

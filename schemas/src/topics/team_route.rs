@@ -1,0 +1,12 @@
+//! Topic `/team/route`.
+
+use super::Topic;
+
+/// The topic.
+pub const TOPIC: Topic = Topic {
+    name: "/team/route",
+    schema: "foxglove.PosesInFrame",
+    description: "the planned route: its waypoints, and between them a pose a cell on the ground, at most 8192 of those; one \
+                  message at the run's start",
+    fields: &[],
+};
