@@ -3,13 +3,14 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-const ROOMS: [(&str, &str); 12] = [
+const ROOMS: [(&str, &str); 13] = [
     ("SCHEMAS", "../../schemas/src"),
     ("NUMERIC", "../numeric/src"),
     ("ROUGHNESS", "../roughness/src"),
     ("TERRAIN", "../terrain/src"),
     ("TEXTURE", "../texture/src"),
     ("MOBILITY", "../mobility/src"),
+    ("NAVIGATION", "../navigation/src"),
     ("STORE", "../store/src"),
     ("STATISTICS", "../../analysis/statistics/src"),
     ("JOB", "src/job.rs"),

@@ -8,6 +8,7 @@ mod coregister;
 mod fit_outputs;
 mod metadata;
 mod minus;
+mod navigate;
 mod pack;
 mod sources;
 mod verbs;

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may end where it stands")]
 
 mod machine;
+mod route;
 mod traverse;
 
 use sastrugi_tests::{area, rows, sastrugi_in, small_study, sums, write};

@@ -5,6 +5,7 @@
 //! * [`papers`]: published figures as data.
 //! * [`releases`]: two releases beside each other, for the page and for the verb `compare`.
 //! * [`fit_svg`] and [`fit_png`]: the picture of one fit file, for the verb `fit`.
+//! * [`RoutePicture`]: that of one route, for the verb `navigate`.
 //! * [`mod@render`]: drawing, which knows nothing of what it draws.
 //! * [`data`]: the only way to the release's rows and files.
 //!
@@ -23,9 +24,11 @@ mod tests;
 
 mod fit_figure;
 mod release;
+mod route_figure;
 mod write;
 
 pub use fit_figure::{fit_png, fit_svg};
+pub use route_figure::RoutePicture;
 pub use write::{Summary, render, render_with};
 
 use std::path::PathBuf;

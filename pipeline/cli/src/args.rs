@@ -100,6 +100,15 @@ pub enum Verb {
         sastrugi traverse bar.tif --set-missions length_m=2 --set-missions border_m=0.5 \\\n    \
         --set-roughness closing_radius_m=0 --replicates 8 -o drive")]
     Traverse(Traverse),
+    /// Plan a route over one DEM: as GeoJSON, as a picture, or as a release with tables and report.
+    #[command(
+        after_help = "An output that ends in .geojson or .svg holds the route alone; any other is the folder of a release.\n\
+        GeoJSON is written in the DEM's own coordinates.\n\n\
+        Examples:\n  sastrugi navigate site.tif --start 12,30 --goal 240,180 -o route.svg\n  \
+        sastrugi navigate site.tif --start 12,30 --goal 240,180 --vehicle husky_a200 --set cost=energy -o route.geojson\n  \
+        sastrugi navigate site.tif --start 12,30 --goal 240,180 --obstacles buildings.geojson -o routes"
+    )]
+    Navigate(Navigate),
     /// Take the traversal metrics from MCAP logs of any vehicle: ours, ROS 2 or Foxglove.
     #[command(
         after_help = "Reads Odometry, PoseStamped, TFMessage, Imu (ROS 2, CDR), PoseInFrame, Odometry, FrameTransforms \
@@ -593,6 +602,40 @@ pub struct Traverse {
     /// A parameter of the run (see `kinds`), `name=value`.
     #[arg(long = "set", value_name = "K=V")]
     pub set: Vec<String>,
+    /// Date that the release carries.
+    #[arg(long, value_name = "YYYY-MM-DD", default_value = "1970-01-01")]
+    pub date: String,
+    /// Where.
+    #[command(flatten)]
+    pub place: Place,
+}
+
+/// `navigate`.
+#[derive(Debug, Args)]
+pub struct Navigate {
+    /// DEM.
+    pub dem: PathBuf,
+    /// Start, in the DEM's coordinates.
+    #[arg(long, value_name = "X,Y", allow_hyphen_values = true)]
+    pub start: String,
+    /// Goal, in the DEM's coordinates.
+    #[arg(long, value_name = "X,Y", allow_hyphen_values = true)]
+    pub goal: String,
+    /// How the route is searched: grid, roadmap, theta_star or anytime (see `kinds`).
+    #[arg(long, value_name = "M", default_value = "grid")]
+    pub method: String,
+    /// Vehicle whose limits of slope hold (see `kinds`); slopes of up to 30 degrees when absent.
+    #[arg(long, value_name = "V")]
+    pub vehicle: Option<String>,
+    /// What cannot be entered: GeoJSON with polygons in the DEM's coordinates, or a raster that is not 0 there. May be repeated.
+    #[arg(long, value_name = "FILE")]
+    pub obstacles: Vec<PathBuf>,
+    /// A parameter of the route (see `kinds`), `name=value`.
+    #[arg(long = "set", value_name = "K=V")]
+    pub set: Vec<String>,
+    /// Replace an existing release of this route even if it has fewer failed items than the new one.
+    #[arg(long)]
+    pub replace: bool,
     /// Date that the release carries.
     #[arg(long, value_name = "YYYY-MM-DD", default_value = "1970-01-01")]
     pub date: String,

@@ -1,7 +1,7 @@
 //! A study's graph under construction: what is there so far, and what later sections refer to.
 
 use crate::job::ItemRef;
-use crate::operations::drawn::Drawn;
+use crate::operations::drawn::{Drawn, Routes};
 use crate::runner::graph::{Graph, InputFile, Node};
 use crate::study::{Entry, Study, StudyError};
 use sastrugi_numeric::{Geometry, Streams};
@@ -67,6 +67,8 @@ pub struct Builder<'a> {
     pub fits: Vec<String>,
     /// Missions by id: what is drawn on which heightfields.
     pub missions: BTreeMap<String, Drawn>,
+    /// Routes by id; a swept id stands for several searches.
+    pub routes: BTreeMap<String, Vec<Routes>>,
     /// Where each input file goes in the release.
     pub inputs: Vec<InputPlace>,
     /// The items so far.
@@ -92,6 +94,7 @@ impl<'a> Builder<'a> {
             families: BTreeMap::new(),
             fits: Vec::new(),
             missions: BTreeMap::new(),
+            routes: BTreeMap::new(),
             inputs: Vec::new(),
             graph: Graph::default(),
             ids: BTreeMap::new(),

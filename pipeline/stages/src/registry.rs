@@ -32,7 +32,7 @@ pub enum Form {
 }
 
 /// Sections in the order in which they may refer to one another.
-pub const SECTIONS: [Section; 8] = [
+pub const SECTIONS: [Section; 9] = [
     Section {
         name: "dem",
         form: Form::Array,
@@ -81,6 +81,13 @@ pub const SECTIONS: [Section; 8] = [
         envelope: schema_of::<envelope::TraverseItem>,
         kinds: jobs::traverse::kinds,
         add: jobs::traverse::add,
+    },
+    Section {
+        name: "route",
+        form: Form::Array,
+        envelope: schema_of::<envelope::RouteItem>,
+        kinds: jobs::route::kinds,
+        add: jobs::route::add,
     },
     Section {
         name: hypotheses::SECTION,

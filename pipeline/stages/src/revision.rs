@@ -12,6 +12,8 @@ pub enum Room {
     Texture,
     /// `pipeline/mobility`.
     Mobility,
+    /// `pipeline/navigation`.
+    Navigation,
     /// `analysis/statistics`.
     Statistics,
 }
@@ -33,6 +35,7 @@ fn revision_of(room: Room) -> &'static str {
         Room::Terrain => env!("SASTRUGI_REVISION_TERRAIN"),
         Room::Texture => env!("SASTRUGI_REVISION_TEXTURE"),
         Room::Mobility => env!("SASTRUGI_REVISION_MOBILITY"),
+        Room::Navigation => env!("SASTRUGI_REVISION_NAVIGATION"),
         Room::Statistics => env!("SASTRUGI_REVISION_STATISTICS"),
     }
 }

@@ -7,6 +7,7 @@ mod files;
 mod fits;
 mod generate;
 mod lists;
+mod navigate;
 mod shown;
 mod study;
 
@@ -31,6 +32,7 @@ pub fn dispatch(arguments: &Arguments) -> Verdict {
         Verb::Report(args) => study::report(args, common),
         Verb::Pack(args) => study::pack(args, common),
         Verb::Traverse(args) => study::traverse(args, common),
+        Verb::Navigate(args) => navigate::navigate(args, common),
         Verb::Terrain(args) => generate::terrain(args, common),
         Verb::Fit(args) => generate::fit(args, common),
         Verb::Coregister(args) => coregister::coregister(args, common),

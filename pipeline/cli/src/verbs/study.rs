@@ -18,11 +18,11 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// Working memory of the items at once where no option sets it, GiB.
-const MEMORY_GIB: f64 = 4.0;
+pub(super) const MEMORY_GIB: f64 = 4.0;
 /// Most lines of a plan for people.
 const PLAN_LINES: usize = 40;
 
-fn limits(memory_gib: f64) -> Result<Limits, Failure> {
+pub(super) fn limits(memory_gib: f64) -> Result<Limits, Failure> {
     if !(memory_gib.is_finite() && memory_gib > 0.0) {
         return Err(Failure::usage(format!("`--memory {memory_gib}`: it must be above 0")));
     }
@@ -63,7 +63,7 @@ pub fn traverse(args: &Traverse, common: &Common) -> Verdict {
 }
 
 /// Runs, says what it came to, and gives the exit code.
-fn finish_run(common: &Common, run: impl FnOnce(&Teller) -> Result<RunSummary, Failure>) -> Verdict {
+pub(super) fn finish_run(common: &Common, run: impl FnOnce(&Teller) -> Result<RunSummary, Failure>) -> Verdict {
     let teller = Teller::new(common.quiet);
     let start = Instant::now();
     let summary = run(&teller);

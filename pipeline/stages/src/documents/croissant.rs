@@ -21,7 +21,7 @@ const DESCRIBED_FILES: usize = 64;
 /// Set of the generated heightfields.
 const HEIGHTS: &str = "terrain-files";
 /// Files beside the tables, which the manifest lists with their hashes: id of the set, folder, ending, media type, what they are.
-const SETS: [(&str, &str, &str, &str, &str); 9] = [
+const SETS: [(&str, &str, &str, &str, &str); 10] = [
     (HEIGHTS, "terrain", ".tif", "image/tiff", "Generated heightfields, GeoTIFF, float32 metres"),
     ("terrain-pictures", "terrain", ".png", "image/png", "Generated heightfields in steps of 16 bit"),
     ("texture-files", "texture", ".tif", "image/tiff", "Synthesised textures, GeoTIFF, float32 metres"),
@@ -41,7 +41,14 @@ const SETS: [(&str, &str, &str, &str, &str); 9] = [
         "image/tiff",
         "Background, residual, covariance and used cells of the fits, GeoTIFF",
     ),
-    ("mcap-files", "mcap", ".mcap", "application/octet-stream", "Recordings of the missions, MCAP"),
+    (
+        "route-files",
+        "route",
+        ".geojson",
+        "application/geo+json",
+        "Planned routes, GeoJSON in the terrain's own coordinates",
+    ),
+    ("mcap-files", "mcap", ".mcap", "application/octet-stream", "Recordings of missions and teams, MCAP"),
     ("bag-files", "mcap", "metadata.yaml", "application/yaml", "Descriptions of the recordings for bag readers"),
 ];
 /// What the release says of itself, and shows: id of the set, patterns, media types, what they are.

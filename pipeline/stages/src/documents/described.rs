@@ -9,15 +9,16 @@ use sastrugi_terrain::{MAPS, MapKind};
 use serde_json::Value;
 
 /// Folders of a release.
-pub const FOLDERS: [(&str, &str); 10] = [
+pub const FOLDERS: [(&str, &str); 11] = [
     ("dem/", "measured inputs, and the same in metres (`.metric.tif`)"),
-    ("mask/", "masks of the fits"),
+    ("mask/", "masks of the fits, obstacles of the routes"),
     ("terrain/", "generated heightfields, GeoTIFF, float32 metres, no data -9999; maps of the same cells beside them"),
     ("export/", "terrains to import into simulators: `export/<terrain>/<simulator>/README.md` says how"),
     ("texture/", "synthesised textures, GeoTIFF, float32 metres, no data -9999"),
     ("classes/", "roughness classes: 0 low, 1 semi, 2 high, 255 none; `.raw.tif` before closing"),
     ("fit/", "covariance fits (JSON), with background, residual and the cells used"),
-    ("mcap/", "one recording per mission"),
+    ("route/", "planned routes, GeoJSON in the terrain's own coordinates (m), not RFC 7946's WGS84"),
+    ("mcap/", "one recording per mission, or run of a team"),
     ("tables/", "Parquet, units and descriptions in the column metadata"),
     ("report/", "report: `index.html`, one offline page"),
 ];

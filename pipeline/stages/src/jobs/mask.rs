@@ -5,11 +5,13 @@ use crate::builder::{BuildError, Builder, InputPlace};
 use crate::job::{ItemRef, JobError, Work};
 use crate::operations::masks;
 use crate::operations::place::{PLACE, Place};
+use crate::operations::routes::Given;
 use crate::study::Entry;
-use sastrugi_numeric::Grid;
+use sastrugi_numeric::{Geometry, Grid};
 use sastrugi_schemas::fit::MaskSource;
-use sastrugi_schemas::study::{Files, FitItem};
+use sastrugi_schemas::study::{Files, FitItem, RouteItem};
 use sastrugi_texture::noise::{self, ReferenceNoise};
+use std::path::Path;
 
 /// A mask of a fit.
 #[derive(Clone)]
@@ -40,6 +42,21 @@ pub fn add(builder: &mut Builder<'_>, entry: &Entry<'_>, item: &FitItem) -> Resu
         Mask::copied(builder, &format!("{}-{}", item.id, number + 1), key, (file, excludes))
     };
     (0usize..).zip(files).map(copy).collect()
+}
+
+/// Adds the copies of the files that say what a route cannot enter.
+///
+/// # Errors
+/// A file that is missing or cannot be read.
+pub fn add_obstacles(builder: &mut Builder<'_>, entry: &Entry<'_>, item: &RouteItem) -> Result<Vec<Mask>, BuildError> {
+    let files: Vec<(Option<usize>, String)> =
+        item.obstacles.numbered().into_iter().map(|(k, file)| (k, file.to_owned())).collect();
+    let copy = |(number, (k, file)): (usize, (Option<usize>, String))| {
+        let mut key = entry.path_of("obstacles");
+        key.extend(k.map(|k| k.to_string()));
+        Mask::copied(builder, &format!("{}-{}", item.id, number + 1), key, (file, false))
+    };
+    files.into_iter().enumerate().map(copy).collect()
 }
 
 /// Adds the copy of a fit's noise reference, where it has one.
@@ -75,11 +92,13 @@ impl Mask {
 
     /// Leaves the heights that the mask keeps.
     fn apply(&self, heights: &mut Grid, place: &Place, work: &Work<'_>) -> Result<(), JobError> {
+        self.with_file(work, |path| masks::apply(heights, place, path, self.source.excludes))
+    }
+
+    /// Does something with the file. Messages are part of the release: they name it as it is called there.
+    fn with_file<T>(&self, work: &Work<'_>, act: impl FnOnce(&Path) -> Result<T, JobError>) -> Result<T, JobError> {
         let path = work.parent(&self.item, original::name(&self.release_path))?;
-        // Messages are part of the release: they name the file as it is called there.
-        let name_it =
-            |e: JobError| JobError { message: e.message.replace(&path.display().to_string(), &self.release_path), ..e };
-        masks::apply(heights, place, &path, self.source.excludes).map_err(name_it)
+        act(&path).map_err(|e| e.reworded(|words| words.replace(&path.display().to_string(), &self.release_path)))
     }
 }
 
@@ -113,4 +132,24 @@ pub fn of_item(heights: &mut Grid, dem: &ItemRef, masks: &[Mask], work: &Work<'_
         one.apply(heights, &place, work)?;
     }
     masks::dropped_share(before, heights).map(Some)
+}
+
+/// Adds what the obstacles of an item mark on a terrain.
+///
+/// # Errors
+/// Obstacles that cannot be used for the terrain.
+pub fn add_marked(
+    given: &mut Given,
+    geometry: &Geometry,
+    terrain: &ItemRef,
+    files: &[Mask],
+    work: &Work<'_>,
+) -> Result<(), JobError> {
+    let place = Place::read(&work.parent(terrain, PLACE)?, geometry)?;
+    for file in files {
+        let (polygons, cells) = file.with_file(work, |path| masks::obstacles(geometry, &place, path))?;
+        given.polygons.extend(polygons);
+        given.add_blocked(cells);
+    }
+    Ok(())
 }

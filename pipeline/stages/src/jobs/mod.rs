@@ -9,6 +9,7 @@ pub mod missions;
 pub mod original;
 pub mod rasters;
 pub mod roughness;
+pub mod route;
 pub mod scoreboard;
 pub mod surface;
 pub mod terrain;

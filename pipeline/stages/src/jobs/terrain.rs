@@ -13,13 +13,17 @@ use crate::study::{Entry, StudyError};
 use sastrugi_numeric::{Grid, Streams};
 use sastrugi_schemas::study::{GeoTiff, TerrainItem};
 use sastrugi_store::dem::{self, Crs, WriteOptions};
-use sastrugi_store::digest;
-use sastrugi_terrain::Generator;
+use sastrugi_store::{digest, geojson};
+use sastrugi_terrain::{Generator, Line};
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Name of the stage.
 pub const STAGE: &str = "terrain";
+/// The trails of a terrain, for missions along them.
+const LINES: &str = "lines.json";
+/// The same, for the release.
+const TRAILS: &str = "trails.geojson";
 
 struct TerrainJob {
     id: String,
@@ -117,6 +121,20 @@ fn name_families(
     Ok(())
 }
 
+/// The trails of a terrain; none where it has none.
+///
+/// # Errors
+/// When the item is no parent, or its file cannot be read.
+pub fn lines(work: &Work<'_>, item: &ItemRef) -> Result<Vec<Line>, JobError> {
+    let path = work.parent(item, LINES)?;
+    if !path.is_file() {
+        return Ok(Vec::new());
+    }
+    let bytes = std::fs::read(&path).map_err(|e| JobError::at(&path, e))?;
+    let stored: Vec<(String, Vec<[f64; 3]>)> = serde_json::from_slice(&bytes).map_err(JobError::new)?;
+    Ok(stored.into_iter().map(|(name, points_m)| Line { name, points_m }).collect())
+}
+
 impl Job for TerrainJob {
     fn recipe(&self) -> Value {
         json!({ "kind": self.generator.kind(), "params": self.generator.parameters() })
@@ -151,6 +169,7 @@ impl Job for TerrainJob {
             let options = WriteOptions { values: values_of(map), ..options.clone() };
             products.push(self.write(work, &file, &ending, &map.values, &crs, &options)?);
         }
+        products.extend(self.write_lines(work, &made.lines, &crs)?);
         let mut notes = self.generator.notes();
         notes.extend(made.notes);
         if self.png16 {
@@ -175,6 +194,24 @@ impl TerrainJob {
             grids.push(read.grid);
         }
         Ok((grids, crs.unwrap_or_default()))
+    }
+
+    /// Writes the trails, for missions along them and as GeoJSON; nothing where there are none.
+    fn write_lines(&self, work: &Work<'_>, lines: &[Line], crs: &Crs) -> Result<Vec<Product>, JobError> {
+        if lines.is_empty() {
+            return Ok(Vec::new());
+        }
+        let line = |line: &Line| (line.name.clone(), line.points_m.clone());
+        let stored: Vec<(String, Vec<[f64; 3]>)> = lines.iter().map(line).collect();
+        work.write(LINES, &serde_json::to_vec(&stored).map_err(JobError::new)?)?;
+        let feature = |line: &Line| geojson::Route {
+            positions: line.points_m.clone(),
+            properties: [("name".to_owned(), json!(line.name))].into_iter().collect(),
+        };
+        let features: Vec<geojson::Route> = lines.iter().map(feature).collect();
+        geojson::write_routes(&work.output(TRAILS), Some(crs), &features).map_err(JobError::io)?;
+        let released = Product::released(TRAILS, format!("terrain/{}.trails.geojson", self.id), None);
+        Ok(vec![Product::internal(LINES), released])
     }
 
     /// Writes a raster that is released as `terrain/<id><ending>.tif`.

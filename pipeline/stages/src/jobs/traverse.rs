@@ -19,14 +19,13 @@ use sastrugi_mobility::vehicle::{
     check_scale, drive,
 };
 use sastrugi_numeric::{Grid, Streams};
-use sastrugi_schemas::kind::{read_parameters, schema_of};
 use sastrugi_schemas::study::{McapFlavour, StudyHead, TraverseItem};
 use sastrugi_schemas::tables::{MissionRow, ParameterRow, ReplicateRow, SampleRow};
 use sastrugi_schemas::topics::{EventKind, Recording};
 use sastrugi_schemas::{Kind, ParameterError};
 use sastrugi_store::mcap::{MissionMcap, TerrainView, bag_metadata, write_mission};
 use sastrugi_store::{dem, digest};
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -47,19 +46,7 @@ pub fn kinds() -> Vec<Kind> {
 
 /// The parameters of the run and of the starts, side by side.
 fn schema() -> Value {
-    let (mut schema, starts) = (schema_of::<TraverseParameters>(), schema_of::<ReplicateParameters>());
-    if let (Some(all), Some(more)) = (schema["properties"].as_object_mut(), starts["properties"].as_object()) {
-        all.extend(more.clone());
-    }
-    schema
-}
-
-/// Takes the parameters of the starts and those of the run apart.
-fn split(params: &Value) -> Result<(ReplicateParameters, TraverseParameters), ParameterError> {
-    let names = keys::properties(&schema_of::<ReplicateParameters>());
-    let (starts, run): (Map<_, _>, Map<_, _>) =
-        params.as_object().cloned().unwrap_or_default().into_iter().partition(|(key, _)| names.contains(key));
-    Ok((read_parameters(&Value::Object(starts))?, read_parameters(&Value::Object(run))?))
+    keys::schema_of_both::<TraverseParameters, ReplicateParameters>()
 }
 
 /// What is driven: the same on every terrain.
@@ -121,7 +108,8 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
         for one in entry.expand(&envelope.id, None, &envelope.sweep, &params)? {
             entry.check_keys::<TraverseItem>(&one.params, &schema())?;
             builder.claim(&entry, STAGE, &one.id)?;
-            let (starts, raw) = split(&one.params).map_err(|e| entry.refuse(e))?;
+            let (raw, starts): (TraverseParameters, ReplicateParameters) =
+                keys::read_both(&one.params).map_err(|e| entry.refuse(e))?;
             let (vehicle, settings) = raw.prepare().map_err(|e| entry.refuse(e))?;
             if raw.goal_tolerance_m >= drawn.length_m {
                 let (tolerance_m, length_m) = (raw.goal_tolerance_m, drawn.length_m);
@@ -374,7 +362,7 @@ impl TraverseJob {
         };
         let Drive { vehicle, settings, starts, rasters, .. } = &*self.drive;
         let rasters = json!({ "wheel_friction_raster": rasters[0], "rolling_resistance_raster": rasters[1] });
-        let more = json!({ "starts": starts, "surface": rasters, "missions": self.lines.settings });
+        let more = json!({ "starts": starts, "surface": rasters, "missions": self.lines.rules });
         let mut rows: Vec<ParameterRow> =
             numbers(vehicle, settings).into_iter().chain(stated("", &more)).map(row).collect();
         rows.sort_by(|a, b| a.parameter.cmp(&b.parameter));

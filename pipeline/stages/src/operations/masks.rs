@@ -2,8 +2,9 @@
 
 use super::place::Place;
 use crate::job::JobError;
-use sastrugi_numeric::Grid;
-use sastrugi_store::mask::{self, MaskError, MaskOptions};
+use sastrugi_navigation::obstacles::Polygon;
+use sastrugi_numeric::{Geometry, Grid};
+use sastrugi_store::mask::{self, MaskError, MaskOptions, Obstacles};
 use sastrugi_texture::noise::{self, ReferenceNoise};
 use std::path::{Path, PathBuf};
 
@@ -63,6 +64,28 @@ pub fn apply(heights: &mut Grid, place: &Place, path: &Path, excludes: bool) -> 
     let kept = place.part(Grid::new(place.whole(), keep));
     heights.values.iter_mut().zip(&kept.values).filter(|(_, kept)| !**kept).for_each(|(height, _)| *height = f64::NAN);
     Ok(())
+}
+
+/// What a file of obstacles marks on heights whose place is known: polygons in the coordinates of the heights, and cells.
+///
+/// # Errors
+/// Obstacles that cannot be used for the DEM.
+pub fn obstacles(
+    geometry: &Geometry,
+    place: &Place,
+    path: &Path,
+) -> Result<(Vec<Polygon>, Option<Grid<bool>>), JobError> {
+    match mask::read_obstacles(path, &place.whole()).map_err(mask_error)? {
+        Obstacles::Cells(cells) => Ok((Vec::new(), Some(place.part(Grid::new(place.whole(), cells))))),
+        Obstacles::Polygons(all) => {
+            let moved = |ring: Vec<[f64; 2]>| ring.into_iter().map(|p| place.to_heights(p, geometry)).collect();
+            let polygon = |rings: Vec<Vec<[f64; 2]>>| {
+                Polygon::new(rings.into_iter().map(moved).collect())
+                    .map_err(|e| JobError::input(format!("{}: failed to {e}", path.display())))
+            };
+            Ok((all.into_iter().map(polygon).collect::<Result<_, _>>()?, None))
+        }
+    }
 }
 
 /// Share of the cells with data that have none any more.

@@ -7,5 +7,6 @@ pub mod fits;
 pub mod masks;
 pub mod place;
 pub mod roughness;
+pub mod routes;
 pub mod terrains;
 pub mod textures;

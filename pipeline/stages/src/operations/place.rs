@@ -59,6 +59,29 @@ impl Place {
         (0..2).any(|k| (heights.cell[k] / self.cell[k] - 1.0).abs() > 1e-6)
     }
 
+    /// A point of the raster's own coordinates in those of the heights, m.
+    pub fn to_heights(self, point: [f64; 2], heights: &Geometry) -> [f64; 2] {
+        let corner = self.south_west();
+        [0, 1].map(|k| heights.origin[k] + (point[k] - corner[k]) * self.scale(heights, k))
+    }
+
+    /// A point of the heights' coordinates, m, in the raster's own.
+    pub fn from_heights(self, point: [f64; 2], heights: &Geometry) -> [f64; 2] {
+        let corner = self.south_west();
+        [0, 1].map(|k| corner[k] + (point[k] - heights.origin[k]) / self.scale(heights, k))
+    }
+
+    /// South-west corner of the window in the raster's own coordinates.
+    fn south_west(self) -> [f64; 2] {
+        let below = self.shape[0] - self.corner[0] - self.size[0];
+        [self.origin[0] + self.corner[1] as f64 * self.cell[0], self.origin[1] + below as f64 * self.cell[1]]
+    }
+
+    /// Metres of the heights over a unit of the raster, along x or y.
+    fn scale(self, heights: &Geometry, axis: usize) -> f64 {
+        heights.size()[axis] / (self.cell[axis] * self.size[1 - axis] as f64)
+    }
+
     /// The window of what covers the whole raster.
     pub fn part<T: Copy>(&self, whole: Grid<T>) -> Grid<T> {
         let ([row, col], [rows, cols]) = (self.corner, self.size);

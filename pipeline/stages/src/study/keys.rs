@@ -1,5 +1,9 @@
 //! Unknown keys: found against the JSON Schema of a parameter type, before anything reads the values.
 
+use sastrugi_schemas::ParameterError;
+use sastrugi_schemas::kind::{read_parameters, schema_of};
+use schemars::JsonSchema;
+use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
 
 /// A key that no parameter has.
@@ -35,6 +39,34 @@ pub fn nearest<'a>(word: &str, candidates: impl Iterator<Item = &'a str>) -> Opt
 /// Names of the properties that a schema describes.
 pub fn properties(schema: &Value) -> Vec<String> {
     objects(schema, schema).iter().flat_map(|o| o.keys().cloned()).collect()
+}
+
+/// Schema of the parameters of two kernels that stand side by side in one table.
+pub fn schema_of_both<A: JsonSchema, B: JsonSchema>() -> Value {
+    let (mut schema, second) = (schema_of::<A>(), schema_of::<B>());
+    for part in ["properties", "$defs"] {
+        let Some(more) = second[part].as_object().cloned() else { continue };
+        match schema[part].as_object_mut() {
+            Some(all) => all.extend(more),
+            None => schema[part] = Value::Object(more),
+        }
+    }
+    schema
+}
+
+/// Reads the parameters of two kernels that stand side by side in one table.
+///
+/// # Errors
+/// The first wrong value.
+pub fn read_both<A, B>(params: &Value) -> Result<(A, B), ParameterError>
+where
+    A: DeserializeOwned,
+    B: DeserializeOwned + JsonSchema,
+{
+    let names = properties(&schema_of::<B>());
+    let (second, first): (Map<_, _>, Map<_, _>) =
+        params.as_object().cloned().unwrap_or_default().into_iter().partition(|(key, _)| names.contains(key));
+    Ok((read_parameters(&Value::Object(first))?, read_parameters(&Value::Object(second))?))
 }
 
 /// The first unknown key of `value`, depth first.

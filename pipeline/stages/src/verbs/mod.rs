@@ -7,6 +7,7 @@ pub mod fit;
 pub mod fits;
 pub mod hillshade;
 pub mod local;
+pub mod navigate;
 pub mod parameters;
 mod reading;
 pub mod releases;

@@ -51,21 +51,34 @@ pub fn traverse(request: &Request<'_>, place: &Place<'_>, progress: &dyn Progres
     let dem = json!({ "id": "dem", "file": path.to_string_lossy() });
     let missions = with(json!({ "id": "missions", "terrains": ["dem"], "seed": request.seed }), &request.missions)?;
     let drive = with(json!({ "id": "mission", "missions": "missions" }), &request.parameters)?;
+    let text = document(&study, &request.roughness, [("dem", dem), ("missions", missions), ("traverse", drive)])?;
+    let Place { output, work, replace, limits } = *place;
+    let run = RunRequest { output, work, part: None, purpose: Some(STAGE), replace, limits };
+    run_text(&text, Path::new(""), &run, progress)
+}
+
+/// The text of a study: its head, its `[roughness]`, and one item of each section.
+///
+/// # Errors
+/// Values that TOML does not have.
+pub(super) fn document<const N: usize>(
+    head: &Value,
+    roughness: &Value,
+    sections: [(&str, Value); N],
+) -> Result<String, Error> {
     let mut document = DocumentMut::new();
-    document["study"] = Item::Table(table(&study)?);
-    document["roughness"] = Item::Table(table(&request.roughness)?);
-    for (section, item) in [("dem", dem), ("missions", missions), ("traverse", drive)] {
+    document["study"] = Item::Table(table(head)?);
+    document["roughness"] = Item::Table(table(roughness)?);
+    for (section, item) in sections {
         let mut tables = ArrayOfTables::new();
         tables.push(table(&item)?);
         document[section] = Item::ArrayOfTables(tables);
     }
-    let Place { output, work, replace, limits } = *place;
-    let run = RunRequest { output, work, part: None, purpose: Some(STAGE), replace, limits };
-    run_text(&document.to_string(), Path::new(""), &run, progress)
+    Ok(document.to_string())
 }
 
 /// An envelope with parameters beside its keys; the envelope's keys are not the caller's to set.
-fn with(mut envelope: Value, more: &Value) -> Result<Value, Error> {
+pub(super) fn with(mut envelope: Value, more: &Value) -> Result<Value, Error> {
     let (Some(map), Some(more)) = (envelope.as_object_mut(), more.as_object()) else { return Ok(envelope) };
     for (key, value) in more {
         if map.insert(key.clone(), value.clone()).is_some() {

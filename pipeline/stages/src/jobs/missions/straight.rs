@@ -1,14 +1,15 @@
-//! Stage `missions`: straight missions drawn on the closed class map of each heightfield.
+//! Straight missions, drawn on the closed class map of each heightfield.
 
-use super::roughness;
+use super::{MISSIONS, STAGE};
 use crate::builder::{BuildError, Builder, common};
 use crate::job::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work};
+use crate::jobs::roughness;
 use crate::operations::dem::input_error;
 use crate::operations::drawn::{Drawn, Lines};
 use crate::revision::Room;
 use crate::runner::graph::Node;
 use crate::study::Entry;
-use sastrugi_mobility::missions::{Mission, MissionParameters, MissionSettings, StartCells, draw_missions};
+use sastrugi_mobility::missions::{MissionParameters, MissionSettings, StartCells, draw_missions};
 use sastrugi_numeric::{Geometry, Streams};
 use sastrugi_schemas::Kind;
 use sastrugi_schemas::kind::{read_parameters, schema_of};
@@ -16,25 +17,19 @@ use sastrugi_schemas::study::MissionsItem;
 use sastrugi_store::dem;
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
 
-/// Name of the stage.
-pub const STAGE: &str = "missions";
-/// Drawn missions.
-const MISSIONS: &str = "missions.json";
-
-/// The one kind of missions.
-pub fn kinds() -> Vec<Kind> {
-    vec![Kind {
+/// How they are described.
+pub fn kind() -> Kind {
+    Kind {
         family: "missions",
         kind: "straight",
         summary: "straight lines of one length with random start and heading, start in low roughness, goal in low or semi",
         source: "Majhor and Bos, section 2.3",
         parameters: schema_of::<MissionParameters>(),
-    }]
+    }
 }
 
-struct MissionsJob {
+struct StraightJob {
     heightfield: String,
     settings: MissionSettings,
     start_cells: StartCells,
@@ -43,45 +38,50 @@ struct MissionsJob {
     cells: u64,
 }
 
-/// Adds the items of `[[missions]]`.
+/// Adds the items of one table.
 ///
 /// # Errors
 /// A wrong item.
-pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
-    for entry in builder.study.entries(STAGE)? {
-        let (envelope, params): (MissionsItem, Value) = entry.read()?;
-        entry.check_keys::<MissionsItem>(&params, &schema_of::<MissionParameters>())?;
-        builder.claim(&entry, STAGE, &envelope.id)?;
-        let raw: MissionParameters = read_parameters(&params).map_err(|e| entry.refuse(e))?;
-        let settings = MissionSettings::try_from(raw).map_err(|e| entry.refuse(e))?;
-        if envelope.terrains.is_empty() {
-            return Err(entry.error("terrains", "`terrains` is empty; it names the heightfields to drive on").into());
-        }
-        let mut heightfields = BTreeSet::new();
-        for (k, id) in envelope.terrains.iter().enumerate() {
-            heightfields.extend(builder.family(&entry, &format!("terrains.{k}"), id)?);
-        }
-        let lines: Vec<Lines> =
-            heightfields.into_iter().map(|id| lines(builder, &envelope.id, &settings, id)).collect();
-        check_geometry(builder, &entry, &lines)?;
-        for one in &lines {
-            let words = format!("{}@{}", envelope.id, one.word);
-            let streams = builder.streams(STAGE, &words, envelope.seed, one.shared.unwrap_or(0));
-            let stream = Some(streams.label());
-            let job = MissionsJob {
-                heightfield: one.heightfield.clone(),
-                settings: settings.clone(),
-                start_cells: if one.shared.is_some() { StartCells::All } else { StartCells::Low },
-                streams,
-                cells: builder.heightfields.get(&one.heightfield).map_or(0, |field| field.cells),
-            };
-            let parents = vec![roughness::item(&one.heightfield)];
-            let item = one.item.clone();
-            builder.node(Node { item, parents, inputs: Vec::new(), stream, job: Box::new(job) })?;
-        }
-        let drawn = Drawn { lines, count: settings.count(), length_m: settings.length_m() };
-        builder.missions.insert(envelope.id, drawn);
+pub fn add(
+    builder: &mut Builder<'_>,
+    entry: &Entry<'_>,
+    envelope: &MissionsItem,
+    params: &Value,
+) -> Result<(), BuildError> {
+    if envelope.of.is_some() {
+        return Err(entry
+            .error("of", "`of` is for `kind = \"routed\"`; straight missions are drawn on `terrains`")
+            .into());
     }
+    entry.check_keys::<MissionsItem>(params, &schema_of::<MissionParameters>())?;
+    let raw: MissionParameters = read_parameters(params).map_err(|e| entry.refuse(e))?;
+    let settings = MissionSettings::try_from(raw).map_err(|e| entry.refuse(e))?;
+    if envelope.terrains.is_empty() {
+        return Err(entry.error("terrains", "`terrains` is empty; it names the heightfields to drive on").into());
+    }
+    let mut heightfields = BTreeSet::new();
+    for (k, id) in envelope.terrains.iter().enumerate() {
+        heightfields.extend(builder.family(entry, &format!("terrains.{k}"), id)?);
+    }
+    let lines: Vec<Lines> = heightfields.into_iter().map(|id| lines(builder, &envelope.id, &settings, id)).collect();
+    check_geometry(builder, entry, &lines)?;
+    for one in &lines {
+        let words = format!("{}@{}", envelope.id, one.word);
+        let streams = builder.streams(STAGE, &words, envelope.seed, one.shared.unwrap_or(0));
+        let stream = Some(streams.label());
+        let job = StraightJob {
+            heightfield: one.heightfield.clone(),
+            settings: settings.clone(),
+            start_cells: if one.shared.is_some() { StartCells::All } else { StartCells::Low },
+            streams,
+            cells: builder.heightfields.get(&one.heightfield).map_or(0, |field| field.cells),
+        };
+        let parents = vec![roughness::item(&one.heightfield)];
+        let item = one.item.clone();
+        builder.node(Node { item, parents, inputs: Vec::new(), stream, job: Box::new(job) })?;
+    }
+    let drawn = Drawn { lines, count: settings.count(), length_m: settings.length_m() };
+    builder.missions.insert(envelope.id.clone(), drawn);
     Ok(())
 }
 
@@ -90,10 +90,12 @@ fn lines(builder: &Builder<'_>, missions: &str, settings: &MissionSettings, heig
     // Draws can be shared only where the cells are known to be the same.
     let known = builder.heightfields.get(&heightfield).filter(|field| builder.is_paired() && field.geometry.is_some());
     let shared = known.and_then(|field| field.replicate);
+    let item = ItemRef::new(STAGE, &format!("{missions}@{heightfield}"));
     Lines {
-        item: ItemRef::new(STAGE, &format!("{missions}@{heightfield}")),
+        pairs: item.id.clone(),
+        item,
         word: shared.map_or_else(|| heightfield.clone(), common),
-        settings: settings.clone(),
+        rules: json!(settings),
         shared,
         heightfield,
     }
@@ -128,7 +130,7 @@ fn unlike((a, of_a): (&str, &Geometry), (b, of_b): (&str, &Geometry)) -> String 
     )
 }
 
-impl Job for MissionsJob {
+impl Job for StraightJob {
     fn recipe(&self) -> Value {
         json!({ "heightfield": self.heightfield, "missions": self.settings, "cells": self.start_cells })
     }
@@ -155,21 +157,4 @@ impl Job for MissionsJob {
         work.write(MISSIONS, &text)?;
         Ok(Outcome { products: vec![Product::internal(MISSIONS)], ..Outcome::default() })
     }
-}
-
-/// The missions that an item drew.
-///
-/// # Errors
-/// A file that cannot be read.
-pub fn read(folder_file: &Path) -> Result<Vec<Mission>, JobError> {
-    let bytes = std::fs::read(folder_file).map_err(|e| JobError::at(folder_file, e))?;
-    serde_json::from_slice(&bytes).map_err(JobError::new)
-}
-
-/// Where the drawn missions are.
-///
-/// # Errors
-/// When the item is no parent.
-pub fn file(work: &Work<'_>, item: &ItemRef) -> Result<std::path::PathBuf, JobError> {
-    work.parent(item, MISSIONS)
 }

@@ -1,0 +1,142 @@
+//! Missions along the trail that a terrain was given.
+
+use super::{MISSIONS, STAGE};
+use crate::builder::{BuildError, Builder};
+use crate::job::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work};
+use crate::jobs::terrain;
+use crate::operations::drawn::{Drawn, Lines};
+use crate::revision::Room;
+use crate::runner::graph::Node;
+use crate::study::Entry;
+use sastrugi_mobility::missions::{Mission, Polyline};
+use sastrugi_schemas::kind::{read_parameters, schema_of};
+use sastrugi_schemas::study::MissionsItem;
+use sastrugi_schemas::{Kind, ParameterError};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
+use std::collections::BTreeSet;
+
+/// Length that a trail is taken for before it is known, m.
+const LENGTH_GUESS_M: f64 = 100.0;
+
+/// Which trail is followed, and which way.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct TrailParameters {
+    /// Name of the trail: `trail`, or `trail-2` ... where a terrain has several.
+    pub trail: String,
+    /// Follow it from its end to its beginning.
+    pub backwards: bool,
+}
+
+impl Default for TrailParameters {
+    fn default() -> Self {
+        Self { trail: "trail".to_owned(), backwards: false }
+    }
+}
+
+/// How they are described.
+pub fn kind() -> Kind {
+    Kind {
+        family: "missions",
+        kind: "trail",
+        summary: "the trail that a terrain was given, from end to end: one mission on each terrain",
+        source: "trails: docs/papers/mavs.md; followed by pure pursuit (Coulter, 1992)",
+        parameters: schema_of::<TrailParameters>(),
+    }
+}
+
+struct TrailJob {
+    terrain: ItemRef,
+    parameters: TrailParameters,
+}
+
+/// Adds the items of one table.
+///
+/// # Errors
+/// A wrong item.
+pub fn add(
+    builder: &mut Builder<'_>,
+    entry: &Entry<'_>,
+    envelope: &MissionsItem,
+    params: &Value,
+) -> Result<(), BuildError> {
+    for (key, given) in [("of", envelope.of.is_some()), ("seed", envelope.seed.is_some())] {
+        if given {
+            return Err(entry.error(key, format!("`{key}` has no meaning for missions along a trail")).into());
+        }
+    }
+    entry.check_keys::<MissionsItem>(params, &schema_of::<TrailParameters>())?;
+    let parameters: TrailParameters = read_parameters(params).map_err(|e: ParameterError| entry.refuse(e))?;
+    if envelope.terrains.is_empty() {
+        return Err(entry
+            .error("terrains", "`terrains` is empty; it names the terrains whose trails are followed")
+            .into());
+    }
+    let mut ids = BTreeSet::new();
+    for (k, id) in envelope.terrains.iter().enumerate() {
+        let key = format!("terrains.{k}");
+        for one in builder.family(entry, &key, id)? {
+            let made = builder.heightfields.get(&one).is_some_and(|field| field.item.stage == terrain::STAGE);
+            if !made {
+                return Err(entry.error(&key, format!("\"{one}\" has no trail; `compose` gives terrains one")).into());
+            }
+            ids.insert(one);
+        }
+    }
+    let mut lines = Vec::new();
+    for heightfield in ids {
+        let item = ItemRef::new(STAGE, &format!("{}@{heightfield}", envelope.id));
+        let terrain = ItemRef::new(terrain::STAGE, &heightfield);
+        let parents = vec![terrain.clone()];
+        let job = TrailJob { terrain, parameters: parameters.clone() };
+        builder.node(Node { item: item.clone(), parents, inputs: Vec::new(), stream: None, job: Box::new(job) })?;
+        lines.push(Lines {
+            pairs: item.id.clone(),
+            item,
+            word: heightfield.clone(),
+            rules: json!(parameters),
+            shared: None,
+            heightfield,
+        });
+    }
+    builder.missions.insert(envelope.id.clone(), Drawn { lines, count: 1, length_m: LENGTH_GUESS_M });
+    Ok(())
+}
+
+impl Job for TrailJob {
+    fn recipe(&self) -> Value {
+        json!({ "terrain": self.terrain, "trail": self.parameters })
+    }
+
+    fn rooms(&self) -> &'static [Room] {
+        &[Room::Mobility]
+    }
+
+    fn memory_bytes(&self) -> u64 {
+        1 << 20
+    }
+
+    fn estimate(&self) -> Estimate {
+        Estimate { seconds: 0.01, bytes: 1e5 }
+    }
+
+    fn run(&self, work: &Work<'_>) -> Result<Outcome, JobError> {
+        let lines = terrain::lines(work, &self.terrain)?;
+        let TrailParameters { trail, backwards } = &self.parameters;
+        let Some(line) = lines.iter().find(|line| line.name == *trail) else {
+            let names: Vec<&str> = lines.iter().map(|line| line.name.as_str()).collect();
+            let has = if names.is_empty() { "has none".to_owned() } else { format!("has {}", names.join(", ")) };
+            return Err(JobError::input(format!("{} has no trail \"{trail}\"; it {has}", self.terrain.id)));
+        };
+        let mut points: Vec<[f64; 2]> = line.points_m.iter().map(|&[x, y, _]| [x, y]).collect();
+        if *backwards {
+            points.reverse();
+        }
+        let line = Polyline::new(&points).map_err(|e| JobError::new(format!("failed to {e}")))?;
+        let text = serde_json::to_vec(&[Mission::along(0, line)]).map_err(JobError::new)?;
+        work.write(MISSIONS, &text)?;
+        Ok(Outcome { products: vec![Product::internal(MISSIONS)], ..Outcome::default() })
+    }
+}

@@ -1,0 +1,278 @@
+//! Ground prepared for routes: the same for studies, verbs and missions.
+
+use crate::job::JobError;
+use sastrugi_mobility::vehicle::{SlopeAbility, SurfaceParameters, Vehicle};
+use sastrugi_navigation::clearance::Clearance;
+use sastrugi_navigation::line::Ground;
+use sastrugi_navigation::obstacles::{self, Polygon};
+use sastrugi_navigation::pairs::Pair;
+use sastrugi_navigation::parameters::{Cost, RouteParameters};
+use sastrugi_navigation::{CostModel, Node, Planner, Route, RouteError, RouteSettings, TravelMap};
+use sastrugi_numeric::{Grid, Surface, resample};
+use sastrugi_roughness::{ClassThresholds, Detrended, Detrender, WaveBand, classify, moore_gradient};
+use sastrugi_schemas::ParameterError;
+use std::fmt::Display;
+
+/// What routes are planned by, besides the heights.
+#[derive(Clone, Debug, Default)]
+pub struct Given {
+    /// Vehicle whose limits of slope, energy and band of wavelengths count.
+    pub vehicle: Option<Vehicle>,
+    /// Obstacles as polygons, in the coordinates of the heights, m.
+    pub polygons: Vec<Polygon>,
+    /// Obstacles as cells of the heights.
+    pub blocked: Option<Grid<bool>>,
+    /// Factors of the cost, in the coordinates of the heights.
+    pub factors: Option<Grid>,
+    /// Thresholds of the roughness classes.
+    pub thresholds: ClassThresholds,
+}
+
+impl Given {
+    /// Blocks more cells.
+    pub fn add_blocked(&mut self, cells: Option<Grid<bool>>) {
+        match (&mut self.blocked, cells) {
+            (Some(all), Some(cells)) => {
+                all.values.iter_mut().zip(cells.values).for_each(|(one, other)| *one |= other);
+            }
+            (blocked, cells) => *blocked = blocked.take().or(cells),
+        }
+    }
+}
+
+/// Ground that routes can be planned on.
+#[derive(Debug)]
+pub struct Site {
+    map: TravelMap,
+    costs: CostModel,
+    clearance: Option<Clearance>,
+    settings: RouteSettings,
+}
+
+/// What a search came to.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Outcome {
+    /// A route.
+    Found(Route),
+    /// No path joins start and goal.
+    NoPath,
+    /// An anytime search used up its expansions before it found a path.
+    Budget,
+}
+
+impl Outcome {
+    /// Name in tables.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Found(_) => "found",
+            Self::NoPath => "no_path",
+            Self::Budget => "budget",
+        }
+    }
+
+    /// The route, where there is one.
+    pub fn route(&self) -> Option<&Route> {
+        match self {
+            Self::Found(route) => Some(route),
+            Self::NoPath | Self::Budget => None,
+        }
+    }
+}
+
+impl Site {
+    /// Prepares heights in m.
+    ///
+    /// # Errors
+    /// Heights that no route can be planned on, or what is given does not suit them.
+    pub fn new(heights: &Grid, parameters: &RouteParameters, given: &Given) -> Result<Self, JobError> {
+        let step = coarsening(heights, parameters)?;
+        let coarse = |grid: &Grid| if step > 1 { resample::block_means(grid, step) } else { grid.clone() };
+        let ability = given.vehicle.as_ref().map(|v| SlopeAbility::of(v, &SurfaceParameters::default()));
+        let limits_deg = ability.map_or(RouteParameters::WITHOUT_VEHICLE_DEG, |a| [a.up_deg, a.down_deg]);
+        let limits = parameters.limits(limits_deg).map_err(refused)?;
+        // Of the precision that the ground is stored with, for teams.
+        let planned_on = coarse(heights).map(|z| f64::from(z as f32));
+        let mut map = TravelMap::new(planned_on, limits).map_err(failed)?;
+        for polygon in &given.polygons {
+            obstacles::block(&mut map, polygon, parameters.obstacle_margin_m).map_err(refused)?;
+        }
+        if let Some(blocked) = &given.blocked {
+            let share = coarse(&blocked.map(|b| f64::from(u8::from(b))));
+            let touched: Vec<bool> = share.values.iter().map(|share| *share > 0.0).collect();
+            obstacles::block_cells(&mut map, &touched, parameters.obstacle_margin_m).map_err(refused)?;
+        }
+        let factors = factors(heights, parameters, given)?.map(|grid| coarse(&grid));
+        let factors = factors.map(|grid| block_unknown(&mut map, grid));
+        let rolling = ability.map_or(f64::NAN, |a| a.rolling_resistance);
+        let slope = parameters.slope_cost(rolling).map_err(refused)?;
+        let costs = CostModel::new(slope, factors, &map).map_err(refused)?;
+        let clearance = |width_m| Clearance::new(&map, width_m, parameters.clearance_weight, parameters.clearance_max);
+        let clearance = parameters.width_m.map(clearance).transpose().map_err(refused)?;
+        let [dx, dy] = map.cell_m();
+        let settings = parameters.settings(dx.max(dy)).map_err(refused)?;
+        Ok(Self { map, costs, clearance, settings })
+    }
+
+    /// Map, costs and room for a team.
+    pub fn ground(&self) -> Ground<'_> {
+        Ground { map: &self.map, costs: &self.costs, clearance: self.clearance.as_ref() }
+    }
+
+    /// The map.
+    pub fn map(&self) -> &TravelMap {
+        &self.map
+    }
+
+    /// Plans a route for each pair of start and goal; one alone, with both as vertices of its roadmap.
+    ///
+    /// # Errors
+    /// Starts and goals that are blocked or the same.
+    pub fn plan(&self, pairs: &[Pair]) -> Result<Vec<Outcome>, JobError> {
+        let cell = |node: Node| self.map.place(node);
+        if let [pair] = pairs {
+            let found = sastrugi_navigation::plan(&self.ground(), &self.settings, cell(pair.start), cell(pair.goal));
+            return Ok(vec![outcome(found)?]);
+        }
+        let planner = Planner::new(self.ground(), self.settings).map_err(failed)?;
+        pairs.iter().map(|pair| outcome(planner.route(cell(pair.start), cell(pair.goal)))).collect()
+    }
+
+    /// The pair of nodes nearest to two points in the coordinates of the heights, m.
+    ///
+    /// # Errors
+    /// A point that is not on the map.
+    pub fn pair(&self, [start, goal]: [[f64; 2]; 2]) -> Result<Pair, JobError> {
+        Ok(Pair { start: self.node("start", start)?, goal: self.node("goal", goal)?, draws: 1 })
+    }
+
+    fn node(&self, name: &str, [x, y]: [f64; 2]) -> Result<Node, JobError> {
+        let g = self.map.heights().geometry;
+        let outside = || {
+            let ([x0, y0], [width, height]) = (g.origin, g.size());
+            let (x1, y1) = (x0 + width, y0 + height);
+            JobError::input(format!(
+                "the {name} ({x}, {y}) lies outside of the terrain, which covers x from {x0} to {x1} and y from {y0} to {y1} m"
+            ))
+        };
+        let (row, col) = g.cell_at(x, y).ok_or_else(outside)?;
+        Ok(self.map.node(row, col))
+    }
+
+    /// Nodes as points in the coordinates of the heights, with their heights, m.
+    pub fn points(&self, nodes: &[Node]) -> Vec<[f64; 3]> {
+        let point = |node: &Node| {
+            let [x, y] = self.map.position_m(*node);
+            [x, y, self.map.height_m(*node)]
+        };
+        nodes.iter().map(point).collect()
+    }
+
+    /// The heights, without data where a cell cannot be entered.
+    pub fn open_ground(&self) -> Grid {
+        let mut heights = self.map.heights().clone();
+        let blocked = heights.values.iter_mut().zip(0..).filter(|(_, node)| self.map.is_blocked(*node));
+        blocked.for_each(|(height, _)| *height = f64::NAN);
+        heights
+    }
+
+    /// Cells that may be entered.
+    pub fn free_cells(&self) -> usize {
+        (0..self.map.len() as Node).filter(|node| !self.map.is_blocked(*node)).count()
+    }
+}
+
+fn outcome(found: Result<Route, RouteError>) -> Result<Outcome, JobError> {
+    match found {
+        Ok(route) => Ok(Outcome::Found(route)),
+        Err(RouteError::NoPath { .. }) => Ok(Outcome::NoPath),
+        Err(RouteError::Budget { .. }) => Ok(Outcome::Budget),
+        Err(other) => Err(failed(other)),
+    }
+}
+
+/// Distance from the first point to each, in plan, m.
+pub fn distances_m(points: &[[f64; 3]]) -> Vec<f64> {
+    let mut distance_m = 0.0;
+    let mut last = points.first();
+    let mut all = Vec::with_capacity(points.len());
+    for point in points {
+        if let Some([x, y, _]) = last {
+            distance_m += ((point[0] - x) * (point[0] - x) + (point[1] - y) * (point[1] - y)).sqrt();
+        }
+        all.push(distance_m);
+        last = Some(point);
+    }
+    all
+}
+
+/// Cells of the heights along a side of a cell that is planned on.
+fn coarsening(heights: &Grid, parameters: &RouteParameters) -> Result<usize, JobError> {
+    let Some(plan_cell_m) = parameters.plan_cell_m else { return Ok(1) };
+    let g = &heights.geometry;
+    let [dx, dy] = g.cell;
+    let step = (plan_cell_m / dx.max(dy)).round().max(1.0);
+    let side = g.rows.min(g.cols) as f64;
+    if step * 2.0 > side {
+        return Err(JobError::input(format!(
+            "`plan_cell_m` of {plan_cell_m} m leaves fewer than two cells of the terrain's {} x {} cells of {dx} x {dy} m",
+            g.rows, g.cols
+        )));
+    }
+    Ok(step as usize)
+}
+
+/// Factor of the cost of each cell of the heights, where the cost has one.
+fn factors(heights: &Grid, parameters: &RouteParameters, given: &Given) -> Result<Option<Grid>, JobError> {
+    Ok(match parameters.cost {
+        Cost::Slope | Cost::Energy => None,
+        Cost::Class => {
+            let classes = classify(&moore_gradient(heights), &given.thresholds);
+            Some(classes.map(|code| parameters.class_factor(code)))
+        }
+        Cost::BandRms => {
+            let rms = band_rms(heights, given)?;
+            Some(rms.map(|rms_m| parameters.band_rms_factor(rms_m)))
+        }
+        Cost::Raster => {
+            let raster =
+                given.factors.as_ref().ok_or_else(|| JobError::new("`cost = \"raster\"` needs `cost_raster`"))?;
+            Some(on_cells_of(heights, raster)?)
+        }
+    })
+}
+
+/// RMS around each cell in the band of wavelengths that shakes the vehicle, m.
+fn band_rms(heights: &Grid, given: &Given) -> Result<Grid, JobError> {
+    let vehicle = given.vehicle.as_ref().ok_or_else(|| JobError::new("`cost = \"band_rms\"` needs a `vehicle`"))?;
+    let band = WaveBand::of_vehicle(vehicle.wheelbase_m(), vehicle.parameters().wheels.radius_m).map_err(failed)?;
+    let [dx, dy] = heights.geometry.cell;
+    let [x, y] = heights.geometry.size();
+    band.fits_cells(dx.max(dy)).map_err(failed)?;
+    band.fits_length(x.max(y)).map_err(failed)?;
+    Ok(Detrended::of(heights, &band, Detrender::Band).rms_map())
+}
+
+/// A raster at the cells of the heights; NaN where it has no data.
+fn on_cells_of(heights: &Grid, raster: &Grid) -> Result<Grid, JobError> {
+    let g = heights.geometry;
+    if !g.overlaps(&raster.geometry) {
+        return Err(JobError::input("`cost_raster` shares no ground with the terrain; it must lie in its coordinates"));
+    }
+    let value = |row: usize, col: usize| raster.height(g.x(col), g.y(row)).unwrap_or(f64::NAN);
+    Ok(Grid::new(g, (0..g.rows).flat_map(|r| (0..g.cols).map(move |c| (r, c))).map(|(r, c)| value(r, c)).collect()))
+}
+
+/// Blocks the cells without a factor.
+fn block_unknown(map: &mut TravelMap, factors: Grid) -> Vec<f64> {
+    let unknown = factors.values.iter().zip(0..).filter(|(factor, _)| factor.is_nan());
+    unknown.for_each(|(_, node)| map.block(node));
+    factors.values
+}
+
+fn refused(error: ParameterError) -> JobError {
+    JobError::input(error)
+}
+
+fn failed(error: impl Display) -> JobError {
+    JobError::input(format!("failed to {error}"))
+}

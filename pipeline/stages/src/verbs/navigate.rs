@@ -1,0 +1,195 @@
+//! `navigate`: a route over one DEM, as a file, a picture, or a small study of its own.
+
+use super::reading::{Reading, read_as_it_is};
+use super::traverse::{Place as ReleasePlace, document, with};
+use crate::error::Error;
+use crate::jobs::route::STAGE;
+use crate::operations::dem::to_metres;
+use crate::operations::masks;
+use crate::operations::place::Place;
+use crate::operations::routes::{Given, Outcome, Site};
+use crate::runner::progress::Progress;
+use crate::studies::{RunRequest, RunSummary, run_text};
+use sastrugi_mobility::registry;
+use sastrugi_navigation::Route;
+use sastrugi_navigation::parameters::RouteParameters;
+use sastrugi_numeric::Grid;
+use sastrugi_report::RoutePicture;
+use sastrugi_roughness::rms_slope;
+use sastrugi_schemas::kind::read_parameters;
+use sastrugi_store::atomic;
+use sastrugi_store::geojson;
+use serde_json::{Map, Value, json};
+use std::path::{Path, PathBuf};
+
+/// What is asked for.
+pub struct Request<'a> {
+    /// DEM.
+    pub dem: &'a Path,
+    /// Start, in the DEM's own coordinates.
+    pub start: [f64; 2],
+    /// Goal, in the DEM's own coordinates.
+    pub goal: [f64; 2],
+    /// Vehicle whose limits of slope hold.
+    pub vehicle: Option<&'a str>,
+    /// Files of what cannot be entered.
+    pub obstacles: &'a [PathBuf],
+    /// Parameters of the search.
+    pub route: Value,
+}
+
+/// Endings of what holds a route alone.
+const ROUTE_ENDINGS: [&str; 2] = ["geojson", "svg"];
+
+/// True for outputs that hold a route alone.
+pub fn is_route_file(output: &Path) -> bool {
+    let ending = output.extension().and_then(|ending| ending.to_str()).unwrap_or_default();
+    ROUTE_ENDINGS.iter().any(|known| known.eq_ignore_ascii_case(ending))
+}
+
+/// Plans a route and writes it as GeoJSON, or as a picture (SVG). Returns its figures.
+///
+/// # Errors
+/// Wrong parameters, a DEM or obstacles that cannot be used, no route, or a file that cannot be written.
+pub fn route(request: &Request<'_>, output: &Path) -> Result<Value, Error> {
+    let parameters: RouteParameters = read_parameters(&request.route)?;
+    parameters.check()?;
+    parameters.check_given(request.vehicle.is_some(), false)?;
+    let own = read_as_it_is(request.dem, &Reading::default())?;
+    let place = Place::of(&own.dem.grid.geometry, &own.dem.grid.geometry);
+    let crs = own.dem.info.crs.clone();
+    let (dem, converted) = to_metres(own.dem);
+    let given = given(request, &dem.grid, &place)?;
+    let site = Site::new(&dem.grid, &parameters, &given)?;
+    let geometry = dem.grid.geometry;
+    let pair = site.pair([request.start, request.goal].map(|end| place.to_heights(end, &geometry)))?;
+    let found = site.plan(&[pair])?;
+    let route = match found.first() {
+        Some(Outcome::Found(route)) => route,
+        other => return Err(Error::Input(no_route(&site, other))),
+    };
+    let drawn = Drawn { site: &site, heights: &dem.grid, given: &given, route, figures: figures(&site, route) };
+    if output.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("svg")) {
+        let picture = drawn.picture(request.dem)?;
+        atomic::write(output, picture.as_bytes()).map_err(|e| Error::at(output, e))?;
+    } else {
+        let own = |[x, y, z]: [f64; 3]| {
+            let [x, y] = place.from_heights([x, y], &geometry);
+            [x, y, z]
+        };
+        let positions = site.points(&route.smoothed).into_iter().map(own).collect();
+        let line = geojson::Route { positions, properties: drawn.figures.clone() };
+        geojson::write_routes(output, Some(&crs), &[line]).map_err(Error::io)?;
+    }
+    let notes: Vec<String> = own.notes.into_iter().chain(converted).collect();
+    Ok(json!({ "file": output.display().to_string(), "route": drawn.figures, "notes": notes }))
+}
+
+fn given(request: &Request<'_>, heights: &Grid, place: &Place) -> Result<Given, Error> {
+    let vehicle = request.vehicle.map(|name| registry::vehicle(name, &Map::new())).transpose()?;
+    let mut given = Given { vehicle, ..Given::default() };
+    for path in request.obstacles {
+        let (polygons, cells) = masks::obstacles(&heights.geometry, place, path)?;
+        given.polygons.extend(polygons);
+        given.add_blocked(cells);
+    }
+    Ok(given)
+}
+
+/// The sentence on a pair without a route.
+fn no_route(site: &Site, outcome: Option<&Outcome>) -> String {
+    let [up, down] = site.map().limits().degrees();
+    match outcome {
+        Some(Outcome::Budget) => "no route was found within `expansions_max`; raise it, or `suboptimality`".to_owned(),
+        _ => format!(
+            "no route joins start and goal with slopes of at most {up:.1} degrees uphill and {down:.1} downhill; raise \
+             `max_up_deg` and `max_down_deg`, or allow 8 neighbours"
+        ),
+    }
+}
+
+/// The figures of a route, by name.
+fn figures(site: &Site, route: &Route) -> Map<String, Value> {
+    let degrees = |slope: f64| libm::atan(slope).to_degrees();
+    let score = &route.smoothed_score;
+    let points = site.points(&route.smoothed);
+    let figures = json!({
+        "length_m": crate::operations::routes::distances_m(&points).last(),
+        "ground_length_m": score.length_m,
+        "cost_m": score.cost,
+        "searched_cost_m": route.path_score.cost,
+        "steepest_up_deg": degrees(score.steepest[0]),
+        "steepest_down_deg": degrees(score.steepest[1]),
+        "points": route.smoothed.len(),
+        "vertices": route.vertices,
+        "expansions": route.expansions,
+    });
+    figures.as_object().cloned().unwrap_or_default()
+}
+
+struct Drawn<'a> {
+    site: &'a Site,
+    heights: &'a Grid,
+    given: &'a Given,
+    route: &'a Route,
+    figures: Map<String, Value>,
+}
+
+impl Drawn<'_> {
+    fn picture(&self, dem: &Path) -> Result<String, Error> {
+        let figure = |name: &str| self.figures.get(name).and_then(Value::as_f64).unwrap_or(f64::NAN);
+        let words = format!(
+            "{:.0} m in plan, cost {:.0} m, climbs {:.1} degrees and descends {:.1} at most",
+            figure("length_m"),
+            figure("cost_m"),
+            figure("steepest_up_deg"),
+            figure("steepest_down_deg")
+        );
+        let rings = self.given.polygons.iter().filter_map(|polygon| polygon.rings().first().cloned());
+        let picture = RoutePicture {
+            heights: self.heights,
+            rms_slope: rms_slope(self.heights),
+            searched: &self.site.points(&self.route.path),
+            smoothed: &self.site.points(&self.route.smoothed),
+            obstacles: &rings.collect::<Vec<_>>(),
+            title: &format!("Route over {}", dem.file_name().unwrap_or_default().to_string_lossy()),
+            words: &words,
+        };
+        picture.svg().map_err(Error::failed)
+    }
+}
+
+/// Plans a route over a DEM and writes a release with tables, GeoJSON and report.
+///
+/// # Errors
+/// As [`crate::studies::run`]; also a DEM on which nothing can be planned.
+pub fn release(
+    request: &Request<'_>,
+    date: &str,
+    place: &ReleasePlace<'_>,
+    progress: &dyn Progress,
+) -> Result<RunSummary, Error> {
+    let dem = absolute(request.dem)?;
+    let obstacles = request.obstacles.iter().map(|path| absolute(path)).collect::<Result<Vec<_>, _>>()?;
+    let mut search = json!({ "id": "route", "terrains": ["dem"], "start": request.start, "goal": request.goal });
+    if !obstacles.is_empty() {
+        search["obstacles"] = json!(obstacles);
+    }
+    if let Some(vehicle) = request.vehicle {
+        search["vehicle"] = json!(vehicle);
+    }
+    let sections = [("dem", json!({ "id": "dem", "file": dem })), (STAGE, with(search, &request.route)?)];
+    let head = json!({ "name": "navigate", "seed": 0, "date": date });
+    let text = document(&head, &json!({}), sections)?;
+    let ReleasePlace { output, work, replace, limits } = *place;
+    let run = RunRequest { output, work, part: None, purpose: Some(STAGE), replace, limits };
+    run_text(&text, Path::new(""), &run, progress)
+}
+
+fn absolute(path: &Path) -> Result<String, Error> {
+    let absolute = std::path::absolute(path).map_err(|e| Error::Input(format!("{}: {e}", path.display())))?;
+    match absolute.is_file() {
+        true => Ok(absolute.to_string_lossy().into_owned()),
+        false => Err(Error::Input(format!("{}: no such file", path.display()))),
+    }
+}
