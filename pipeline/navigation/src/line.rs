@@ -66,33 +66,17 @@ impl Ground<'_> {
 
     /// The straight line between two points, `[row, column]`; `None` where it may not be travelled or leaves the map.
     pub fn segment(&self, start: Point, end: Point) -> Option<Travelled> {
-        if !self.map.is_free_along(start, end) {
-            return None;
-        }
-        let span = [end[0] - start[0], end[1] - start[1]];
-        let [dx, dy] = self.map.cell_m();
-        let count = libm::ceil(PIECES * span[0].abs().max(span[1].abs()));
-        let run_m = ((span[1] * dx) * (span[1] * dx) + (span[0] * dy) * (span[0] * dy)).sqrt() / count;
-        let along = direction_of(span);
-        let point = |k: f64| [0, 1].map(|axis| start[axis] + span[axis] * (k / count));
+        let along = direction_of([end[0] - start[0], end[1] - start[1]]);
         let mut travelled = Travelled::NONE;
-        let mut before_m = self.map.height_at_m(start)?;
-        for k in 0..count as usize {
-            let after_m = self.map.height_at_m(point((k + 1) as f64))?;
-            let rise_m = after_m - before_m;
+        for_each_piece(self.map, start, end, |run_m, rise_m, middle| {
             let slope = rise_m / run_m;
-            let rounding = ROUNDING * slope.abs() + 8.0 * f64::EPSILON * before_m.abs().max(after_m.abs()) / run_m;
-            if !self.map.limits().allow((slope.abs() - rounding).max(0.0).copysign(slope)) {
-                return None;
-            }
             travelled = travelled.then(Travelled {
-                cost: self.costs.piece(run_m, rise_m) * self.factor(point(k as f64 + 0.5), along),
+                cost: self.costs.piece(run_m, rise_m) * self.factor(middle, along),
                 length_m: (run_m * run_m + rise_m * rise_m).sqrt(),
                 horizontal_m: run_m,
                 steepest: [slope.max(0.0), (-slope).max(0.0)],
             });
-            before_m = after_m;
-        }
+        })?;
         Some(travelled)
     }
 
@@ -114,6 +98,37 @@ impl Ground<'_> {
     pub fn path(&self, nodes: &[Node]) -> Option<Travelled> {
         nodes.windows(2).try_fold(Travelled::NONE, |sum, pair| Some(sum.then(self.line(pair[0], pair[1])?)))
     }
+}
+
+/// Whether the straight line between two points, `[row, column]`, may be travelled; never where it leaves the map.
+pub fn is_passable(map: &TravelMap, start: Point, end: Point) -> bool {
+    for_each_piece(map, start, end, |_, _, _| ()).is_some()
+}
+
+/// Calls `visit` with run (m), rise (m) and middle of the pieces of a line, up to the first that is too steep; `None` where the line may not
+/// be travelled.
+fn for_each_piece(map: &TravelMap, start: Point, end: Point, mut visit: impl FnMut(f64, f64, Point)) -> Option<()> {
+    if !map.is_free_along(start, end) {
+        return None;
+    }
+    let span = [end[0] - start[0], end[1] - start[1]];
+    let [dx, dy] = map.cell_m();
+    let count = libm::ceil(PIECES * span[0].abs().max(span[1].abs()));
+    let run_m = ((span[1] * dx) * (span[1] * dx) + (span[0] * dy) * (span[0] * dy)).sqrt() / count;
+    let point = |k: f64| [0, 1].map(|axis| start[axis] + span[axis] * (k / count));
+    let mut before_m = map.height_at_m(start)?;
+    for k in 0..count as usize {
+        let after_m = map.height_at_m(point((k + 1) as f64))?;
+        let rise_m = after_m - before_m;
+        let slope = rise_m / run_m;
+        let rounding = ROUNDING * slope.abs() + 8.0 * f64::EPSILON * before_m.abs().max(after_m.abs()) / run_m;
+        if !map.limits().allow((slope.abs() - rounding).max(0.0).copysign(slope)) {
+            return None;
+        }
+        visit(run_m, rise_m, point(k as f64 + 0.5));
+        before_m = after_m;
+    }
+    Some(())
 }
 
 /// The one of the eight directions that a line is nearest to, `[rows, columns]`.

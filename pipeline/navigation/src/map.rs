@@ -392,6 +392,14 @@ impl TravelMap {
         self.node(row.min(rows - 1), col.min(cols - 1))
     }
 
+    /// The point at an easting and a northing in the raster's coordinates, m.
+    #[inline]
+    pub fn point_at(&self, [x_m, y_m]: [f64; 2]) -> Point {
+        let geometry = &self.heights.geometry;
+        let [dx, dy] = geometry.cell;
+        [(geometry.y(0) - y_m) / dy, (x_m - geometry.x(0)) / dx]
+    }
+
     /// Whether a point lies between the outer nodes, where heights are defined.
     pub fn holds(&self, [row, col]: Point) -> bool {
         let [rows, cols] = self.shape();

@@ -27,7 +27,7 @@ super::table! {
         lost: i64 ["1"],
         /// Distance between neighbouring slots; null for custom slots.
         spacing_m: f64 ["m"],
-        /// `arrived`, `stuck`, `timeout`, `team_lost` or `no_path`.
+        /// `arrived`, `stuck`, `timeout`, or `no_room` where the team found no room at the start.
         outcome: String [""],
         /// Member that was stuck; null otherwise.
         stuck_member: Option<i64> [""],

@@ -1,0 +1,25 @@
+//! Teams that keep a formation along a route (the thesis, chapter 4).
+//!
+//! A [`shape::Formation`] has a slot for each member. At every waypoint of the route [`placement`] gives each slot a target that fits the
+//! ground; [`crowd`] moves the members from target to target, step by step and without collisions; [`speeds`] keeps their distances.
+//! A [`Team`] puts these together, with losses of members, and measures how well the formation holds.
+//!
+//! Positions are eastings and northings in the coordinates of the map's heights, m.
+
+pub mod crowd;
+mod detour;
+pub mod draws;
+pub mod footing;
+pub mod metrics;
+pub mod obstacles;
+pub mod parameters;
+pub mod placement;
+mod plane;
+pub mod shape;
+pub mod speeds;
+pub mod team;
+
+pub use footing::TeamGround;
+pub use parameters::TeamParameters;
+pub use shape::{Formation, FormationError};
+pub use team::{Outcome, Team, TeamError};

@@ -1,0 +1,307 @@
+//! Formations: slots at fixed offsets from one another, and the members that hold them (the thesis, section 4.1 and Algorithm 9).
+//!
+//! A slot lies behind its predecessor by its depth and to the right of it by its width, m; slot 1 has no predecessor and leads. Lower ids
+//! lie nearer the front and have priority. A slot may hold a team with a formation of its own, whose leader takes the slot.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+#[cfg(test)]
+mod tests;
+
+/// Most members of a team.
+const MEMBERS_MAX: usize = 1000;
+
+/// A slot as a study writes it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SlotParameters {
+    /// Number, from 1; unique in the formation.
+    pub id: u32,
+    /// Id of the slot that it follows, smaller than its own; absent for slot 1 alone.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub predecessor: Option<u32>,
+    /// Distance behind the predecessor, m.
+    #[serde(default)]
+    pub depth_m: f64,
+    /// Distance to the right of the predecessor, m.
+    #[serde(default)]
+    pub width_m: f64,
+    /// Slots of a team that holds this one, with ids from 1; its leader stands here.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub team: Vec<SlotParameters>,
+}
+
+/// A formation by name.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Pattern {
+    /// One behind the other.
+    #[default]
+    Column,
+    /// Side by side, alternately to the left and to the right of the leader.
+    Line,
+    /// Back from the leader on both sides.
+    Wedge,
+}
+
+impl Pattern {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Column, Self::Line, Self::Wedge];
+
+    /// Name in studies and tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Column => "column",
+            Self::Line => "line",
+            Self::Wedge => "wedge",
+        }
+    }
+
+    /// The slots of a team of that size. With four members they are those of the thesis.
+    pub fn slots(self, members: u32, spacing_m: f64) -> Vec<SlotParameters> {
+        let slot = |id: u32| {
+            // Slot 2 goes to the left, 3 to the right, each later one behind the one two before.
+            let (predecessor, side) = match self {
+                Self::Column => (id - 1, 0.0),
+                Self::Line | Self::Wedge if id == 2 => (1, -1.0),
+                Self::Line | Self::Wedge if id == 3 => (1, 1.0),
+                Self::Line | Self::Wedge => (id - 2, if id.is_multiple_of(2) { -1.0 } else { 1.0 }),
+            };
+            let depth_m = if self == Self::Line { 0.0 } else { spacing_m };
+            let first = id == 1;
+            SlotParameters {
+                id,
+                predecessor: (!first).then_some(predecessor),
+                depth_m: if first { 0.0 } else { depth_m },
+                width_m: if first { 0.0 } else { side * spacing_m },
+                team: Vec::new(),
+            }
+        };
+        (1..=members).map(slot).collect()
+    }
+}
+
+/// A formation that cannot be taken up. Messages read after "failed to".
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum FormationError {
+    /// No slot 1.
+    #[error("form a team: no slot has the id 1, which leads")]
+    Leaderless,
+    /// Two slots with the same id.
+    #[error("form a team: two slots have the id {0}; ids are unique")]
+    Duplicate(u32),
+    /// A slot other than the first without a predecessor.
+    #[error("form a team: slot {0} has no predecessor; every slot but 1 follows one with a smaller id")]
+    Unled(u32),
+    /// A predecessor that is not smaller, or not there.
+    #[error("form a team: slot {slot} follows slot {predecessor}; it must follow a slot with a smaller id that exists")]
+    Predecessor {
+        /// Slot.
+        slot: u32,
+        /// What it follows.
+        predecessor: u32,
+    },
+    /// Too many slots.
+    #[error("form a team: {0} slots are too many; a team has at most {MEMBERS_MAX} members")]
+    Size(usize),
+    /// A leader that follows another slot.
+    #[error("form a team: slot 1 leads, but follows slot {0}")]
+    Led(u32),
+    /// An offset that is not finite.
+    #[error("form a team: the offset of slot {0} is not finite")]
+    Offset(u32),
+    /// A slot nearer the front than one of higher priority.
+    #[error(
+        "form a team: slot {slot} lies {depth_m} m behind the leader, nearer the front than slot {ahead} at {ahead_m} m; lower ids lie nearer the front"
+    )]
+    Order {
+        /// Slot.
+        slot: u32,
+        /// Its distance behind the leader, m.
+        depth_m: f64,
+        /// Slot of a smaller number.
+        ahead: u32,
+        /// Its distance behind the leader, m.
+        ahead_m: f64,
+    },
+    /// Two slots too near each other.
+    #[error("form a team: slots {first} and {second} lie {distance_m:.3} m apart; members of radius {radius_m} m need at least {} m", 2.0 * radius_m)]
+    Crowded {
+        /// Slot.
+        first: u32,
+        /// Another slot.
+        second: u32,
+        /// Distance between them, m.
+        distance_m: f64,
+        /// Radius of a member, m.
+        radius_m: f64,
+    },
+    /// A member that holds no slot.
+    #[error("rearrange the team: member {0} is not in it, or was lost before")]
+    NotThere(u32),
+    /// No member is left.
+    #[error("rearrange the team: its last member is lost")]
+    TeamLost,
+}
+
+/// A checked slot.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Slot {
+    /// Number.
+    pub id: u32,
+    /// Position of the predecessor among the slots; none for the leader.
+    pub predecessor: Option<usize>,
+    /// Distance behind the predecessor and to the right of it, m.
+    pub offset_m: [f64; 2],
+    /// Distance behind the leader and to the right of it, m.
+    pub from_leader_m: [f64; 2],
+    /// Member that holds it, from 1.
+    pub member: u32,
+}
+
+/// Slots in order of priority, each held by a member.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Formation {
+    slots: Vec<Slot>,
+}
+
+impl Formation {
+    /// A formation of these slots for members of that radius; the k-th slot by id is held by member k. Teams within it are taken apart: their
+    /// members get the ids after those of the formation, and so a lower priority.
+    ///
+    /// # Errors
+    /// See [`FormationError`].
+    pub fn new(slots: &[SlotParameters], radius_m: f64) -> Result<Self, FormationError> {
+        let mut slots = flattened(slots)?;
+        if slots.len() > MEMBERS_MAX {
+            return Err(FormationError::Size(slots.len()));
+        }
+        slots.iter_mut().zip(1..).for_each(|(slot, member)| slot.member = member);
+        check_room(&slots, radius_m)?;
+        Ok(Self { slots })
+    }
+
+    /// Slots in order of priority.
+    pub fn slots(&self) -> &[Slot] {
+        &self.slots
+    }
+
+    /// Position of the slot that a member holds.
+    pub fn slot_of(&self, member: u32) -> Option<usize> {
+        self.slots.iter().position(|slot| slot.member == member)
+    }
+
+    /// Extent to the sides and backwards, m: `[leftmost, rightmost, rearmost]` from the leader.
+    pub fn extent_m(&self) -> [f64; 3] {
+        let fold = |axis: usize, from: f64, end: fn(f64, f64) -> f64| {
+            self.slots.iter().map(|slot| slot.from_leader_m[axis]).fold(from, end)
+        };
+        [fold(1, 0.0, f64::min), fold(1, 0.0, f64::max), fold(0, 0.0, f64::max)]
+    }
+
+    /// Fills the slot of a lost member (the thesis, Algorithm 9): the lowest-numbered follower moves up, its own lowest-numbered follower after
+    /// it, until one has none, whose slot disappears. Other followers keep their slots. Returns the members that moved, with their new slots.
+    ///
+    /// # Errors
+    /// A member that holds no slot; the last member.
+    pub fn lose(&mut self, member: u32) -> Result<Vec<(u32, u32)>, FormationError> {
+        let mut empty = self.slot_of(member).ok_or(FormationError::NotThere(member))?;
+        if self.slots.len() == 1 {
+            return Err(FormationError::TeamLost);
+        }
+        let mut moved = Vec::new();
+        while let Some(next) = self.slots.iter().position(|slot| slot.predecessor == Some(empty)) {
+            self.slots[empty].member = self.slots[next].member;
+            moved.push((self.slots[empty].member, self.slots[empty].id));
+            empty = next;
+        }
+        self.slots.remove(empty);
+        for slot in &mut self.slots {
+            slot.predecessor = slot.predecessor.map(|at| if at > empty { at - 1 } else { at });
+        }
+        Ok(moved)
+    }
+}
+
+/// The slots with those of the teams within them. The leader of such a team stands in the slot.
+fn flattened(slots: &[SlotParameters]) -> Result<Vec<Slot>, FormationError> {
+    let mut slots: Vec<&SlotParameters> = slots.iter().collect();
+    slots.sort_by_key(|slot| slot.id);
+    let mut all = of_one_level(&slots)?;
+    for (at, slot) in slots.iter().enumerate().filter(|(_, slot)| !slot.team.is_empty()) {
+        let (team, base) = (flattened(&slot.team)?, all.len() - 1);
+        let (last_id, leader_m) = (all.iter().map(|slot| slot.id).max().unwrap_or(0), all[at].from_leader_m);
+        all.extend(team.iter().skip(1).map(|member| Slot {
+            id: last_id.saturating_add(member.id - 1),
+            predecessor: member.predecessor.map(|k| if k == 0 { at } else { base + k }),
+            from_leader_m: [0, 1].map(|axis| leader_m[axis] + member.from_leader_m[axis]),
+            ..*member
+        }));
+    }
+    Ok(all)
+}
+
+/// Slots in order of their ids, without the teams within them.
+fn of_one_level(slots: &[&SlotParameters]) -> Result<Vec<Slot>, FormationError> {
+    let mut checked: Vec<Slot> = Vec::with_capacity(slots.len());
+    for slot in slots {
+        checked.push(placed(slot, &checked)?);
+    }
+    if checked.first().is_none_or(|slot| slot.id != 1) {
+        return Err(FormationError::Leaderless);
+    }
+    check_order(&checked)?;
+    Ok(checked)
+}
+
+/// A slot behind those that were placed before it.
+fn placed(slot: &SlotParameters, before: &[Slot]) -> Result<Slot, FormationError> {
+    let id = slot.id;
+    if before.iter().any(|other| other.id == id) {
+        return Err(FormationError::Duplicate(id));
+    }
+    if !(slot.depth_m.is_finite() && slot.width_m.is_finite()) {
+        return Err(FormationError::Offset(id));
+    }
+    let offset_m = [slot.depth_m, slot.width_m];
+    let (predecessor, from_leader_m) = match (id, slot.predecessor) {
+        (0, _) => return Err(FormationError::Leaderless),
+        (1, None) => (None, [0.0; 2]),
+        (1, Some(other)) => return Err(FormationError::Led(other)),
+        (_, None) => return Err(FormationError::Unled(id)),
+        (_, Some(predecessor)) => {
+            let at = before.iter().position(|other| other.id == predecessor);
+            let at = at.ok_or(FormationError::Predecessor { slot: id, predecessor })?;
+            (Some(at), [0, 1].map(|axis| before[at].from_leader_m[axis] + offset_m[axis]))
+        }
+    };
+    Ok(Slot { id, predecessor, offset_m, from_leader_m, member: 0 })
+}
+
+/// Lower numbers stand nearer the front.
+fn check_order(slots: &[Slot]) -> Result<(), FormationError> {
+    let behind = |pair: &[Slot]| pair[1].from_leader_m[0] < pair[0].from_leader_m[0];
+    match slots.windows(2).find(|pair| behind(pair)) {
+        None => Ok(()),
+        Some(pair) => Err(FormationError::Order {
+            slot: pair[1].id,
+            depth_m: pair[1].from_leader_m[0],
+            ahead: pair[0].id,
+            ahead_m: pair[0].from_leader_m[0],
+        }),
+    }
+}
+
+fn check_room(slots: &[Slot], radius_m: f64) -> Result<(), FormationError> {
+    for (k, first) in slots.iter().enumerate() {
+        for second in &slots[k + 1..] {
+            let [dx, dy] = [0, 1].map(|axis| first.from_leader_m[axis] - second.from_leader_m[axis]);
+            let distance_m = (dx * dx + dy * dy).sqrt();
+            if distance_m < 2.0 * radius_m {
+                return Err(FormationError::Crowded { first: first.id, second: second.id, distance_m, radius_m });
+            }
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,484 @@
+//! A team on its way: formation, placement, movement, speeds and losses together.
+
+use super::crowd::{Crowd, Motion, Phase};
+use super::footing::{Footing, TeamGround};
+use super::metrics::{Metrics, errors_m};
+use super::parameters::{Loss, TeamParameters};
+use super::placement::{Disc, Placement, Placer, heading};
+use super::plane::{Vector, add, distance, length, scale, sub};
+use super::shape::Formation;
+use sastrugi_schemas::ParameterError;
+
+#[cfg(test)]
+mod tests;
+
+/// Time between two events of one kind of a member below which only the first is told, s.
+const EVENT_GAP_S: f64 = 1.0;
+/// Time limit where none is stated: so many times that of the route at mean speed.
+const TIME_FACTOR: f64 = 10.0;
+/// And so much more, s.
+const TIME_MORE_S: f64 = 600.0;
+/// Cells around a place at the start in which a free one is looked for, at most.
+const SEARCH_CELLS: f64 = 100.0;
+
+/// Why a team cannot set out. Messages read after "failed to".
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum TeamError {
+    /// A parameter out of range.
+    #[error(transparent)]
+    Parameter(#[from] ParameterError),
+    /// A route that leads nowhere.
+    #[error("lead a team along a route without two waypoints apart")]
+    Route,
+    /// A member without a free place at the start.
+    #[error(
+        "place member {member} near ({:.2}, {:.2}), at the start of the route: no free ground there has room for a disc of radius {radius_m} m",
+        position_m[0], position_m[1]
+    )]
+    NoRoom {
+        /// Member, from 1.
+        member: u32,
+        /// Its place, m.
+        position_m: Vector,
+        /// Radius of a member, m.
+        radius_m: f64,
+    },
+}
+
+/// How a run ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outcome {
+    /// All members that are left are at their last targets.
+    Arrived,
+    /// No member comes nearer to its target; this one has not for longest.
+    Stuck {
+        /// Member, from 1.
+        member: u32,
+    },
+    /// Out of time.
+    Timeout,
+}
+
+impl Outcome {
+    /// Name in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Arrived => "arrived",
+            Self::Stuck { .. } => "stuck",
+            Self::Timeout => "timeout",
+        }
+    }
+}
+
+/// Something that happened.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Event {
+    /// Time, s.
+    pub time_s: f64,
+    /// Member, from 1; `None` for the team as a whole.
+    pub member: Option<u32>,
+    /// What.
+    pub kind: EventKind,
+}
+
+/// Kinds of events.
+#[derive(Clone, Debug, PartialEq)]
+pub enum EventKind {
+    /// The clock starts.
+    Start,
+    /// A member begins to wait.
+    Wait,
+    /// A member begins to move in another direction than towards its target.
+    Dodge,
+    /// A member is lost.
+    Lost,
+    /// A member takes a slot.
+    Rearranged {
+        /// Id of the slot.
+        slot: u32,
+    },
+    /// The leader makes for a waypoint with too little room for the formation.
+    Squeezed {
+        /// Number of the waypoint, from 0.
+        waypoint: usize,
+    },
+    /// The route was changed.
+    Replanned,
+    /// A member is at its last target.
+    Arrived,
+    /// The run is over.
+    End(Outcome),
+}
+
+/// Where a member is and how well it keeps its place.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sample {
+    /// Position, m.
+    pub position_m: Vector,
+    /// Direction to its target.
+    pub heading: Vector,
+    /// Velocity over the last step, m/s.
+    pub velocity_m_s: Vector,
+    /// Id of its slot; `None` once it is lost.
+    pub slot: Option<u32>,
+    /// Target that it makes for, m.
+    pub target_m: Vector,
+    /// Depth and width error, m; `None` for the leader and for lost members.
+    pub errors_m: Option<[f64; 2]>,
+    /// What it does.
+    pub phase: Phase,
+}
+
+/// The formation's box from a time on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TimedBox {
+    /// Time, s.
+    pub time_s: f64,
+    /// Corners: front left, front right, rear right, rear left, m.
+    pub corners_m: [Vector; 4],
+    /// Whether there is too little room for the formation.
+    pub squeezed: bool,
+}
+
+/// A team on its way along a route.
+#[derive(Clone, Debug)]
+pub struct Team<'a> {
+    ground: &'a TeamGround<'a>,
+    parameters: TeamParameters,
+    formation: Formation,
+    route_m: Vec<Vector>,
+    placements: Vec<Placement>,
+    crowd: Crowd<'a>,
+    /// Losses to come, the next one last.
+    losses: Vec<Loss>,
+    metrics: Metrics,
+    events: Vec<Event>,
+    boxes: Vec<TimedBox>,
+    /// Time of the last event of waiting and of dodging of each member, s.
+    told_s: Vec<[f64; 2]>,
+    time_max_s: f64,
+    outcome: Option<Outcome>,
+}
+
+impl<'a> Team<'a> {
+    /// A team at the start of a route, in m; members are placed as at any waypoint. Costs and clearance of the ground count for detours alone.
+    ///
+    /// # Errors
+    /// Parameters out of range, a route without a length, or no room at its start.
+    pub fn new(ground: &'a TeamGround<'a>, parameters: &TeamParameters, route_m: &[Vector]) -> Result<Self, TeamError> {
+        parameters.check()?;
+        let formation = parameters.formation()?;
+        let route_m = divided(route_m, parameters.leg_max_m())?;
+        let route_length_m: f64 = route_m.windows(2).map(|pair| distance(pair[0], pair[1])).sum();
+        let footing = Footing::new(ground, &route_m);
+        let placements = placer(&footing, &formation, &route_m, parameters, &[]).all();
+        let starts_m = starts(&footing, &formation, placements.first().ok_or(TeamError::Route)?, parameters.radius_m)?;
+        let members = formation.slots().len();
+        let targets_m = (0..members).map(|slot| targets(&placements, slot)).collect();
+        let mut losses = parameters.losses.clone();
+        losses.sort_by(|a, b| b.time_s.total_cmp(&a.time_s));
+        let limit_s = TIME_FACTOR * route_length_m / parameters.speed_m_s + TIME_MORE_S;
+        let (speed_m_s, obstacles) = (parameters.speed_m_s, parameters.obstacles.clone());
+        let mut team = Self {
+            crowd: Crowd::new(footing, parameters.crowd(), &starts_m, targets_m, speed_m_s, obstacles),
+            ground,
+            formation,
+            route_m,
+            placements,
+            losses,
+            metrics: Metrics::of(members),
+            events: Vec::new(),
+            boxes: Vec::new(),
+            told_s: vec![[f64::NEG_INFINITY; 2]; members],
+            time_max_s: parameters.time_max_s.unwrap_or(limit_s),
+            parameters: parameters.clone(),
+            outcome: None,
+        };
+        team.tell(None, EventKind::Start);
+        team.enter_waypoint(0);
+        Ok(team)
+    }
+
+    /// Runs to the end; calls `sample` at the start, at every recorded instant and at the end if it is one.
+    ///
+    /// # Errors
+    /// A sampling rate that does not suit the steps.
+    pub fn run(&mut self, mut sample: impl FnMut(&Self)) -> Result<Outcome, TeamError> {
+        let every = self.parameters.sample_every()?;
+        sample(self);
+        for step in 1u64.. {
+            let outcome = self.step();
+            if step.is_multiple_of(every) {
+                sample(self);
+            }
+            if let Some(outcome) = outcome {
+                return Ok(outcome);
+            }
+        }
+        Ok(Outcome::Timeout)
+    }
+
+    /// One step; the outcome once the run is over.
+    pub fn step(&mut self) -> Option<Outcome> {
+        if self.outcome.is_some() {
+            return self.outcome;
+        }
+        self.lose_due();
+        self.tune_speeds();
+        let before: Vec<Motion> = self.crowd.motions().to_vec();
+        let stuck = self.crowd.step(&self.order());
+        self.note(&before);
+        self.outcome = self.ended(stuck);
+        if let Some(outcome) = self.outcome {
+            self.tell(None, EventKind::End(outcome));
+        }
+        self.outcome
+    }
+
+    /// Leads the team along another route from where it is; the first waypoint is where its leader is to begin.
+    ///
+    /// # Errors
+    /// A route without a length.
+    pub fn reroute(&mut self, route_m: &[Vector]) -> Result<(), TeamError> {
+        self.route_m = divided(route_m, self.parameters.leg_max_m())?;
+        self.metrics.replans += 1;
+        self.tell(None, EventKind::Replanned);
+        self.place_anew(|slot, _| usize::from(slot == 0));
+        Ok(())
+    }
+
+    /// Time since the start, s.
+    pub fn time_s(&self) -> f64 {
+        self.crowd.time_s()
+    }
+
+    /// How the members move, the first member first.
+    pub fn motions(&self) -> &[Motion] {
+        self.crowd.motions()
+    }
+
+    /// The formation as it is now.
+    pub fn formation(&self) -> &Formation {
+        &self.formation
+    }
+
+    /// Waypoints with the targets at each, m.
+    pub fn placements(&self) -> (&[Vector], &[Placement]) {
+        (&self.route_m, &self.placements)
+    }
+
+    /// Figures so far.
+    pub fn metrics(&self) -> &Metrics {
+        &self.metrics
+    }
+
+    /// Events so far, in order of time.
+    pub fn events(&self) -> &[Event] {
+        &self.events
+    }
+
+    /// Boxes of the formation so far, in order of time.
+    pub fn boxes(&self) -> &[TimedBox] {
+        &self.boxes
+    }
+
+    /// Members as they are now, the first member first.
+    pub fn samples(&self) -> Vec<Sample> {
+        let sample = |(k, motion): (usize, &Motion)| {
+            let slot = self.formation.slot_of(k as u32 + 1);
+            Sample {
+                position_m: motion.position_m,
+                heading: motion.heading,
+                velocity_m_s: scale(motion.moved_m, 1.0 / self.parameters.step_s),
+                slot: slot.map(|at| self.formation.slots()[at].id),
+                target_m: self.crowd.target_m(k),
+                errors_m: slot.and_then(|at| self.errors_m(at)),
+                phase: motion.phase,
+            }
+        };
+        self.crowd.motions().iter().enumerate().map(sample).collect()
+    }
+
+    /// Members in order of priority.
+    fn order(&self) -> Vec<usize> {
+        self.formation.slots().iter().map(|slot| slot.member as usize - 1).collect()
+    }
+
+    fn motion_in(&self, slot: usize) -> &Motion {
+        &self.crowd.motions()[self.formation.slots()[slot].member as usize - 1]
+    }
+
+    /// Direction of the leg of the route that the member in a slot is on.
+    fn forward(&self, slot: usize) -> Vector {
+        heading(&self.route_m, self.motion_in(slot).next.min(self.route_m.len() - 1).saturating_sub(1))
+    }
+
+    /// Depth and width error of the member in a slot, m; `None` for the leader.
+    fn errors_m(&self, slot: usize) -> Option<[f64; 2]> {
+        let predecessor = self.formation.slots()[slot].predecessor?;
+        let [ahead_m, own_m] = [predecessor, slot].map(|at| self.motion_in(at).position_m);
+        Some(errors_m(ahead_m, self.forward(predecessor), own_m, self.formation.slots()[slot].offset_m))
+    }
+
+    fn tune_speeds(&mut self) {
+        let position = |slot: usize| self.motion_in(slot).position_m;
+        let requests = self.parameters.bands().requests(&self.formation, position, |slot| self.forward(slot));
+        let (limits, order) = (self.parameters.speeds(), self.order());
+        for (request, member) in requests.into_iter().zip(order) {
+            let speed_m_s = self.crowd.motions()[member].speed_m_s;
+            self.crowd.set_speed(member, limits.tuned(speed_m_s, request, self.parameters.step_s));
+        }
+    }
+
+    /// Loses the members whose time has come.
+    fn lose_due(&mut self) {
+        while let Some(loss) = self.losses.pop_if(|loss| loss.time_s <= self.crowd.time_s()) {
+            self.crowd.lose(loss.member as usize - 1);
+            self.tell(Some(loss.member), EventKind::Lost);
+            // The losses were checked: each member is lost once, and one stays.
+            let moved = self.formation.lose(loss.member).unwrap_or_default();
+            self.place_anew(|_, motion| motion.next);
+            moved.iter().for_each(|&(member, slot)| self.tell(Some(member), EventKind::Rearranged { slot }));
+        }
+    }
+
+    /// Targets of the formation as it is now; `next` gives the waypoint that the member in a slot makes for.
+    fn place_anew(&mut self, next: impl Fn(usize, &Motion) -> usize) {
+        let lost = self.crowd.motions().iter().filter(|motion| motion.phase == Phase::Lost);
+        let discs: Vec<Disc> =
+            lost.map(|motion| Disc { position_m: motion.position_m, radius_m: self.parameters.radius_m }).collect();
+        let footing = Footing::new(self.ground, &self.route_m);
+        self.placements = placer(&footing, &self.formation, &self.route_m, &self.parameters, &discs).all();
+        let last = self.route_m.len() - 1;
+        for (slot, member) in self.order().into_iter().enumerate() {
+            let motion = self.crowd.motions()[member];
+            let targets_m = targets(&self.placements, slot);
+            // One that has arrived looks at its last target again.
+            let moved_m = distance(motion.position_m, targets_m[last]);
+            let at = next(slot, &motion);
+            let next = if at > last && moved_m > self.parameters.arrive_m { last } else { at };
+            self.crowd.redirect(member, targets_m, next);
+        }
+    }
+
+    /// Notes what happened in a step.
+    fn note(&mut self, before: &[Motion]) {
+        let leader = self.formation.slots()[0].member as usize - 1;
+        let after: Vec<Motion> = self.crowd.motions().to_vec();
+        for (k, (before, after)) in before.iter().zip(&after).enumerate() {
+            self.metrics.driven_m[k] += length(after.moved_m);
+            if after.phase == Phase::Waiting {
+                self.metrics.waits += 1;
+                self.tell_seldom(k, 0, before.phase != Phase::Waiting, EventKind::Wait);
+            }
+            if after.dodging {
+                self.metrics.dodges += 1;
+                self.tell_seldom(k, 1, !before.dodging, EventKind::Dodge);
+            }
+            if after.phase == Phase::Arrived && before.phase != Phase::Arrived {
+                self.tell(Some(k as u32 + 1), EventKind::Arrived);
+            }
+            if k == leader && after.next != before.next && after.next < self.placements.len() {
+                self.enter_waypoint(after.next);
+            }
+        }
+        for slot in 0..self.formation.slots().len() {
+            let member = self.formation.slots()[slot].member as usize - 1;
+            if let (true, Some(errors_m)) = (before[member].phase != Phase::Arrived, self.errors_m(slot)) {
+                self.metrics.followers[member].add(errors_m, self.parameters.spacing_m);
+            }
+        }
+        self.metrics.least_separation_m = self.metrics.least_separation_m.min(self.crowd.least_separation_m());
+        self.metrics.contacts += self.crowd.touched() as u64;
+    }
+
+    /// The leader makes for a waypoint.
+    fn enter_waypoint(&mut self, waypoint: usize) {
+        let Placement { corners_m, squeezed, .. } = self.placements[waypoint];
+        self.boxes.push(TimedBox { time_s: self.time_s(), corners_m, squeezed });
+        if squeezed {
+            self.metrics.squeezed += 1;
+            self.tell(None, EventKind::Squeezed { waypoint });
+        }
+    }
+
+    fn ended(&self, stuck: Option<usize>) -> Option<Outcome> {
+        let mut phases = self.crowd.motions().iter().map(|motion| motion.phase);
+        if phases.all(|phase| matches!(phase, Phase::Arrived | Phase::Lost)) {
+            return Some(Outcome::Arrived);
+        }
+        let out_of_time = (self.time_s() >= self.time_max_s).then_some(Outcome::Timeout);
+        stuck.map(|member| Outcome::Stuck { member: member as u32 + 1 }).or(out_of_time)
+    }
+
+    fn tell(&mut self, member: Option<u32>, kind: EventKind) {
+        self.events.push(Event { time_s: self.time_s(), member, kind });
+    }
+
+    /// Tells that a member begins to wait (0) or to dodge (1), unless it did so a moment ago.
+    fn tell_seldom(&mut self, member: usize, which: usize, begins: bool, kind: EventKind) {
+        let (now_s, last_s) = (self.time_s(), self.told_s[member][which]);
+        self.told_s[member][which] = now_s;
+        if begins && now_s - last_s > EVENT_GAP_S {
+            self.tell(Some(member as u32 + 1), kind);
+        }
+    }
+}
+
+fn placer<'a>(
+    footing: &'a Footing<'a>,
+    formation: &'a Formation,
+    route_m: &'a [Vector],
+    parameters: &TeamParameters,
+    discs: &'a [Disc],
+) -> Placer<'a> {
+    let TeamParameters { radius_m, margin_m, .. } = *parameters;
+    Placer { footing, formation, route_m, radius_m, margin_m, discs }
+}
+
+/// Targets of a slot at all waypoints, m.
+fn targets(placements: &[Placement], slot: usize) -> Vec<Vector> {
+    placements.iter().map(|placement| placement.targets_m[slot]).collect()
+}
+
+/// Places at the first waypoint, m; where there is no room, the nearest free nodes.
+fn starts(
+    footing: &Footing<'_>,
+    formation: &Formation,
+    first: &Placement,
+    radius_m: f64,
+) -> Result<Vec<Vector>, TeamError> {
+    let [left_m, right_m, depth_m] = formation.extent_m();
+    let [dx, dy] = footing.ground().map.cell_m();
+    let cells = libm::ceil((right_m - left_m + depth_m + 4.0 * radius_m) / dx.min(dy)).min(SEARCH_CELLS) as i32;
+    let mut starts_m: Vec<Vector> = Vec::new();
+    for (&place_m, member) in first.targets_m.iter().zip(1..) {
+        let apart = |point_m: Vector| starts_m.iter().all(|other| distance(point_m, *other) >= 2.0 * radius_m);
+        let in_place = Some(place_m).filter(|place_m| footing.holds(*place_m) && apart(*place_m));
+        let near = || footing.node_near(place_m, cells, apart).map(|node| footing.ground().map.position_m(node));
+        let start_m = in_place.or_else(near);
+        starts_m.push(start_m.ok_or(TeamError::NoRoom { member, position_m: place_m, radius_m })?);
+    }
+    Ok(starts_m)
+}
+
+/// A route with waypoints at most so far apart, without those that repeat the one before.
+fn divided(route_m: &[Vector], leg_max_m: f64) -> Result<Vec<Vector>, TeamError> {
+    let mut all: Vec<Vector> = Vec::new();
+    for &point_m in route_m {
+        let Some(&last_m) = all.last() else {
+            all.push(point_m);
+            continue;
+        };
+        let leg_m = distance(last_m, point_m);
+        if leg_m > 0.0 {
+            let count = libm::ceil(leg_m / leg_max_m).max(1.0) as usize;
+            all.extend((1..count).map(|k| add(last_m, scale(sub(point_m, last_m), k as f64 / count as f64))));
+            all.push(point_m);
+        }
+    }
+    match all.len() {
+        0 | 1 => Err(TeamError::Route),
+        _ => Ok(all),
+    }
+}
