@@ -102,3 +102,20 @@ fn val_refusals() {
         assert!(call.stderr.contains(words), "{}", call.stderr);
     }
 }
+
+#[test]
+fn val_a_team_follows_the_route() {
+    let folder = area();
+    let team = ["--formation", "wedge", "--team", "members=3", "--team", "spacing_m=4"];
+    let call = navigate(folder.path(), &[&team[..], &["-o", "release"]].concat());
+    assert_eq!(call.code, 0, "{}", call.stderr);
+    let runs = rows(&folder.path().join("release"), "formations");
+    assert_eq!(runs.len(), 1);
+    assert_eq!((runs[0]["members"].as_i64(), runs[0]["formation"].as_str()), (Some(3), Some("wedge")));
+    // A route alone has no room for a team.
+    let call = navigate(folder.path(), &[&team[..], &["-o", "route.svg"]].concat());
+    assert_eq!(call.code, 2);
+    assert!(call.stderr.contains("a team needs a folder"), "{}", call.stderr);
+    let call = navigate(folder.path(), &["--team", "members=3", "-o", "release"]);
+    assert_eq!(call.code, 2, "{}", call.stderr);
+}

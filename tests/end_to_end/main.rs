@@ -4,6 +4,7 @@
 
 mod machine;
 mod route;
+mod team;
 mod traverse;
 
 use sastrugi_tests::{area, rows, sastrugi_in, small_study, sums, write};

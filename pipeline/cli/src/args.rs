@@ -100,13 +100,15 @@ pub enum Verb {
         sastrugi traverse bar.tif --set-missions length_m=2 --set-missions border_m=0.5 \\\n    \
         --set-roughness closing_radius_m=0 --replicates 8 -o drive")]
     Traverse(Traverse),
-    /// Plan a route over one DEM: as GeoJSON, as a picture, or as a release with tables and report.
+    /// Plan a route over one DEM, alone or with a team in formation that follows it: as GeoJSON, as a picture, or as a release with tables,
+    /// recordings and report.
     #[command(
         after_help = "An output that ends in .geojson or .svg holds the route alone; any other is the folder of a release.\n\
         GeoJSON is written in the DEM's own coordinates.\n\n\
         Examples:\n  sastrugi navigate site.tif --start 12,30 --goal 240,180 -o route.svg\n  \
         sastrugi navigate site.tif --start 12,30 --goal 240,180 --vehicle husky_a200 --set cost=energy -o route.geojson\n  \
-        sastrugi navigate site.tif --start 12,30 --goal 240,180 --obstacles buildings.geojson -o routes"
+        sastrugi navigate site.tif --start 12,30 --goal 240,180 --obstacles buildings.geojson -o routes\n  \
+        sastrugi navigate site.tif --start 12,30 --goal 240,180 --formation wedge --team members=6 --team spacing_m=5 -o team"
     )]
     Navigate(Navigate),
     /// Take the traversal metrics from MCAP logs of any vehicle: ours, ROS 2 or Foxglove.
@@ -633,6 +635,12 @@ pub struct Navigate {
     /// A parameter of the route (see `kinds`), `name=value`.
     #[arg(long = "set", value_name = "K=V")]
     pub set: Vec<String>,
+    /// Formation of a team that follows the route: column, line or wedge, or custom with slots (see `kinds`). Needs `-o DIR`.
+    #[arg(long, value_name = "F")]
+    pub formation: Option<String>,
+    /// A parameter of the team (see `kinds`), `name=value`.
+    #[arg(long = "team", value_name = "K=V", requires = "formation")]
+    pub team: Vec<String>,
     /// Replace an existing release of this route even if it has fewer failed items than the new one.
     #[arg(long)]
     pub replace: bool,

@@ -32,7 +32,7 @@ pub enum Form {
 }
 
 /// Sections in the order in which they may refer to one another.
-pub const SECTIONS: [Section; 9] = [
+pub const SECTIONS: [Section; 10] = [
     Section {
         name: "dem",
         form: Form::Array,
@@ -88,6 +88,13 @@ pub const SECTIONS: [Section; 9] = [
         envelope: schema_of::<envelope::RouteItem>,
         kinds: jobs::route::kinds,
         add: jobs::route::add,
+    },
+    Section {
+        name: "navigate",
+        form: Form::Array,
+        envelope: schema_of::<envelope::NavigateItem>,
+        kinds: jobs::navigate::kinds,
+        add: jobs::navigate::add,
     },
     Section {
         name: hypotheses::SECTION,

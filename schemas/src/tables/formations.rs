@@ -57,13 +57,54 @@ super::table! {
         dodges: i64 ["1"],
         /// Waypoints with too little room for the formation, even compressed.
         squeezed: i64 ["1"],
+        /// Steps in which a moving obstacle touched a member.
+        obstacle_contacts: i64 ["1"],
         /// Searches of a new route on the way.
         replans: i64 ["1"],
         /// Recorded samples of each member.
         samples: i64 ["1"],
         /// Rate of the recorded samples.
         sample_rate_hz: f64 ["Hz"],
-        /// MCAP recording in the release.
-        path: String [""],
+        /// MCAP recording in the release; null where the team found no room at the start.
+        path: Option<String> [""],
+    }
+}
+
+impl FormationRow {
+    /// A row of a run that did not begin: no text, counts of 0, NaN for everything else.
+    pub fn without_run() -> Self {
+        Self {
+            terrain_id: String::new(),
+            run_id: String::new(),
+            group: None,
+            variant: None,
+            split: None,
+            route_id: String::new(),
+            stage_id: String::new(),
+            formation: String::new(),
+            members: 0,
+            lost: 0,
+            spacing_m: f64::NAN,
+            outcome: String::new(),
+            stuck_member: None,
+            time_s: f64::NAN,
+            route_length_m: f64::NAN,
+            path_length_m: f64::NAN,
+            depth_error_m: f64::NAN,
+            width_error_m: f64::NAN,
+            worst_depth_error_m: f64::NAN,
+            worst_width_error_m: f64::NAN,
+            in_range: f64::NAN,
+            tolerable: f64::NAN,
+            least_separation_m: f64::NAN,
+            waits: 0,
+            dodges: 0,
+            squeezed: 0,
+            obstacle_contacts: 0,
+            replans: 0,
+            samples: 0,
+            sample_rate_hz: f64::NAN,
+            path: None,
+        }
     }
 }

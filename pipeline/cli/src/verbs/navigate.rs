@@ -10,10 +10,14 @@ use sastrugi_stages::verbs::{numbers, parameters, traverse};
 use serde_json::{Value, json};
 use std::path::Path;
 
-/// Plans a route.
+/// Plans a route, and leads a team along it.
 pub fn navigate(args: &Navigate, common: &Common) -> Verdict {
     let mut search = json!({ "method": args.method });
     parameters::assign(&mut search, &args.set)?;
+    let team = |formation: &String| {
+        let mut team = json!({ "formation": formation });
+        parameters::assign(&mut team, &args.team).map(|()| team)
+    };
     let request = Request {
         dem: &args.dem,
         start: numbers("--start", &args.start)?,
@@ -21,6 +25,7 @@ pub fn navigate(args: &Navigate, common: &Common) -> Verdict {
         vehicle: args.vehicle.as_deref(),
         obstacles: &args.obstacles,
         route: search,
+        team: args.formation.as_ref().map(team).transpose()?,
     };
     let Place { output, work } = &args.place;
     if is_route_file(output) {

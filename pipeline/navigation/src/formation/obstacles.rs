@@ -16,7 +16,7 @@ pub struct MovingObstacle {
     pub points_m: Vec<Vector>,
     /// Speed, above 0, m/s.
     pub speed_m_s: f64,
-    /// Radius, 0 or above, m.
+    /// Radius, above 0, m.
     pub radius_m: f64,
     /// Time of its start, 0 or later, s.
     #[serde(default)]
@@ -30,7 +30,7 @@ impl MovingObstacle {
     /// The first one.
     pub fn check(&self) -> Result<(), ParameterError> {
         ParameterError::positive("speed_m_s", self.speed_m_s)?;
-        ParameterError::not_negative("radius_m", self.radius_m)?;
+        ParameterError::positive("radius_m", self.radius_m)?;
         ParameterError::not_negative("start_s", self.start_s)?;
         let finite = self.points_m.iter().flatten().all(|value| value.is_finite());
         match !self.points_m.is_empty() && finite {

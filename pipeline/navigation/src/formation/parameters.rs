@@ -156,6 +156,7 @@ impl TeamParameters {
     pub fn check(&self) -> Result<(), ParameterError> {
         let positive = [
             ("spacing_m", self.spacing_m),
+            ("radius_m", self.radius_m),
             ("speed_m_s", self.speed_m_s),
             ("speed_min_m_s", self.speed_min_m_s),
             ("speed_max_m_s", self.speed_max_m_s),
@@ -171,7 +172,6 @@ impl TeamParameters {
             Some(value) => ParameterError::positive(key, value).map(drop),
             None => Ok(()),
         })?;
-        ParameterError::not_negative("radius_m", self.radius_m)?;
         ParameterError::not_negative("margin_m", self.margin_m)?;
         self.check_speeds()?;
         if !(self.tolerance > 0.0 && self.tolerance < 0.5) {

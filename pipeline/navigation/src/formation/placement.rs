@@ -92,7 +92,7 @@ impl Placer<'_> {
         let centre_m = 0.0_f64.min(right_m - half_m).max(half_m - left_m);
         let middle_m = 0.5 * (leftmost_m + rightmost_m);
         let place = |[depth_m, width_m]: Vector| [depth_m * along, centre_m + (width_m - middle_m) * across];
-        let mut placed = Placed { placer: self, k, frame, targets_m: Vec::new(), squeezed: false };
+        let mut placed = Placed { placer: self, k, frame, targets_m: Vec::new(), pushed_m: 0.0, squeezed: false };
         self.formation.slots().iter().for_each(|slot| placed.add(place(slot.from_leader_m)));
         let edges = [centre_m - half_m, centre_m + half_m];
         let corner = |depth_m: f64, edge: usize| frame.point(depth_m * along, edges[edge]);
@@ -139,6 +139,8 @@ struct Placed<'a> {
     k: usize,
     frame: Frame,
     targets_m: Vec<Vector>,
+    /// Up to this distance behind the waypoint the route is taken, as far as targets were pushed back: depths grow with the ids.
+    pushed_m: f64,
     squeezed: bool,
 }
 
@@ -161,11 +163,20 @@ impl Placed<'_> {
     }
 
     /// The first clear point of the route from a depth on.
-    fn pushed_back(&self, depth_m: f64) -> Option<Vector> {
+    fn pushed_back(&mut self, depth_m: f64) -> Option<Vector> {
         let step_m = 0.25 * self.separation_m();
         // Each target takes at most twice the separation along the route.
         let count = 8 * (self.targets_m.len() + self.placer.discs.len() + 1);
-        (0..=count).map_while(|n| self.placer.behind(self.k, depth_m + n as f64 * step_m)).find(|p| self.is_clear(*p))
+        let from_m = Some(depth_m.max(self.pushed_m)).filter(|from_m| from_m.is_finite())?;
+        self.pushed_m = f64::INFINITY;
+        for back_m in (0..=count).map(|n| from_m + n as f64 * step_m) {
+            let point_m = self.placer.behind(self.k, back_m)?;
+            if self.is_clear(point_m) {
+                self.pushed_m = back_m;
+                return Some(point_m);
+            }
+        }
+        None
     }
 
     fn separation_m(&self) -> f64 {

@@ -6,6 +6,7 @@ pub mod fit;
 pub mod mask;
 pub mod matched;
 pub mod missions;
+pub mod navigate;
 pub mod original;
 pub mod rasters;
 pub mod roughness;

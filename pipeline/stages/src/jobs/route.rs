@@ -30,7 +30,7 @@ use std::sync::Arc;
 /// Name of the stage.
 pub const STAGE: &str = "route";
 /// The heights that were planned on, without data where a cell cannot be entered.
-const GROUND: &str = "ground.tif";
+pub const GROUND: &str = "ground.tif";
 /// The planned routes, for teams.
 const ROUTES: &str = "routes.json";
 /// The planned routes, for the release.
@@ -197,8 +197,15 @@ fn add_search(
         let parents = [field.item.clone()].into_iter().chain(masks).chain(search.cost_raster.clone()).collect();
         let job = RouteJob { search: Arc::clone(&search), terrain: terrain.clone(), field, word, streams };
         builder.node(Node { item: item.clone(), parents, inputs: Vec::new(), stream, job: Box::new(job) })?;
-        let (id, variant, count) = (search.id.clone(), search.variant.clone(), search.pairs.count());
-        all.push(Routes { search: id, variant, terrain: terrain.clone(), item, count });
+        let RouteSearch { id, variant, parameters, pairs, .. } = &*search;
+        all.push(Routes {
+            search: id.clone(),
+            variant: variant.clone(),
+            parameters: parameters.clone(),
+            terrain: terrain.clone(),
+            item,
+            count: pairs.count(),
+        });
     }
     Ok(all)
 }
@@ -214,11 +221,11 @@ struct RouteJob {
 }
 
 impl RouteSearch {
-    /// The ground of a terrain prepared for this search, with its heights.
+    /// The ground of a terrain prepared for this search, with its heights and the outer rings of its obstacles.
     ///
     /// # Errors
     /// Inputs that cannot be used.
-    fn site(&self, field: &Heightfield, work: &Work<'_>) -> Result<(Site, dem::Dem), JobError> {
+    fn site(&self, field: &Heightfield, work: &Work<'_>) -> Result<(Site, dem::Dem, Vec<Vec<[f64; 2]>>), JobError> {
         let read = dem::read(&work.parent(&field.item, HEIGHTS)?).map_err(input_error)?;
         let factors =
             self.cost_raster.as_ref().map(|item| dem::read(&work.parent(item, HEIGHTS)?).map_err(input_error));
@@ -229,7 +236,8 @@ impl RouteSearch {
             ..Given::default()
         };
         mask::add_marked(&mut given, &read.grid.geometry, &field.item, &self.obstacles, work)?;
-        Ok((Site::new(&read.grid, &self.parameters, &given)?, read))
+        let rings = given.polygons.iter().filter_map(|polygon| polygon.rings().first().cloned()).collect();
+        Ok((Site::new(&read.grid, &self.parameters, &given)?, read, rings))
     }
 
     /// Everything that decides the routes on a terrain.
@@ -256,6 +264,8 @@ impl RouteSearch {
 pub struct PlannedRoutes {
     /// Steepest climb and descent, degrees.
     pub limits_deg: [f64; 2],
+    /// Outer rings of the obstacles that are polygons, in the coordinates of the heights, m.
+    pub obstacles: Vec<Vec<[f64; 2]>>,
     /// The routes in order.
     pub routes: Vec<PlannedRoute>,
 }
@@ -438,7 +448,7 @@ impl Job for RouteJob {
     }
 
     fn run(&self, work: &Work<'_>) -> Result<Outcome, JobError> {
-        let (site, read) = self.search.site(&self.field, work)?;
+        let (site, read, obstacles) = self.search.site(&self.field, work)?;
         let place = Place::read(&work.parent(&self.field.item, PLACE)?, &read.grid.geometry)?;
         let pairs = self.pairs(&site, &place)?;
         let found = site.plan(&pairs)?;
@@ -455,7 +465,7 @@ impl Job for RouteJob {
         dem::write(&work.output(GROUND), &site.open_ground(), &read.info.crs, &Default::default())
             .map_err(JobError::io)?;
         let points = self.points(&routes);
-        let planned = PlannedRoutes { limits_deg: site.map().limits().degrees(), routes };
+        let planned = PlannedRoutes { limits_deg: site.map().limits().degrees(), obstacles, routes };
         work.write(ROUTES, &serde_json::to_vec(&planned).map_err(JobError::new)?)?;
         let mut products = vec![Product::internal(ROUTES), Product::internal(GROUND)];
         products.extend(self.write_lines(work, &read, &place, (&planned.routes, &rows))?);

@@ -2,6 +2,7 @@
 
 use crate::job::ItemRef;
 use sastrugi_mobility::missions::Mission;
+use sastrugi_navigation::parameters::RouteParameters;
 use serde_json::Value;
 
 /// Missions that a traverse can refer to.
@@ -56,6 +57,8 @@ pub struct Routes {
     pub search: String,
     /// Swept parameters of the search.
     pub variant: Option<String>,
+    /// Parameters of the search.
+    pub parameters: RouteParameters,
     /// Terrain.
     pub terrain: String,
     /// Item that plans them.

@@ -1,8 +1,9 @@
-//! `navigate`: a route over one DEM, as a file, a picture, or a small study of its own.
+//! `navigate`: a route over one DEM, as a file, a picture, or a small study of its own, which may lead a team along it.
 
 use super::reading::{Reading, read_as_it_is};
 use super::traverse::{Place as ReleasePlace, document, with};
 use crate::error::Error;
+use crate::jobs::navigate;
 use crate::jobs::route::STAGE;
 use crate::operations::dem::to_metres;
 use crate::operations::masks;
@@ -36,6 +37,8 @@ pub struct Request<'a> {
     pub obstacles: &'a [PathBuf],
     /// Parameters of the search.
     pub route: Value,
+    /// Parameters of the team that follows the route; needs a release.
+    pub team: Option<Value>,
 }
 
 /// Endings of what holds a route alone.
@@ -52,6 +55,10 @@ pub fn is_route_file(output: &Path) -> bool {
 /// # Errors
 /// Wrong parameters, a DEM or obstacles that cannot be used, no route, or a file that cannot be written.
 pub fn route(request: &Request<'_>, output: &Path) -> Result<Value, Error> {
+    if request.team.is_some() {
+        let message = format!("{}: a team needs a folder for its release; give `-o DIR`", output.display());
+        return Err(Error::Usage(message));
+    }
     let parameters: RouteParameters = read_parameters(&request.route)?;
     parameters.check()?;
     parameters.check_given(request.vehicle.is_some(), false)?;
@@ -159,7 +166,7 @@ impl Drawn<'_> {
     }
 }
 
-/// Plans a route over a DEM and writes a release with tables, GeoJSON and report.
+/// Plans a route over a DEM, leads a team along it where one is asked for, and writes a release with tables, GeoJSON, recordings and report.
 ///
 /// # Errors
 /// As [`crate::studies::run`]; also a DEM on which nothing can be planned.
@@ -178,11 +185,17 @@ pub fn release(
     if let Some(vehicle) = request.vehicle {
         search["vehicle"] = json!(vehicle);
     }
-    let sections = [("dem", json!({ "id": "dem", "file": dem })), (STAGE, with(search, &request.route)?)];
+    let team = |team: &Value| -> Result<_, Error> {
+        Ok((navigate::STAGE, with(json!({ "id": "team", "route": "route" }), team)?))
+    };
+    let team: Option<(&str, Value)> = request.team.as_ref().map(team).transpose()?;
+    let route = (STAGE, with(search, &request.route)?);
+    let sections = [("dem", json!({ "id": "dem", "file": dem })), route].into_iter().chain(team);
     let head = json!({ "name": "navigate", "seed": 0, "date": date });
     let text = document(&head, &json!({}), sections)?;
     let ReleasePlace { output, work, replace, limits } = *place;
-    let run = RunRequest { output, work, part: None, purpose: Some(STAGE), replace, limits };
+    let purpose = if request.team.is_some() { navigate::STAGE } else { STAGE };
+    let run = RunRequest { output, work, part: None, purpose: Some(purpose), replace, limits };
     run_text(&text, Path::new(""), &run, progress)
 }
 

@@ -57,14 +57,14 @@ pub fn traverse(request: &Request<'_>, place: &Place<'_>, progress: &dyn Progres
     run_text(&text, Path::new(""), &run, progress)
 }
 
-/// The text of a study: its head, its `[roughness]`, and one item of each section.
+/// The text of a study: its head, its `[roughness]`, and one item of each section given.
 ///
 /// # Errors
 /// Values that TOML does not have.
-pub(super) fn document<const N: usize>(
+pub(super) fn document<'a>(
     head: &Value,
     roughness: &Value,
-    sections: [(&str, Value); N],
+    sections: impl IntoIterator<Item = (&'a str, Value)>,
 ) -> Result<String, Error> {
     let mut document = DocumentMut::new();
     document["study"] = Item::Table(table(head)?);

@@ -1,0 +1,190 @@
+//! Studies of teams: runs along routes, their tables and recordings, losses and obstacles, the same bytes however they are made.
+
+use sastrugi_tests::{Row, area, differing, rows, sastrugi_in, sums, write};
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+const STUDY: &str = r#"
+[study]
+name = "teams"
+seed = 3
+date = "2026-01-01"
+
+[[terrain]]
+id = "hills"
+kind = "spheroids"
+preset = "rough"
+count = 2
+size_px = [160, 140]
+cell_m = 1.0
+
+[[route]]
+id = "ways"
+terrains = ["hills"]
+pairs = 2
+border_m = 20.0
+method = "roadmap"
+
+[[navigate]]
+id = "lossy"
+route = "ways"
+formation = "wedge"
+spacing_m = 5.0
+count = 2
+drawn_losses = 1
+drawn_obstacles = 2
+
+[[navigate]]
+id = "plain"
+route = "ways"
+spacing_m = 5.0
+sweep.formation = ["column", "line"]
+
+[[navigate]]
+id = "nested"
+route = "ways"
+formation = "custom"
+slots = [
+  { id = 1 },
+  { id = 2, predecessor = 1, depth_m = 8.0, width_m = 4.0, team = [{ id = 1 }, { id = 2, predecessor = 1, depth_m = 3.0 }] },
+]
+losses = [{ time_s = 20.0, member = 2 }]
+"#;
+
+fn number(row: &Row, column: &str) -> f64 {
+    row[column].as_f64().or(row[column].as_i64().map(|n| n as f64)).unwrap_or(f64::NAN)
+}
+
+fn text<'a>(row: &'a Row, column: &str) -> &'a str {
+    row[column].as_str().unwrap_or_default()
+}
+
+fn run(folder: &Path, study: &str, more: &[&str]) -> BTreeMap<String, String> {
+    write(folder, "study.toml", study);
+    let arguments: Vec<&str> =
+        ["run", "study.toml", "-o", "release", "--quiet"].into_iter().chain(more.iter().copied()).collect();
+    let call = sastrugi_in(folder, &arguments);
+    assert_eq!(call.code, 0, "{}", call.stderr);
+    sums(&folder.join("release"))
+}
+
+#[test]
+fn val_runs_have_rows_samples_events_and_recordings() {
+    let folder = area();
+    let release = folder.path().join("release");
+    let sums = run(folder.path(), STUDY, &[]);
+    let runs = rows(&release, "formations");
+    // Two terrains with two routes: two runs with losses, two formations, one nested team.
+    assert_eq!(runs.len(), 2 * 2 * (2 + 2 + 1));
+    let samples = rows(&release, "formation_samples");
+    let events = rows(&release, "formation_events");
+    let routes: BTreeSet<String> =
+        rows(&release, "routes").iter().map(|row| text(row, "route_id").to_owned()).collect();
+    for run in &runs {
+        let id = (text(run, "terrain_id"), text(run, "run_id"));
+        let of = |rows: &[Row]| {
+            rows.iter().filter(|row| (text(row, "terrain_id"), text(row, "run_id")) == id).cloned().collect::<Vec<_>>()
+        };
+        assert_eq!(text(run, "outcome"), "arrived", "{id:?}");
+        assert!(routes.contains(text(run, "route_id")));
+        assert!(sums.contains_key(text(run, "path")), "{}", text(run, "path"));
+        assert!(number(run, "least_separation_m") >= 1.0 - 1e-9);
+        assert_eq!(number(run, "obstacle_contacts"), 0.0);
+        let (own, told) = (of(&samples), of(&events));
+        assert_eq!(own.len() as f64, number(run, "samples") * number(run, "members"));
+        let kinds: Vec<&str> = told.iter().map(|row| text(row, "kind")).collect();
+        assert_eq!((kinds.first(), kinds.last()), (Some(&"start"), Some(&"end")));
+        let lost = kinds.iter().filter(|kind| **kind == "lost").count() as f64;
+        assert_eq!(lost, number(run, "lost"));
+        assert_eq!(lost, if text(run, "stage_id").starts_with("plain") { 0.0 } else { 1.0 });
+        let standing = own.iter().filter(|row| text(row, "state") == "lost").all(|row| row["slot"].is_null());
+        assert!(standing);
+    }
+    let formations: BTreeSet<&str> = runs.iter().map(|row| text(row, "formation")).collect();
+    assert_eq!(formations, ["column", "custom", "line", "wedge"].into());
+    // A custom formation has no one spacing.
+    assert!(runs.iter().all(|row| number(row, "spacing_m").is_nan() == (text(row, "formation") == "custom")));
+}
+
+#[test]
+fn val_draws_differ_from_run_to_run_and_stay() {
+    let folder = area();
+    run(folder.path(), STUDY, &[]);
+    let lost = |folder: &Path| -> BTreeMap<String, (String, f64)> {
+        let events = rows(&folder.join("release"), "formation_events");
+        let lost = events.iter().filter(|row| text(row, "kind") == "lost" && text(row, "run_id").starts_with("lossy"));
+        lost.map(|row| {
+            (
+                format!("{} {}", text(row, "terrain_id"), text(row, "run_id")),
+                (row["member"].to_string(), number(row, "time_s")),
+            )
+        })
+        .collect()
+    };
+    let first = lost(folder.path());
+    assert_eq!(first.len(), 8);
+    let times: BTreeSet<String> = first.values().map(|(_, time_s)| time_s.to_string()).collect();
+    assert!(times.len() > 4, "{times:?}");
+    // More runs change none of those before.
+    let more = area();
+    run(more.path(), &STUDY.replace("count = 2\ndrawn", "count = 3\ndrawn"), &[]);
+    let more = lost(more.path());
+    assert_eq!(more.len(), 12);
+    assert!(first.iter().all(|(id, one)| more.get(id) == Some(one)));
+}
+
+#[test]
+fn prop_a_release_of_teams_has_the_same_bytes() {
+    let (one, two) = (area(), area());
+    let [first, second] =
+        [(&one, "1"), (&two, "2")].map(|(folder, threads)| run(folder.path(), STUDY, &["--threads", threads]));
+    assert_eq!(differing(&first, &second), Vec::<String>::new());
+}
+
+#[test]
+fn val_bags_open_as_folders() {
+    let folder = area();
+    let sums = run(folder.path(), &STUDY.replace("date =", "mcap = \"ros2\"\ndate ="), &[]);
+    for file in ["plain-column-0001-01.mcap", "metadata.yaml"] {
+        let path = format!("mcap/hills-0001/plain-column-0001-01/{file}");
+        assert!(sums.contains_key(&path), "{path}");
+    }
+}
+
+#[test]
+fn val_a_team_without_room_has_a_row() {
+    let folder = area();
+    // Twenty discs of 50 m do not fit onto the map.
+    let losses = "spacing_m = 5.0\ncount = 2\ndrawn_losses = 1\ndrawn_obstacles = 2";
+    let study = STUDY.replace(losses, "spacing_m = 60.0\nradius_m = 25.0\nmembers = 20");
+    run(folder.path(), &study, &[]);
+    let runs = rows(&folder.path().join("release"), "formations");
+    let crowded: Vec<&Row> = runs.iter().filter(|row| text(row, "stage_id") == "lossy").collect();
+    assert!(!crowded.is_empty());
+    for row in crowded {
+        assert_eq!(text(row, "outcome"), "no_room");
+        assert!(row["path"].is_null() && number(row, "time_s").is_nan());
+    }
+}
+
+#[test]
+fn val_wrong_teams_are_refused_with_their_line() {
+    let cases = [
+        ("route = \"ways\"\nformation = \"wedge\"", "route = \"way\"\nformation = \"wedge\"", "did you mean \"ways\"?"),
+        ("formation = \"wedge\"", "formation = \"vee\"", "vee"),
+        ("formation = \"wedge\"", "formation = \"wedge\"\nradius_m = 4.0", "apart; members of radius 4 m need"),
+        ("count = 2\ndrawn", "count = 0\ndrawn", "`count` is 0"),
+        ("drawn_losses = 1", "drawn_losses = 4", "one must stay"),
+        ("member = 2 }", "member = 4 }", "member 4 is not in it"),
+        ("predecessor = 1, depth_m = 8.0", "predecessor = 3, depth_m = 8.0", "follows slot 3"),
+        ("drawn_obstacles = 2", "drawn_obstacle = 2", "drawn_obstacles"),
+        ("method = \"roadmap\"", "sweep.method = [\"roadmap\", \"grid\"]", "name one of its searches"),
+    ];
+    for (right, wrong, told) in cases {
+        let folder = area();
+        write(folder.path(), "study.toml", &STUDY.replacen(right, wrong, 1));
+        let call = sastrugi_in(folder.path(), &["plan", "study.toml"]);
+        assert_eq!(call.code, 2, "{wrong}: {}", call.stderr);
+        assert!(call.stderr.contains(told), "{wrong}: {}", call.stderr);
+    }
+}
