@@ -12,6 +12,7 @@ pub mod probability;
 pub mod published;
 pub mod releases;
 mod relief;
+pub mod routes;
 pub mod scoreboard;
 pub mod sensitivity;
 mod sql;
@@ -36,12 +37,13 @@ pub struct Question {
 }
 
 /// All questions, in the order of the page.
-pub const ALL: [Question; 12] = [
+pub const ALL: [Question; 13] = [
     failures::QUESTION,
     terrain::QUESTION,
     covariance::QUESTION,
     texture::QUESTION,
     scoreboard::QUESTION,
+    routes::QUESTION,
     missions::QUESTION,
     comparison::QUESTION,
     releases::QUESTION,
