@@ -1,5 +1,7 @@
 //! A release that was never made: three groups of terrains with missions, a measured DEM with two fits, a texture.
 
+mod navigation;
+
 use crate::ReportError;
 use crate::data::{Artifact, Data, Files, Study};
 use sastrugi_numeric::{Geometry, Grid, Stream, Streams, sums};
@@ -152,6 +154,7 @@ pub fn parts(per_group: usize, side: usize) -> (Data, Shelf) {
     variants(&mut data);
     replicates(&mut data);
     measured(&mut data, &mut shelf);
+    navigation::add(&mut data, &mut shelf);
     (data, shelf)
 }
 

@@ -156,7 +156,8 @@ fn figure(strip: &Strip, methods: &[Method], rows: Vec<Row>) -> Option<Figure> {
 
 fn draw_band(drawn: &mut Rows, y: f64, height: f64, band: Option<(f64, f64)>) {
     if let Some((Some(from), Some(to))) = band.map(|(low, high)| (drawn.x.clamped(low), drawn.x.clamped(high))) {
-        drawn.svg.rect((from, y - 0.5 * height), (to - from, height), Paint::Muted, 0.22);
+        // A single published map is a line.
+        drawn.svg.rect((from - 1.0, y - 0.5 * height), (to - from + 2.0, height), Paint::Muted, 0.22);
     }
 }
 

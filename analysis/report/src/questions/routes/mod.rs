@@ -1,7 +1,7 @@
 //! How good the routes are: vertices, costs and effort by group of terrains and method, ratios to a reference over common pairs, maps.
 
 mod lanes;
-mod maps;
+pub mod maps;
 pub mod methods;
 mod ratios;
 
