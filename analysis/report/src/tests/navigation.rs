@@ -130,7 +130,7 @@ fn val_recovery_is_when_the_team_is_back_and_stays() {
     assert_eq!(found.len(), 18);
     for row in &found {
         assert_eq!((row[3].as_f64(), row[4].as_i64(), row[5].as_str()), (Some(30.0), Some(3), Some("yes")));
-        // 3 (1 - t / 8) + 0.2 sin(0.3 (t + 30) + 3) is 0.94 m at 6 s, 0.56 m at 7 s; samples are 1 s apart.
+        // 3 (1 - t / 8) + 0.2 sin(0.3 (t + 30) + 3) is 0.94 m at 6 s, 0.57 m at 7 s; samples are 1 s apart.
         assert_eq!(row[6].as_f64(), Some(7.0));
         assert_eq!(row[8], "member 4 takes slot 3");
     }
