@@ -180,11 +180,11 @@ pub fn count(n: usize) -> Cell {
     i64::try_from(n).map_or(Cell::Null, Cell::I64)
 }
 
-/// Text as a part of a file name and of an anchor: [a-z0-9.-], everything else a hyphen.
+/// Text as a part of a file name and of an anchor: [a-z0-9.-], everything else a hyphen; no two points in a row.
 pub fn slug(text: &str) -> String {
     let plain = |c: char| if c.is_ascii_alphanumeric() || c == '.' { c.to_ascii_lowercase() } else { '-' };
     let slug: String = text.chars().take(96).map(plain).collect();
-    slug.trim_matches(['-', '.']).to_owned()
+    slug.replace("..", "--").trim_matches(['-', '.']).to_owned()
 }
 
 fn value(cell: &Cell) -> Value {
@@ -220,6 +220,7 @@ mod tests {
     fn val_slugs_are_file_names() {
         assert_eq!(slug("psd-2.30"), "psd-2.30");
         assert_eq!(slug("../../etc/Passwd <x>"), "etc-passwd--x");
+        assert_eq!(slug("a/../b"), "a----b");
     }
 
     #[test]

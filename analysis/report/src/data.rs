@@ -9,9 +9,9 @@ use sastrugi_schemas::fit::FitFile;
 use sastrugi_schemas::manifest::FailedItem;
 use sastrugi_schemas::study::{HypothesisItem, RoughnessSection};
 use sastrugi_schemas::tables::{
-    CandidateCurveRow, CandidateRow, CovarianceRow, FitRow, HeightDistributionRow, LikelihoodProfileRow, LogRow,
-    MissionRow, ParameterRow, ProfilePsdRow, PsdRow, ReplicateRow, SampleRow, ScoreCovarianceRow, ScoreRow,
-    StructureRow, SurfaceRow, TerrainRow,
+    CandidateCurveRow, CandidateRow, CovarianceRow, FitRow, FormationEventRow, FormationRow, FormationSampleRow,
+    HeightDistributionRow, LikelihoodProfileRow, LogRow, MissionRow, ParameterRow, ProfilePsdRow, PsdRow, ReplicateRow,
+    RoutePointRow, RouteRow, SampleRow, ScoreCovarianceRow, ScoreRow, StructureRow, SurfaceRow, TerrainRow,
 };
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -23,6 +23,10 @@ pub trait Files {
     fn classes(&self, path: &str) -> Result<Option<Grid<u8>>, ReportError>;
     /// Recorded samples of every mission on a terrain.
     fn samples(&self, terrain_id: &str) -> Result<Vec<SampleRow>, ReportError>;
+    /// Points of every route.
+    fn route_points(&self) -> Result<Vec<RoutePointRow>, ReportError>;
+    /// Recorded samples of every team on a terrain.
+    fn formation_samples(&self, terrain_id: &str) -> Result<Vec<FormationSampleRow>, ReportError>;
     /// A fit file.
     fn fit(&self, path: &str) -> Result<Option<FitFile>, ReportError>;
 }
@@ -101,6 +105,12 @@ pub struct Data {
     pub missions: Vec<MissionRow>,
     /// Starts of missions that have several.
     pub replicates: Vec<ReplicateRow>,
+    /// Routes.
+    pub routes: Vec<RouteRow>,
+    /// Runs of teams.
+    pub formations: Vec<FormationRow>,
+    /// What happened on these runs.
+    pub formation_events: Vec<FormationEventRow>,
     /// Every number of every run.
     pub parameters: Vec<ParameterRow>,
     /// Hashes of decoded content by path, once the release is sealed.
@@ -291,7 +301,7 @@ fn run<'a>(runs: &[&'a str], mission: &MissionRow) -> Option<&'a str> {
 }
 
 /// The rows of one key in a table that is sorted by it.
-fn of_key<'a, R>(rows: &'a [R], key: impl Fn(&R) -> &str, id: &str) -> &'a [R] {
+pub fn of_key<'a, R>(rows: &'a [R], key: impl Fn(&R) -> &str, id: &str) -> &'a [R] {
     let from = rows.partition_point(|r| key(r) < id);
     &rows[from..][..rows[from..].partition_point(|r| key(r) <= id)]
 }
@@ -305,10 +315,10 @@ pub fn label(terrain: &TerrainRow) -> &str {
 type Of<'a> = (&'a str, Option<&'a str>);
 
 /// Sorting key of a label (numbers before words, numbers by value), and the label.
-type Natural = (Vec<(u64, String)>, String);
+pub type Natural = (Vec<(u64, String)>, String);
 
 /// A key under which `d2.3` < `d2.45` < `d10`: runs of digits and points compare by their value.
-fn natural(label: &str) -> Natural {
+pub fn natural(label: &str) -> Natural {
     let numeric = |c: &char| c.is_ascii_digit() || *c == '.';
     let chars: Vec<char> = label.chars().collect();
     let part = |run: &[char]| {

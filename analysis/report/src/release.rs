@@ -7,7 +7,7 @@ use sastrugi_schemas::Record;
 use sastrugi_schemas::fit::FitFile;
 use sastrugi_schemas::manifest::{self, Manifest};
 use sastrugi_schemas::study::{HypothesisItem, RoughnessSection};
-use sastrugi_schemas::tables::{LogRow, SampleRow};
+use sastrugi_schemas::tables::{FormationSampleRow, LogRow, RoutePointRow, SampleRow};
 use sastrugi_store::release::{MANIFEST, SHARD, TABLES};
 use sastrugi_store::{dem, digest, parquet};
 use std::fmt::Display;
@@ -15,7 +15,7 @@ use std::fs;
 use std::path::{Component, Path, PathBuf};
 
 /// Folders that hold data: what a page counts is the same before and after sealing.
-const DATA_FOLDERS: [&str; 7] = ["classes", "dem", "fit", "mcap", TABLES, "terrain", "texture"];
+const DATA_FOLDERS: [&str; 8] = ["classes", "dem", "fit", "mcap", "route", TABLES, "terrain", "texture"];
 const STUDY: &str = "study.toml";
 
 impl Data {
@@ -57,6 +57,9 @@ impl Data {
             scoreboard_covariance: release.rows()?,
             missions: release.rows()?,
             replicates: release.rows()?,
+            routes: release.rows()?,
+            formations: release.rows()?,
+            formation_events: release.rows()?,
             parameters: release.rows()?,
             contents,
             against: None,
@@ -109,8 +112,15 @@ impl Files for Release {
     }
 
     fn samples(&self, terrain_id: &str) -> Result<Vec<SampleRow>, ReportError> {
-        let path = format!("{TABLES}/{}/part-{terrain_id}.parquet", SampleRow::TABLE.name);
-        Ok(self.read(&path, parquet::read_table)?.unwrap_or_default())
+        self.rows_of(terrain_id)
+    }
+
+    fn route_points(&self) -> Result<Vec<RoutePointRow>, ReportError> {
+        self.rows()
+    }
+
+    fn formation_samples(&self, terrain_id: &str) -> Result<Vec<FormationSampleRow>, ReportError> {
+        self.rows_of(terrain_id)
     }
 
     fn fit(&self, path: &str) -> Result<Option<FitFile>, ReportError> {
@@ -136,6 +146,12 @@ impl Release {
     fn json<T: serde::de::DeserializeOwned>(&self, path: &str) -> Result<Option<T>, ReportError> {
         let parse = |text: String| serde_json::from_str(&text).map_err(|e| read_error(path, e));
         self.text(path)?.map(parse).transpose()
+    }
+
+    /// Rows of a terrain in a table with a file for each; none when the release does not have it.
+    fn rows_of<R: Record>(&self, terrain_id: &str) -> Result<Vec<R>, ReportError> {
+        let path = format!("{TABLES}/{}/part-{terrain_id}.parquet", R::TABLE.name);
+        Ok(self.read(&path, parquet::read_table)?.unwrap_or_default())
     }
 
     /// All rows of a table; none when the release does not have it.

@@ -150,11 +150,17 @@ fn key_figures(data: &Data) -> Vec<(String, String)> {
         (stage("dem"), "measured DEM"),
         (data.fits.len(), "covariance fit"),
         (stage("texture"), "texture"),
+        (data.routes.len(), "route"),
+        (data.formations.len(), "run of a team"),
         (data.missions.len(), "mission"),
         (recordings, "MCAP recording"),
         (data.artifacts.len(), "data file"),
     ];
-    let plural = |n: usize, what: &str| if n == 1 { what.to_owned() } else { format!("{what}s") };
+    let plural = |n: usize, what: &str| match what {
+        _ if n == 1 => what.to_owned(),
+        "run of a team" => "runs of teams".to_owned(),
+        _ => format!("{what}s"),
+    };
     let named = |(n, what): (usize, &str)| (set::count(n), plural(n, what));
     let mut figures: Vec<(String, String)> = counts.into_iter().filter(|(n, _)| *n > 0).map(named).collect();
     let bytes: u64 = data.artifacts.iter().map(|a| a.bytes).sum();

@@ -1,5 +1,7 @@
 //! Published figures as data, for comparison beside ours. They are never used to tune anything.
 
+pub mod bayrak;
+
 use crate::data::Data;
 use serde::Deserialize;
 use std::collections::BTreeMap;

@@ -5,18 +5,23 @@ pub mod comparison;
 pub mod covariance;
 mod curves;
 pub mod failures;
+pub mod formations;
 pub mod logs;
+pub mod losses;
 pub mod missions;
 mod outcome;
 pub mod probability;
 pub mod published;
 pub mod releases;
 mod relief;
+pub mod routes;
 pub mod scoreboard;
 pub mod sensitivity;
 mod sql;
+mod team;
 pub mod terrain;
 pub mod texture;
+pub mod thesis;
 
 use crate::ReportError;
 use crate::content::{Block, Section};
@@ -36,17 +41,21 @@ pub struct Question {
 }
 
 /// All questions, in the order of the page.
-pub const ALL: [Question; 12] = [
+pub const ALL: [Question; 16] = [
     failures::QUESTION,
     terrain::QUESTION,
     covariance::QUESTION,
     texture::QUESTION,
     scoreboard::QUESTION,
+    routes::QUESTION,
+    formations::QUESTION,
+    losses::QUESTION,
     missions::QUESTION,
     comparison::QUESTION,
     releases::QUESTION,
     logs::QUESTION,
     published::QUESTION,
+    thesis::QUESTION,
     probability::QUESTION,
     sensitivity::QUESTION,
 ];

@@ -1,12 +1,15 @@
 //! A release that was never made: three groups of terrains with missions, a measured DEM with two fits, a texture.
 
+mod navigation;
+
 use crate::ReportError;
 use crate::data::{Artifact, Data, Files, Study};
 use sastrugi_numeric::{Geometry, Grid, Stream, Streams, sums};
 use sastrugi_schemas::fit::FitFile;
 use sastrugi_schemas::tables::{
-    CandidateCurveRow, CandidateRow, CovarianceRow, FitRow, HeightDistributionRow, LikelihoodProfileRow, LogRow,
-    MissionRow, ProfilePsdRow, PsdRow, ReplicateRow, SampleRow, StructureRow, SurfaceRow, TerrainRow,
+    CandidateCurveRow, CandidateRow, CovarianceRow, FitRow, FormationSampleRow, HeightDistributionRow,
+    LikelihoodProfileRow, LogRow, MissionRow, ProfilePsdRow, PsdRow, ReplicateRow, RoutePointRow, SampleRow,
+    StructureRow, SurfaceRow, TerrainRow,
 };
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
@@ -18,6 +21,8 @@ pub struct Shelf {
     pub classes: BTreeMap<String, Grid<u8>>,
     pub samples: BTreeMap<String, Vec<SampleRow>>,
     pub fits: BTreeMap<String, FitFile>,
+    pub route_points: Vec<RoutePointRow>,
+    pub formation_samples: BTreeMap<String, Vec<FormationSampleRow>>,
 }
 
 impl Files for Shelf {
@@ -29,6 +34,12 @@ impl Files for Shelf {
     }
     fn samples(&self, terrain_id: &str) -> Result<Vec<SampleRow>, ReportError> {
         Ok(self.samples.get(terrain_id).cloned().unwrap_or_default())
+    }
+    fn route_points(&self) -> Result<Vec<RoutePointRow>, ReportError> {
+        Ok(self.route_points.clone())
+    }
+    fn formation_samples(&self, terrain_id: &str) -> Result<Vec<FormationSampleRow>, ReportError> {
+        Ok(self.formation_samples.get(terrain_id).cloned().unwrap_or_default())
     }
     fn fit(&self, path: &str) -> Result<Option<FitFile>, ReportError> {
         Ok(self.fits.get(path).cloned())
@@ -65,6 +76,9 @@ pub fn empty() -> Data {
         scoreboard_covariance: Vec::new(),
         missions: Vec::new(),
         replicates: Vec::new(),
+        routes: Vec::new(),
+        formations: Vec::new(),
+        formation_events: Vec::new(),
         parameters: Vec::new(),
         contents: BTreeMap::new(),
         against: None,
@@ -140,6 +154,7 @@ pub fn parts(per_group: usize, side: usize) -> (Data, Shelf) {
     variants(&mut data);
     replicates(&mut data);
     measured(&mut data, &mut shelf);
+    navigation::add(&mut data, &mut shelf);
     (data, shelf)
 }
 

@@ -1,6 +1,7 @@
 //! Structure of whole reports: nothing here compares with a stored page.
 
 pub mod made_up;
+mod navigation;
 mod on_disk;
 pub mod xml;
 
@@ -47,9 +48,18 @@ fn prop_a_full_report_is_sound() {
     let (files, summary) = report(&made_up::full(3, 48));
     assert_sound(&files);
     let page = &files["index.html"];
-    for section in
-        ["terrain", "covariance", "texture", "missions", "comparison", "published", "probability", "sensitivity"]
-    {
+    for section in [
+        "terrain",
+        "covariance",
+        "texture",
+        "routes",
+        "formations",
+        "losses",
+        "missions",
+        "comparison",
+        "published",
+        "probability",
+    ] {
         assert!(page.contains(&format!("<section id=\"{section}\">")), "{section}");
     }
     for figure in &summary.figures {
@@ -149,7 +159,12 @@ fn prop_an_empty_release_has_a_page_without_empty_boxes() {
 #[test]
 fn prop_any_part_may_be_absent() {
     type Take = (&'static str, fn(&mut Data));
-    let takes: [Take; 20] = [
+    let takes: [Take; 25] = [
+        ("routes", |d| d.routes.clear()),
+        ("paths", |d| d.routes.iter_mut().for_each(|r| (r.outcome, r.path) = ("no_path".into(), None))),
+        ("formations", |d| d.formations.clear()),
+        ("followers", |d| d.formations.iter_mut().for_each(|f| (f.members, f.depth_error_m) = (1, f64::NAN))),
+        ("events", |d| d.formation_events.clear()),
         ("missions", |d| d.missions.clear()),
         ("replicates", |d| d.replicates.clear()),
         ("plain missions", |d| d.missions.retain(|m| m.variant.is_some())),
@@ -193,6 +208,9 @@ fn prop_hostile_words_stay_words() {
     data.terrains.iter_mut().for_each(|t| t.terrain_id.push_str(hostile));
     data.missions.iter_mut().for_each(|m| m.outcome = hostile.into());
     data.fits.iter_mut().for_each(|f| f.model = hostile.into());
+    data.routes.iter_mut().for_each(|r| (r.stage_id, r.group) = (hostile.into(), Some(hostile.into())));
+    data.formations.iter_mut().for_each(|f| f.formation = hostile.into());
+    data.formation_events.iter_mut().for_each(|e| e.text = hostile.into());
     let (files, _) = report(&data);
     assert_sound(&files);
     assert!(files.keys().all(|name| !name.contains("..") && !name.contains('<')));
@@ -215,6 +233,11 @@ fn prop_unknown_figures_are_absent_not_nan() {
     data.likelihood_profile.iter_mut().for_each(|p| p.range_m = f64::NAN);
     data.structure.iter_mut().for_each(|s| s.value_m2 = f64::INFINITY);
     data.candidates.iter_mut().for_each(|c| (c.parameters, c.chi2) = ("not JSON".into(), Some(f64::NAN)));
+    data.routes.iter_mut().for_each(|r| (r.smoothed_cost_m, r.start_x_m, r.free_cells) = (f64::NAN, f64::INFINITY, 0));
+    for f in &mut data.formations {
+        (f.depth_error_m, f.spacing_m, f.time_s, f.least_separation_m) = (f64::NAN, f64::NAN, f64::INFINITY, f64::NAN);
+    }
+    data.formation_events.iter_mut().for_each(|e| e.time_s = f64::NAN);
     assert_sound(&report(&data).0);
 }
 

@@ -55,6 +55,13 @@ fn assembled(dest: &Path) -> ReleaseBuilder {
     write_table(&mut builder, TablePart::WHOLE, data.heights);
     write_table(&mut builder, TablePart::WHOLE, data.missions);
     write_table(&mut builder, TablePart::WHOLE, data.replicates);
+    write_table(&mut builder, TablePart::WHOLE, data.routes);
+    write_table(&mut builder, TablePart::WHOLE, shelf.route_points);
+    write_table(&mut builder, TablePart::WHOLE, data.formations);
+    write_table(&mut builder, TablePart::WHOLE, data.formation_events);
+    for (terrain, samples) in shelf.formation_samples {
+        write_table(&mut builder, &terrain, samples);
+    }
     for (terrain, samples) in shelf.samples {
         write_table(&mut builder, &terrain, samples);
     }
@@ -76,7 +83,9 @@ fn prop_a_release_reads_the_same_before_and_after_sealing() {
     let builder = assembled(&dest);
     let before = report(builder.staging());
     assert_sound(&before.0);
-    assert!(before.1.figures.iter().any(|f| f.starts_with("mission-")), "{:?}", before.1.figures);
+    for of in ["mission-", "routes-", "formation-tracks-", "loss-errors-"] {
+        assert!(before.1.figures.iter().any(|f| f.starts_with(of)), "{of}: {:?}", before.1.figures);
+    }
     assert!(before.0["index.html"].contains("<h1>A &lt;title&gt;</h1>"));
     builder.seal(&dest).unwrap();
     assert_eq!(before, report(&dest));

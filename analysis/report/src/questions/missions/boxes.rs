@@ -230,7 +230,8 @@ fn describe(samples: &[Sample], axis: &str) -> String {
     format!("Box plots of {axis}. {}.", samples.iter().map(group).collect::<Vec<_>>().join("; "))
 }
 
-fn capital(words: &str) -> String {
+/// The words with a capital first letter.
+pub fn capital(words: &str) -> String {
     let mut chars = words.chars();
     chars.next().map_or_else(String::new, |c| c.to_uppercase().chain(chars).collect())
 }

@@ -1,0 +1,137 @@
+//! Routes of all methods between one start and goal of each group, on the relief.
+
+use super::methods::{Method, found, groups};
+use crate::ReportError;
+use crate::content::{Figure, Numbers, slug};
+use crate::data::{Data, of_key};
+use crate::questions::relief::{MAP_WIDTH, exaggeration_words, extent};
+use crate::questions::sql::quoted;
+use crate::render::chart::{Entry, Mark};
+use crate::render::hillshade::exaggeration;
+use crate::render::map::{Key, Map};
+use crate::render::svg::{Paint, SERIES, Stroke, Symbol};
+use crate::render::{number as set, picture, thin};
+use sastrugi_schemas::tables::{RoutePointRow, RouteRow};
+
+/// Largest number of groups that are drawn.
+const GROUPS_MAX: usize = 12;
+/// Largest number of rows or columns of a relief.
+const PIXELS: usize = 420;
+/// Marks on maps do not follow the theme.
+pub const DARK: Paint = Paint::Fixed([0x1b, 0x20, 0x26]);
+/// What sets them apart from the ground.
+pub const LIGHT: Paint = Paint::Fixed([0xff, 0xff, 0xff]);
+/// Dashes by number, so that colour alone never tells.
+const DASHES: [&str; 6] = ["", "7 3", "2 3", "9 3 2 3", "5 2 1 2 1 2", "1 4"];
+
+/// Line by number on a picture.
+pub fn track(index: usize) -> Stroke {
+    Stroke::new(Paint::Fixed(SERIES[index % SERIES.len()]), 1.9).dashed(DASHES[index % DASHES.len()])
+}
+
+/// The same in a legend, which follows the theme.
+pub fn legend_track(index: usize) -> Stroke {
+    Stroke { paint: Paint::Series(index), ..track(index) }
+}
+
+/// What is drawn, and how many.
+pub fn words(maps: usize) -> String {
+    format!(
+        "{}, one for each group up to {GROUPS_MAX}: of the pairs that most methods connect, the one whose first route has the middle \
+         smoothed cost (the lower middle of an even number, the first of equals). Lines are smoothed routes.",
+        set::counted(maps, "map")
+    )
+}
+
+/// A map for each group with a route whose relief the release holds.
+pub fn figures(data: &Data, methods: &[Method]) -> Result<Vec<Figure>, ReportError> {
+    let points = data.files.route_points()?;
+    let mut figures = Vec::new();
+    for (group, routes) in groups(data).into_iter().take(GROUPS_MAX) {
+        let drawn = middle(&routes);
+        figures.extend(figure(data, methods, &points, &group, &drawn)?);
+    }
+    Ok(figures)
+}
+
+/// Routes of the pair with the middle cost among those that most methods connect.
+fn middle<'a>(routes: &[&'a RouteRow]) -> Vec<&'a RouteRow> {
+    let mut pairs: std::collections::BTreeMap<(&str, &str), Vec<&RouteRow>> = Default::default();
+    for route in routes.iter().filter(|r| found(r) && r.variant.is_none()) {
+        pairs.entry((&route.terrain_id, &route.pair_id)).or_default().push(route);
+    }
+    let most = pairs.values().map(Vec::len).max().unwrap_or(0);
+    let mut ranked: Vec<Vec<&RouteRow>> = pairs.into_values().filter(|p| p.len() == most).collect();
+    ranked.sort_by(|a, b| a[0].smoothed_cost_m.total_cmp(&b[0].smoothed_cost_m));
+    let at = ranked.len().saturating_sub(1) / 2;
+    if ranked.is_empty() { Vec::new() } else { ranked.swap_remove(at) }
+}
+
+fn figure(
+    data: &Data,
+    methods: &[Method],
+    points: &[RoutePointRow],
+    group: &str,
+    routes: &[&RouteRow],
+) -> Result<Option<Figure>, ReportError> {
+    let Some(first) = routes.first() else { return Ok(None) };
+    let Some(terrain) = data.terrain(&first.terrain_id) else { return Ok(None) };
+    let Some(grid) = data.files.grid(&terrain.path)? else { return Ok(None) };
+    let Some(range) = grid.range() else { return Ok(None) };
+    let factor = exaggeration(terrain.rms_slope);
+    let picture = picture::relief(&grid, range, factor, PIXELS)?;
+    let id = slug(&format!("routes-{group}"));
+    let number_of = |route: &RouteRow| methods.iter().position(|m| m.holds(route)).unwrap_or(0);
+    let entry = |r: &&RouteRow| {
+        let cost = set::with_unit(r.smoothed_cost_m, 4, "m");
+        (Mark::Line(legend_track(number_of(r))), format!("{}: {cost}", r.stage_id))
+    };
+    let ends =
+        [(Symbol::Ring, "start"), (Symbol::Disc, "goal")].map(|(s, w)| (Mark::Symbol(s, Paint::Ink), w.to_owned()));
+    let entries: Vec<Entry> = routes.iter().map(entry).chain(ends).collect();
+    let mut map = Map::new(&picture, MAP_WIDTH, &Key::Entries(&entries));
+    map.clip(&format!("{id}-clip"));
+    for route in routes {
+        draw(&mut map, &line_of(points, route), track(number_of(route)));
+    }
+    draw_ends(&mut map, first);
+    map.svg.close();
+    let costs: Vec<String> = entries.iter().take(routes.len()).map(|e| e.1.clone()).collect();
+    let condition = format!("terrain_id = {} and pair_id = {}", quoted(&first.terrain_id), quoted(&first.pair_id));
+    let condition = format!("{condition} and outcome = 'found' and variant is null");
+    let columns =
+        ["route_id", "method", "threshold_m", "smoothed_cost_m", "length_m", "vertices", "expansions", "path"];
+    Ok(Some(Figure {
+        id,
+        title: format!("Routes, group {group}."),
+        caption: format!("{}, costs in metres of level ground.{}", terrain.terrain_id, exaggeration_words(factor)),
+        description: format!("Map of routes, {}; smoothed costs: {}.", extent(&grid), costs.join(", ")),
+        svg: map.svg,
+        numbers: Numbers::select(&condition, routes.iter().copied(), &columns),
+    }))
+}
+
+/// The smoothed path of a route; the nothing where its points are not held.
+fn line_of(points: &[RoutePointRow], route: &RouteRow) -> Vec<(f64, f64)> {
+    let of_terrain = of_key(points, |p| &p.terrain_id, &route.terrain_id);
+    let own = of_key(of_terrain, |p| &p.route_id, &route.route_id);
+    let line: Vec<(f64, f64)> = own.iter().filter(|p| p.form == "smoothed").map(|p| (p.x_m, p.y_m)).collect();
+    thin::every(&line, 400)
+}
+
+/// A line with a light edge.
+pub fn draw(map: &mut Map, line: &[(f64, f64)], stroke: Stroke) {
+    let placed: Vec<(f64, f64)> = line.iter().filter_map(|&(x, y)| map.at(x, y)).collect();
+    map.svg.polyline(&placed, Stroke::new(LIGHT, stroke.width + 1.8).faint(0.7));
+    map.svg.polyline(&placed, stroke);
+}
+
+fn draw_ends(map: &mut Map, route: &RouteRow) {
+    let ends = [(route.start_x_m, route.start_y_m, Symbol::Ring), (route.goal_x_m, route.goal_y_m, Symbol::Disc)];
+    for (x, y, symbol) in ends {
+        if let Some(at) = map.at(x, y) {
+            map.svg.disc(at, 6.0, LIGHT, 1.0);
+            map.svg.symbol(symbol, at, 4.2, DARK);
+        }
+    }
+}

@@ -1,0 +1,153 @@
+//! Pages about routes, formations and losses.
+
+use super::{assert_sound, made_up, report, rows};
+use crate::data::Data;
+
+/// Routes and teams alone, on `per_group` terrains in each of three groups.
+fn navigated(per_group: usize) -> Data {
+    let mut data = made_up::full(per_group, 24);
+    data.missions.clear();
+    data.replicates.clear();
+    data.fits.clear();
+    data.terrains.retain(|t| t.stage == "terrain");
+    data
+}
+
+/// Costs of the made-up roadmap without threshold are 1.2 times those of the grid, give or take 5 %.
+#[test]
+fn val_ratios_are_paired_with_the_grid() {
+    let (files, summary) = report(&navigated(6));
+    let found = rows(&files, "route-ratios");
+    assert_eq!(found.len(), 3 * 2);
+    for row in found.iter().filter(|r| r[1] == "nohdt") {
+        assert_eq!((row[2].as_str(), row[3].as_u64(), row[4].as_u64()), (Some("grid"), Some(12), Some(6)));
+        let [mean, low, high, smallest, largest] = [5, 6, 7, 8, 9].map(|k| row[k].as_f64().unwrap());
+        assert!((1.2 / 1.05..=1.2 * 1.05).contains(&mean) && low < mean && mean < high, "{row:?}");
+        assert!(smallest <= low && high <= largest, "{row:?}");
+    }
+    let page = &files["index.html"];
+    assert!(
+        page.contains("54 searches found no route") || page.contains("of 162 searches found no route"),
+        "a warning"
+    );
+    for figure in ["route-cost-ratios", "route-expansion-ratios", "vertex-shares", "routes-2.30"] {
+        assert!(summary.figures.iter().any(|f| f == figure), "{figure}");
+    }
+    assert!(page.contains("3 maps, one for each group"));
+}
+
+/// Three terrains are too few for an interval: the ends stand alone.
+#[test]
+fn val_few_terrains_have_no_interval() {
+    let found = rows(&report(&navigated(3)).0, "route-ratios");
+    assert!(found.iter().all(|r| r[6].is_null() && r[7].is_null() && r[8].is_f64() && r[9].is_f64()));
+}
+
+/// Without a grid the first method on the same terms is the reference; searches on other terms are not compared.
+#[test]
+fn val_references_share_their_terms() {
+    let mut data = navigated(1);
+    data.routes.retain(|r| r.method != "grid");
+    let found = rows(&report(&data).0, "route-ratios");
+    assert!(found.len() == 3 && found.iter().all(|r| r[1] == "nohdt" && r[2] == "hdt2"));
+    data.routes.iter_mut().filter(|r| r.stage_id == "hdt2").for_each(|r| r.cost = "energy".into());
+    let files = report(&data).0;
+    assert!(!files.contains_key("data/route-ratios.json") && files.contains_key("data/vertex-shares.json"));
+    assert_sound(&files);
+}
+
+/// A release whose groups are labelled as maps of the thesis.
+fn labelled() -> Data {
+    let mut data = navigated(6);
+    let label = |group: &mut Option<String>| {
+        let name = match group.as_deref() {
+            Some("2.30") => "plain 500",
+            Some("2.45") => "rough 500",
+            _ => "very rough 500",
+        };
+        *group = Some(name.into());
+    };
+    data.routes.iter_mut().for_each(|r| label(&mut r.group));
+    data.formations.iter_mut().for_each(|f| label(&mut f.group));
+    data
+}
+
+/// Printed ratios stand beside ours with a verdict that their own row bears out; other groups have no such section.
+#[test]
+fn val_the_thesis_stands_beside_its_groups() {
+    assert!(!report(&navigated(2)).0["index.html"].contains("<section id=\"thesis\">"));
+    let (files, summary) = report(&labelled());
+    assert_sound(&files);
+    let routes = rows(&files, "bayrak-routes");
+    // Of the grid the gain of smoothing; of HDT 2 and NoHDT also share and two costs.
+    assert_eq!(routes.len(), 3 * (1 + 2 * 4));
+    // 703.412 / 632.04 of Table 5.3.
+    let row = routes.iter().find(|r| r[0] == "smoothed cost over the grid's" && r[2] == "rough 500" && r[3] == "NoHDT");
+    assert!((row.unwrap()[4].as_f64().unwrap() - 1.112_923).abs() < 1e-5, "{row:?}");
+    // Teams that lost nobody and arrived: columns everywhere, wedges where none was stuck. Table 5.5 prints 1.78, 3.04 and 3.04.
+    let teams = rows(&files, "bayrak-formations");
+    assert_eq!(teams.len(), 2 * (2 + 2 + 1));
+    let column =
+        teams.iter().find(|r| r[0] == "depth error over spacing" && r[2] == "plain 500" && r[3] == "column").unwrap();
+    assert!((column[4].as_f64().unwrap() - 26.2).abs() < 1e-9 && (column[5].as_f64().unwrap() - 20.0).abs() < 1e-9);
+    for row in routes.iter().chain(&teams) {
+        let [paper, low, high] = [4, 6, 7].map(|k| row[k].as_f64().unwrap());
+        assert_eq!(row[10] == "inside", (low..=high).contains(&paper), "{row:?}");
+    }
+    for figure in ["bayrak-share", "bayrak-smoothed", "bayrak-depth", "bayrak-width"] {
+        assert!(summary.figures.iter().any(|f| f == figure), "{figure}");
+    }
+}
+
+/// Table 5.5's layout, errors over time, tracks; stuck runs first; a team of one has a row without errors and no figure.
+#[test]
+fn val_formations_have_rows_curves_and_tracks() {
+    let (files, summary) = report(&navigated(2));
+    let found = rows(&files, "formation-errors");
+    assert_eq!(found.len(), 4 * 3);
+    let single = found.iter().find(|r| r[0].as_str().unwrap().starts_with("custom")).unwrap();
+    assert!(single[4].is_null() && single[10].is_null() && single[3] == 2);
+    let page = &files["index.html"];
+    let at = |words: &str| page.find(words).unwrap_or_else(|| panic!("{words}"));
+    assert!(at("2 of 24 runs did not arrive: 2 stuck") < at("Teams stay in tolerance 95 % of the time"));
+    for formation in ["column", "line", "wedge"] {
+        for figure in ["formation-errors", "formation-tracks"] {
+            assert!(
+                summary.figures.contains(&format!("{figure}-{formation}--team")),
+                "{figure} {formation} {:?}",
+                summary.figures
+            );
+        }
+    }
+    assert!(!summary.figures.iter().any(|f| f.contains("custom")));
+}
+
+/// The fourth member swings out by 3 m at the loss and back to 0.8 m (40 % of the spacing) within eight seconds; it stays.
+#[test]
+fn val_recovery_is_when_the_team_is_back_and_stays() {
+    let (files, summary) = report(&navigated(6));
+    let found = rows(&files, "losses");
+    assert_eq!(found.len(), 18);
+    for row in &found {
+        assert_eq!((row[3].as_f64(), row[4].as_i64(), row[5].as_str()), (Some(30.0), Some(3), Some("yes")));
+        // 3 (1 - t / 8) + 0.2 sin(0.3 (t + 30) + 3) is 0.94 m at 6 s, 0.57 m at 7 s; samples are 1 s apart.
+        assert_eq!(row[6].as_f64(), Some(7.0));
+        assert_eq!(row[8], "member 4 takes slot 3");
+    }
+    let page = &files["index.html"];
+    assert!(
+        page.contains("18 members lost in 18 runs. 18 of 18 teams came back") && page.contains("terrains drawn anew")
+    );
+    assert!(summary.figures.iter().any(|f| f == "loss-errors-line"));
+    assert_eq!(summary.figures.iter().filter(|f| f.starts_with("loss-tracks-")).count(), 3);
+    // Errors that never fall: no return.
+    let (mut data, mut shelf) = made_up::parts(1, 24);
+    shelf.formation_samples.values_mut().flatten().filter(|s| s.member == 2).for_each(|s| s.width_error_m = 9.0);
+    data.files = Box::new(shelf);
+    let (files, _) = report(&data);
+    assert!(rows(&files, "losses").iter().all(|r| r[6].is_null() && r[5] == "no"));
+    assert!(files["index.html"].contains("No team came back into tolerance."));
+    // Nobody lost: no section.
+    data.formations.iter_mut().for_each(|f| f.lost = 0);
+    assert!(!report(&data).0["index.html"].contains("<section id=\"losses\">"));
+}
