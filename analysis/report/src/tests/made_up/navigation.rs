@@ -194,10 +194,11 @@ fn row(terrain: &TerrainRow, run_id: &str, formation: &str, members: i64) -> For
         waits: 12,
         dodges: 3,
         squeezed: 0,
+        obstacle_contacts: 0,
         replans: 0,
         samples: SAMPLES,
         sample_rate_hz: 1.0,
-        path: format!("mcap/{}/{run_id}.mcap", terrain.terrain_id),
+        path: Some(format!("mcap/{}/{run_id}.mcap", terrain.terrain_id)),
     }
 }
 
