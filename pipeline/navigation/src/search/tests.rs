@@ -10,6 +10,7 @@ use crate::testing::{NEIGHBOURHOODS, Random, drawn, ends, ground, hills, limits,
 use crate::vertices::{VertexSettings, Vertices};
 
 mod components;
+mod edits;
 mod replanning;
 mod scenarios;
 mod weighted;
