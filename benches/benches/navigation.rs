@@ -1,7 +1,7 @@
 //! Routes over the hills of the published maps, on one core.
 //!
 //! Before the table, in processor time: for each preset on 1000 x 1000 nodes the share of vertices, how much faster the search over the roadmap is than the
-//! one over the grid (medians of 5), and smoothed costs over that of the grid, all by the fine integral; on 2000 x 2000 nodes our A* over
+//! one over the grid (medians of 5), and smoothed costs over that of the grid, all by the fine integral; how both grow with the map; on 2000 x 2000 nodes our A* over
 //! the grid beside those of the crates `pathfinding` and `petgraph` on the same steps, costs and bound, and the memory of the process.
 //! Targets: roadmap at least 10 times faster, smoothed cost at most 1.05 (threshold 2 m) and 1.4 (without); 2000 x 2000 nodes: vertices
 //! and edges 1.5 s, roadmap search 30 ms, grid search 4 s, 1000 searches of a prepared roadmap 2 s, 600 MB.
@@ -25,6 +25,7 @@ const FOUR: Neighbourhood = Neighbourhood::Four;
 fn main() {
     PRESETS.into_iter().for_each(compare_methods);
     PRESETS.into_iter().for_each(time_large);
+    [250, 500, 1000, 2000].into_iter().for_each(time_growth);
     compare_crates();
     divan::main();
 }
@@ -141,6 +142,20 @@ fn time_large(preset: &str) {
         1e3 * median_s(|| astar::search(&roadmap, ends[0], ends[1])),
         found.expansions,
         peak_mb().unwrap_or(0)
+    );
+}
+
+/// How the work grows with the side of the map, on very rough hills.
+fn time_growth(size: usize) {
+    let course = Course::new(size, "very_rough");
+    let (build_s, roadmap) = timed(|| course.roadmap(None));
+    let ends = course.ends().map(|node| roadmap.vertex(node).expect("a vertex"));
+    let [start, goal] = course.ends();
+    println!(
+        "very_rough, {size}: vertices and edges {:.1} ms, grid search {:.1} ms, roadmap search {:.2} ms",
+        1e3 * build_s,
+        1e3 * median_s(|| astar::search(&course.grid(), start, goal)),
+        1e3 * median_s(|| astar::search(&roadmap, ends[0], ends[1])),
     );
 }
 

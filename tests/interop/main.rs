@@ -237,6 +237,20 @@ fn described_study() -> String {
     study.replace("count = 2\n", "count = 3\n").replace("group = \"b\"\n", exports) + methods
 }
 
+/// Routes over a measured DEM and two synthetic terrains: least costs as scipy and scikit-image have them, no route where scipy has none, and
+/// smoothed routes whose cost, lengths and slopes come out of another integral.
+#[test]
+fn val_routes_cost_what_scipy_and_scikit_image_find() {
+    let Some(python) = python() else { return };
+    let folder = area();
+    let dem = sastrugi_fixtures::workspace_root().join("fixtures/dem/pozo_blanca.tif");
+    let call = check(&python, "check_routes.py", &[&program(), &dem, folder.path()]);
+    assert_eq!(call.code, 0, "{}{}", call.stdout, call.stderr);
+    let counts: Value = serde_json::from_str(&call.stdout).unwrap();
+    let at_least = |kind: &str, count| assert!(counts[kind].as_u64().unwrap() >= count, "{kind}: {counts}");
+    [("found", 50), ("no_path", 15), ("isotropic", 20)].into_iter().for_each(|(kind, count)| at_least(kind, count));
+}
+
 /// Every measured DEM reads as rasterio (or numpy) reads it.
 #[test]
 fn val_measured_dems_read_as_rasterio_reads_them() {

@@ -1,4 +1,5 @@
-//! An independent engine, MuJoCo, drives the missions of a release on its terrains; outcomes and figures are compared.
+//! An independent engine, MuJoCo, drives the missions of a release on its terrains; outcomes and figures are compared. GRASS GIS plans
+//! walks where our routes lead.
 //!
 //! The engine lives in `.cache/peer`, which `./test --full` sets up. Without it the test is skipped with a message; with CI
 //! set that is a failure. Damping and controller are shared with our model, so this is a cross-check of the mechanics and
@@ -78,6 +79,28 @@ fn val_an_independent_engine_drives_the_same_missions() {
         let ratio = figure(&format!("/ratios/{rate}"));
         assert!((ratio - 1.0).abs() <= 0.1, "{rate}: {ratio}");
     }
+}
+
+/// r.walk of GRASS GIS on the measured catchment, 12 pairs: with the coefficients of our linear cost, and slopes so small that lengths in plan and
+/// on the ground agree, the same least costs. On true slopes ours cost more, by the length on the ground; and no route of ours beats r.walk
+/// by its own default coefficients. GRASS is a Debian package (`grass-core`), which nothing here installs.
+#[test]
+#[ignore = "slow: ./test --full"]
+fn val_r_walk_finds_the_same_least_costs() {
+    let Some(python) = sastrugi_tests::python("readers", "./test") else { return };
+    if Command::new("grass").arg("--version").output().is_err() {
+        eprintln!("SKIPPED: GRASS GIS is not installed; apt-get install grass-core does it");
+        return;
+    }
+    let folder = area();
+    let dem = sastrugi_fixtures::workspace_root().join("fixtures/dem/pozo_blanca.tif");
+    let told = script(&python, "walk.py", &[&sastrugi_tests::program(), &dem, folder.path()]).stdout;
+    println!("{told}");
+    let ratios: Value = serde_json::from_str(&told).unwrap();
+    let ratio = |key: &str| ratios.pointer(key).and_then(Value::as_f64).unwrap();
+    assert!(ratio("/flat/least") > 1.0 - 1e-9 && ratio("/flat/most") < 1.0 + 1e-6, "{told}");
+    assert!(ratio("/true/least") > 1.0 - 1e-9, "{told}");
+    assert!(ratio("/langmuir_on_our_route/least") > 1.0 - 1e-9, "{told}");
 }
 
 /// The data that our vehicle is made of.

@@ -9,7 +9,9 @@ use crate::roadmap::Roadmap;
 use crate::testing::{NEIGHBOURHOODS, Random, drawn, ends, ground, hills, limits, map_of, plane, rough, thesis_costs};
 use crate::vertices::{VertexSettings, Vertices};
 
+mod any_angle;
 mod components;
+mod edits;
 mod replanning;
 mod scenarios;
 mod weighted;

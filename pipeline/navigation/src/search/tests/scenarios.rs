@@ -9,7 +9,7 @@ use movingai::Map2D;
 use movingai::parser::{parse_map, parse_scen};
 use std::io::Read;
 
-fn text(name: &str) -> String {
+pub fn text(name: &str) -> String {
     let bytes = std::fs::read(sastrugi_fixtures::routes(name)).unwrap();
     let mut text = String::new();
     match name.ends_with(".gz") {
