@@ -113,7 +113,7 @@ fn val_formations_have_rows_curves_and_tracks() {
     for formation in ["column", "line", "wedge"] {
         for figure in ["formation-errors", "formation-tracks"] {
             assert!(
-                summary.figures.contains(&format!("{figure}-{formation}--team")),
+                summary.figures.contains(&format!("{figure}-{formation}")),
                 "{figure} {formation} {:?}",
                 summary.figures
             );

@@ -107,7 +107,12 @@ fn sets(data: &Data) -> Vec<Set<'_>> {
         let key = (natural(&run.stage_id), run.variant.as_deref().map(natural), run.formation.as_str());
         sets.entry(key).or_default().push(run);
     }
+    let formations: Vec<&str> = sets.keys().map(|(.., formation)| *formation).collect();
+    let is_single = |formation: &str| formations.iter().filter(|other| **other == formation).count() == 1;
     let name = |stage: Natural, variant: Option<Natural>, formation: &str| {
+        if is_single(formation) {
+            return formation.to_owned();
+        }
         let variant = variant.map_or_else(String::new, |v| format!(", {}", v.1));
         let stage = if stage.1 == formation { String::new() } else { format!(", {}", stage.1) };
         format!("{formation}{stage}{variant}")
