@@ -510,3 +510,17 @@ fn gold_published_schemas_are_current() {
         assert!(now == kept, "{file} is stale; refresh it and say why in the commit message");
     }
 }
+
+/// Tables within themselves too: a team's slot may hold a team.
+#[test]
+fn val_every_kind_is_described() {
+    let folder = area();
+    let all = sastrugi_in(folder.path(), &["kinds", "--json"]);
+    let kinds: Value = serde_json::from_str(&all.stdout).unwrap();
+    for kind in kinds.as_array().unwrap() {
+        let call = sastrugi_in(folder.path(), &["kinds", kind["kind"].as_str().unwrap()]);
+        assert_eq!(call.code, 0, "{}: {}", kind["kind"], call.stderr);
+    }
+    let wedge = sastrugi_in(folder.path(), &["kinds", "wedge"]).stdout;
+    assert!(wedge.contains("slots[].team") && !wedge.contains("slots[].team[].team[]"), "{wedge}");
+}

@@ -35,15 +35,21 @@ pub fn kinds(args: &Kinds, common: &Common) -> Verdict {
 
 fn describe(kind: &Kind) -> String {
     let mut rows = Vec::new();
-    parameters("", &kind.parameters, &kind.parameters, &mut rows);
+    parameters("", &[&kind.parameters], &mut rows);
     let text = format!("{} {}: {}\nsource: {}", kind.family, kind.kind, kind.summary, kind.source);
     if rows.is_empty() { text } else { format!("{text}\n{}", columns(&rows)) }
 }
 
 /// Rows `name, default, description` of a schema's properties: tables opened, lists of tables as `name[]` or by the kind of table, and
-/// words with what each of them says.
-fn parameters(prefix: &str, schema: &Value, root: &Value, rows: &mut Vec<Vec<String>>) {
+/// words with what each of them says. `path` leads from the root to the schema; a table within itself is not opened again.
+fn parameters(prefix: &str, path: &[&Value], rows: &mut Vec<Vec<String>>) {
+    let (Some(root), Some(schema)) = (path.first(), path.last()) else { return };
     let schema = resolve(schema, root);
+    let open = |prefix: &str, table: &Value, rows: &mut Vec<Vec<String>>| {
+        if !path.iter().any(|outer| std::ptr::eq(*outer, table)) {
+            parameters(prefix, &[path, &[table]].concat(), rows);
+        }
+    };
     let defaults = schema.get("default");
     for (name, property) in schema.get("properties").and_then(Value::as_object).into_iter().flatten() {
         if property.get("const").is_some() {
@@ -62,13 +68,13 @@ fn parameters(prefix: &str, schema: &Value, root: &Value, rows: &mut Vec<Vec<Str
             rows.push(vec![format!("  {prefix}{name} = {word}"), String::new(), text]);
         }
         if is_table(inner) {
-            parameters(&format!("{prefix}{name}."), inner, root, rows);
+            open(&format!("{prefix}{name}."), inner, rows);
         } else if let Some(items) = items {
-            parameters(&format!("{prefix}{name}[]."), items, root, rows);
+            open(&format!("{prefix}{name}[]."), items, rows);
         }
         for (kind, table) in tables {
             rows.push(vec![format!("  {prefix}{name}[{kind}]"), String::new(), text_of(table)]);
-            parameters(&format!("{prefix}{name}[{kind}]."), table, root, rows);
+            open(&format!("{prefix}{name}[{kind}]."), table, rows);
         }
     }
 }

@@ -9,7 +9,7 @@
 //! lower priority goes round the other as round a rock, and after twice as many the one of higher priority does. Members that are lost or at
 //! their last target are rocks at once. Obstacles that move are known for one step: a member goes round them, and out of their way where it
 //! would be run over. Slopes on a straight line to a target are those of quarters of a cell, as for routes; on other ways each step is within the
-//! limits. A member that comes no nearer to its target takes a [detour](super::detour). A team that comes no nearer for
+//! limits. A member that comes no nearer to its target takes a detour over the cells. A team that comes no nearer for
 //! [`STUCK_AFTER_S`] seconds, or whose joint state repeats, is stuck: it never goes in circles for ever.
 
 use super::detour::detour;

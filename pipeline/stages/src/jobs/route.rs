@@ -221,11 +221,11 @@ struct RouteJob {
 }
 
 impl RouteSearch {
-    /// The ground of a terrain prepared for this search, with its heights and the outer rings of its obstacles.
+    /// The ground of a terrain prepared for this search, with its heights.
     ///
     /// # Errors
     /// Inputs that cannot be used.
-    fn site(&self, field: &Heightfield, work: &Work<'_>) -> Result<(Site, dem::Dem, Vec<Vec<[f64; 2]>>), JobError> {
+    fn site(&self, field: &Heightfield, work: &Work<'_>) -> Result<(Site, dem::Dem), JobError> {
         let read = dem::read(&work.parent(&field.item, HEIGHTS)?).map_err(input_error)?;
         let factors =
             self.cost_raster.as_ref().map(|item| dem::read(&work.parent(item, HEIGHTS)?).map_err(input_error));
@@ -236,8 +236,7 @@ impl RouteSearch {
             ..Given::default()
         };
         mask::add_marked(&mut given, &read.grid.geometry, &field.item, &self.obstacles, work)?;
-        let rings = given.polygons.iter().filter_map(|polygon| polygon.rings().first().cloned()).collect();
-        Ok((Site::new(&read.grid, &self.parameters, &given)?, read, rings))
+        Ok((Site::new(&read.grid, &self.parameters, &given)?, read))
     }
 
     /// Everything that decides the routes on a terrain.
@@ -448,7 +447,7 @@ impl Job for RouteJob {
     }
 
     fn run(&self, work: &Work<'_>) -> Result<Outcome, JobError> {
-        let (site, read, obstacles) = self.search.site(&self.field, work)?;
+        let (site, read) = self.search.site(&self.field, work)?;
         let place = Place::read(&work.parent(&self.field.item, PLACE)?, &read.grid.geometry)?;
         let pairs = self.pairs(&site, &place)?;
         let found = site.plan(&pairs)?;
@@ -465,7 +464,8 @@ impl Job for RouteJob {
         dem::write(&work.output(GROUND), &site.open_ground(), &read.info.crs, &Default::default())
             .map_err(JobError::io)?;
         let points = self.points(&routes);
-        let planned = PlannedRoutes { limits_deg: site.map().limits().degrees(), obstacles, routes };
+        let planned =
+            PlannedRoutes { limits_deg: site.map().limits().degrees(), obstacles: site.rings().to_vec(), routes };
         work.write(ROUTES, &serde_json::to_vec(&planned).map_err(JobError::new)?)?;
         let mut products = vec![Product::internal(ROUTES), Product::internal(GROUND)];
         products.extend(self.write_lines(work, &read, &place, (&planned.routes, &rows))?);

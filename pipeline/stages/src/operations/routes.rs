@@ -47,6 +47,7 @@ pub struct Site {
     costs: CostModel,
     clearance: Option<Clearance>,
     settings: RouteSettings,
+    rings: Vec<Vec<[f64; 2]>>,
 }
 
 /// What a search came to.
@@ -110,7 +111,8 @@ impl Site {
         let clearance = parameters.width_m.map(clearance).transpose().map_err(refused)?;
         let [dx, dy] = map.cell_m();
         let settings = parameters.settings(dx.max(dy)).map_err(refused)?;
-        Ok(Self { map, costs, clearance, settings })
+        let rings = given.polygons.iter().filter_map(|polygon| polygon.rings().first().cloned()).collect();
+        Ok(Self { map, costs, clearance, settings, rings })
     }
 
     /// Map, costs and room for a team.
@@ -121,6 +123,11 @@ impl Site {
     /// The map.
     pub fn map(&self) -> &TravelMap {
         &self.map
+    }
+
+    /// Outer rings of the obstacles that are polygons, in the coordinates of the heights, m.
+    pub fn rings(&self) -> &[Vec<[f64; 2]>] {
+        &self.rings
     }
 
     /// Plans a route for each pair of start and goal; one alone, with both as vertices of its roadmap.
