@@ -260,7 +260,7 @@ def main(program, dem, folder):
         write_raster(folder / "factors.tif", like, factors)
         write_raster(folder / "level.tif", like, np.zeros(shape))
     (folder / "study.toml").write_text(study(dem))
-    subprocess.run([program, "run", "study.toml", "-o", "release", "--quiet"], cwd=folder, check=True)
+    subprocess.run([program, "run", "study.toml", "-o", "release", "--quiet"], cwd=folder, check=True, stdout=subprocess.DEVNULL)
     release = folder / "release"
     routes, points = table(release, "routes"), points_of(release)
     found = {"found": 0, "no_path": 0, "isotropic": 0}
