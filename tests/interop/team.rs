@@ -4,7 +4,7 @@ use super::{check, python};
 use sastrugi_numeric::{Geometry, Grid, Surface};
 use sastrugi_schemas::study::McapFlavour;
 use sastrugi_schemas::topics::{
-    DiscState, FormationBox, Member, MemberState, MovingDisc, TeamEvent, TeamEventKind, TeamRecording,
+    DiscState, FormationBox, Member, MemberState, MovingDisc, PlannedRoute, TeamEvent, TeamEventKind, TeamRecording,
 };
 use sastrugi_store::dem::Crs;
 use sastrugi_store::geojson::{Route, write_routes};
@@ -57,7 +57,10 @@ fn run(dem: &Grid) -> TeamRecording {
     TeamRecording {
         sample_rate_hz: 10.0,
         members: vec![member(1, 0.0, 0.0), member(2, 3.0, -1.0), member(3, 3.0, 5.0)],
-        route_m: [[15.0, 15.0], [25.0, 25.5], [35.0, 35.0]].map(|[x, y]| place(dem, x, y)).into(),
+        routes: vec![PlannedRoute {
+            time_s: 0.0,
+            points_m: [[15.0, 15.0], [25.0, 25.5], [35.0, 35.0]].map(|[x, y]| place(dem, x, y)).into(),
+        }],
         search_path_m: [[15.0, 15.0], [15.0, 25.0], [35.0, 25.0], [35.0, 35.0]].map(|[x, y]| place(dem, x, y)).into(),
         vertices_m: (0..300).map(|k| place(dem, 2.0 + f64::from(k % 20), 2.0 + f64::from(k / 20))).collect(),
         boxes: vec![bounds(0.0, false), bounds(4.0, false), bounds(8.0, true)],
@@ -95,7 +98,10 @@ fn val_readers_agree_with_a_team() {
         }
     }
     let properties = serde_json::json!({ "route_id": "a-0001", "cost": 31.25 });
-    let routes = [Route { positions: recording.route_m.clone(), properties: properties.as_object().unwrap().clone() }];
+    let routes = [Route {
+        positions: recording.routes[0].points_m.clone(),
+        properties: properties.as_object().unwrap().clone(),
+    }];
     let crs = Crs { epsg: Some(32633), ..Crs::default() };
     write_routes(&path.join("routes.geojson"), Some(&crs), &routes).unwrap();
     write(path, "recording.json", &serde_json::to_string(&recording).unwrap());

@@ -109,6 +109,11 @@ impl CostModel {
         Ok(Self { slope, factors, least })
     }
 
+    /// The cost of slopes.
+    pub fn slope(&self) -> SlopeCost {
+        self.slope
+    }
+
     /// Least cost of a metre of path: what a search may count on.
     pub fn least(&self) -> f64 {
         self.least

@@ -15,6 +15,7 @@ use crate::search::{Network, Reversible, astar};
 use sastrugi_schemas::ParameterError;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::ops::Range;
 
 #[cfg(test)]
 mod tests;
@@ -88,7 +89,6 @@ fn check_radius(map: &TravelMap, radius_m: f64) -> Result<(), ParameterError> {
 
 struct Walker<'a> {
     known: Known<'a>,
-    radius_m: f64,
     search: DStarLite,
     at: Node,
     goal: Node,
@@ -98,10 +98,9 @@ struct Walker<'a> {
 
 impl<'a> Walker<'a> {
     fn new(grid: GridNetwork<'a>, radius_m: f64, [start, goal]: [Node; 2]) -> Self {
-        let mut known = Known { grid, seen: vec![false; grid.len()] };
-        known.sense(start, radius_m);
+        let known = Known::new(grid, radius_m, start);
         let search = DStarLite::new(&known, start, goal);
-        Self { known, radius_m, search, at: start, goal, cost: 0.0, replans: 0 }
+        Self { known, search, at: start, goal, cost: 0.0, replans: 0 }
     }
 
     /// Nodes to the goal; `None` once no path is left.
@@ -113,7 +112,7 @@ impl<'a> Walker<'a> {
             self.known.edges(self.at, |target, cost| self.cost += if target == next { cost } else { 0.0 });
             self.at = next;
             walked.push(next);
-            let changed = self.known.sense(next, self.radius_m);
+            let changed = self.known.sense(next);
             if !changed.is_empty() && next != self.goal {
                 self.search.move_to(&self.known, next);
                 self.search.changed(&self.known, changed);
@@ -126,26 +125,38 @@ impl<'a> Walker<'a> {
 }
 
 /// The grid as far as it has been seen.
-struct Known<'a> {
+#[derive(Clone, Debug)]
+pub(crate) struct Known<'a> {
     grid: GridNetwork<'a>,
+    radius_m: f64,
+    /// Where it was last seen from.
+    from: Node,
     seen: Vec<bool>,
 }
 
-impl Known<'_> {
-    /// Sees the cells within a radius; returns those whose steps may have changed.
-    fn sense(&mut self, from: Node, radius_m: f64) -> Vec<Node> {
+impl<'a> Known<'a> {
+    /// The grid as far as it is seen from a node.
+    pub(crate) fn new(grid: GridNetwork<'a>, radius_m: f64, from: Node) -> Self {
+        let mut known = Self { grid, radius_m, from, seen: vec![false; grid.len()] };
+        for row in 0..grid.ground.map.shape()[0] {
+            let columns = known.in_sight(from, row);
+            let first = grid.ground.map.node(row, 0) as usize;
+            known.seen[first + columns.start..first + columns.end].fill(true);
+        }
+        known
+    }
+
+    /// Sees the cells within the radius; returns those whose steps may have changed, ascending. Only the part of the circle is looked at that
+    /// lies outside the last one.
+    pub(crate) fn sense(&mut self, from: Node) -> Vec<Node> {
         let map = self.grid.ground.map;
-        let ([row, col], [rows, cols], [dx, dy]) = (map.place(from), map.shape(), map.cell_m());
-        let reach = |cell: f64, at: usize, count: usize| {
-            let cells = libm::floor(radius_m / cell) as usize;
-            at.saturating_sub(cells)..at.saturating_add(cells).saturating_add(1).min(count)
-        };
+        let before = std::mem::replace(&mut self.from, from);
         let mut changed = Vec::new();
-        for r in reach(dy, row, rows) {
-            for c in reach(dx, col, cols) {
-                let [y, x] = [r.abs_diff(row) as f64 * dy, c.abs_diff(col) as f64 * dx];
-                let node = map.node(r, c);
-                if x * x + y * y <= radius_m * radius_m && !std::mem::replace(&mut self.seen[node as usize], true) {
+        for row in 0..map.shape()[0] {
+            let [now, known] = [from, before].map(|place| self.in_sight(place, row));
+            for col in (now.start..now.end.min(known.start)).chain(now.start.max(known.end)..now.end) {
+                let node = map.node(row, col);
+                if !std::mem::replace(&mut self.seen[node as usize], true) {
                     changed.extend(map.around(node));
                 }
             }
@@ -153,6 +164,18 @@ impl Known<'_> {
         changed.sort_unstable();
         changed.dedup();
         changed
+    }
+
+    /// Columns of a row with their centres within the radius of a node.
+    fn in_sight(&self, from: Node, row: usize) -> Range<usize> {
+        let map = self.grid.ground.map;
+        let ([from_row, from_col], [dx, dy], cols) = (map.place(from), map.cell_m(), map.shape()[1]);
+        let away_m = row.abs_diff(from_row) as f64 * dy;
+        if away_m > self.radius_m {
+            return 0..0;
+        }
+        let reach = libm::floor((self.radius_m * self.radius_m - away_m * away_m).sqrt() / dx) as usize;
+        from_col.saturating_sub(reach)..from_col.saturating_add(reach).saturating_add(1).min(cols)
     }
 
     /// Cost of a step as far as is known; `None` where it may not be taken.

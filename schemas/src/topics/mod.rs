@@ -31,7 +31,9 @@ pub use recording::{
     CommandSample, Event, EventKind, ImuSample, Recording, StateSample, VehicleOutline, WheelOutline, WheelSample,
     WheelState,
 };
-pub use team::{DiscState, FormationBox, Member, MemberState, MovingDisc, TeamEvent, TeamEventKind, TeamRecording};
+pub use team::{
+    DiscState, FormationBox, Member, MemberState, MovingDisc, PlannedRoute, TeamEvent, TeamEventKind, TeamRecording,
+};
 
 use serde::Serialize;
 

@@ -68,7 +68,7 @@ pub const TEAM_ROUTE: Topic = topic(
     "/team/route",
     "nav_msgs/msg/Path",
     "the planned route: its waypoints, and between them a pose a cell on the ground, at most 8192 of those; one \
-     message at the run's start",
+     message at the run's start, and one whenever a team that plans on its way is led on",
 );
 /// Topic `/team/markers`.
 pub const TEAM_MARKERS: Topic = topic(

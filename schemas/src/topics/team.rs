@@ -11,8 +11,8 @@ pub struct TeamRecording {
     pub sample_rate_hz: f64,
     /// Members in the order of their numbers; all have their states at the same times.
     pub members: Vec<Member>,
-    /// Waypoints of the planned route in the map frame, m; empty without one.
-    pub route_m: Vec<[f64; 3]>,
+    /// Planned routes, in order of time: one, or those of a team that plans on its way; may be empty.
+    pub routes: Vec<PlannedRoute>,
     /// Path of the search before it was smoothed, m; may be empty.
     pub search_path_m: Vec<[f64; 3]>,
     /// Vertices of the roadmap, m; may be empty.
@@ -25,6 +25,15 @@ pub struct TeamRecording {
     pub moving: Vec<MovingDisc>,
     /// What happened, in order of time.
     pub events: Vec<TeamEvent>,
+}
+
+/// The route that a team makes for from a time on.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PlannedRoute {
+    /// Time since the start, s.
+    pub time_s: f64,
+    /// Waypoints in the map frame, m.
+    pub points_m: Vec<[f64; 3]>,
 }
 
 /// A member of a team.

@@ -210,9 +210,10 @@ impl<'a> Crowd<'a> {
         &self.motions
     }
 
-    /// Time since the start, s.
+    /// Time since the start, s: steps over their rate where that is whole, so that times are the decimals nearest to them.
     pub fn time_s(&self) -> f64 {
-        self.step as f64 * self.settings.step_s
+        let (steps, rate_hz) = (self.step as f64, 1.0 / self.settings.step_s);
+        if rate_hz == rate_hz.round() { steps / rate_hz } else { steps * self.settings.step_s }
     }
 
     /// The obstacles that move on their own.
@@ -226,6 +227,16 @@ impl<'a> Crowd<'a> {
         self.targets_m[member].get(motion.next).copied().unwrap_or(motion.position_m)
     }
 
+    /// Lets the members stand on other ground.
+    pub fn stand_on(&mut self, footing: Footing<'a>) {
+        self.footing = footing;
+    }
+
+    /// Whether the straight line between two points may be travelled.
+    pub fn is_passable(&self, from_m: Vector, to_m: Vector) -> bool {
+        self.footing.is_passable(from_m, to_m)
+    }
+
     /// Changes the speed of a member, m/s.
     pub fn set_speed(&mut self, member: usize, speed_m_s: f64) {
         self.motions[member].speed_m_s = speed_m_s;
@@ -237,18 +248,22 @@ impl<'a> Crowd<'a> {
         (motion.phase, motion.moved_m, motion.dodging) = (Phase::Lost, [0.0; 2], false);
     }
 
-    /// Gives a member other targets, of which it makes for number `next`; lost members keep theirs.
+    /// Gives a member other targets, of which it makes for number `next`; lost members keep theirs. One that makes for the same point as before
+    /// goes on as it is.
     pub fn redirect(&mut self, member: usize, targets_m: Vec<Vector>, next: usize) {
-        let motion = &mut self.motions[member];
-        if motion.phase == Phase::Lost || (targets_m == self.targets_m[member] && next == motion.next) {
+        let motion = self.motions[member];
+        if motion.phase == Phase::Lost {
             return;
         }
-        if next < targets_m.len() {
-            (motion.phase, motion.mode) = (Phase::Moving, Mode::Direct);
-        }
-        motion.next = next;
+        let same = targets_m.get(next) == self.targets_m[member].get(motion.next);
+        self.motions[member].next = next;
         self.targets_m[member] = targets_m;
-        self.begin_target(member);
+        if !same {
+            if next < self.targets_m[member].len() {
+                (self.motions[member].phase, self.motions[member].mode) = (Phase::Moving, Mode::Direct);
+            }
+            self.begin_target(member);
+        }
     }
 
     /// Moves all members by one step, in this order. Returns the member that is stuck when the team comes no farther.

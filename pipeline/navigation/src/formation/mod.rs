@@ -2,7 +2,8 @@
 //!
 //! A [`shape::Formation`] has a slot for each member. At every waypoint of the route [`placement`] gives each slot a target that fits the
 //! ground; [`crowd`] moves the members from target to target, step by step and without collisions; [`speeds`] keeps their distances.
-//! A [`Team`] puts these together, with losses of members, and measures how well the formation holds.
+//! A [`Team`] puts these together, with losses of members, and measures how well the formation holds. It goes along a given route, or along one that it
+//! plans on the ground it has seen.
 //!
 //! Positions are eastings and northings in the coordinates of the map's heights, m.
 
@@ -15,6 +16,7 @@ pub mod obstacles;
 pub mod parameters;
 pub mod placement;
 mod plane;
+mod scout;
 pub mod shape;
 pub mod speeds;
 pub mod team;

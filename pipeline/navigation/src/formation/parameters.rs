@@ -98,6 +98,9 @@ pub struct TeamParameters {
     pub step_s: f64,
     /// Steps for which members look at the ground ahead.
     pub look_ahead: u32,
+    /// Distance from its leader within which the team sees the ground, m: it plans from start to goal on what it has seen. It follows the route
+    /// when absent.
+    pub sensing_radius_m: Option<f64>,
     /// Time after which the run ends, s; ten times that of the route at mean speed, plus ten minutes, when absent.
     pub time_max_s: Option<f64>,
     /// Rate of the recorded samples, Hz: the rate of the steps over a whole number.
@@ -135,6 +138,7 @@ impl Default for TeamParameters {
             arrive_m: 1.0,
             step_s: 0.1,
             look_ahead: 3,
+            sensing_radius_m: None,
             time_max_s: None,
             sample_rate_hz: 1.0,
             losses: Vec::new(),
@@ -167,7 +171,11 @@ impl TeamParameters {
             ("sample_rate_hz", self.sample_rate_hz),
         ];
         positive.into_iter().try_for_each(|(key, value)| ParameterError::positive(key, value).map(drop))?;
-        let optional = [("waypoint_spacing_m", self.waypoint_spacing_m), ("time_max_s", self.time_max_s)];
+        let optional = [
+            ("waypoint_spacing_m", self.waypoint_spacing_m),
+            ("sensing_radius_m", self.sensing_radius_m),
+            ("time_max_s", self.time_max_s),
+        ];
         optional.into_iter().try_for_each(|(key, value)| match value {
             Some(value) => ParameterError::positive(key, value).map(drop),
             None => Ok(()),

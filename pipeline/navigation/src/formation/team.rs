@@ -6,6 +6,7 @@ use super::metrics::{Metrics, errors_m};
 use super::parameters::{Loss, TeamParameters};
 use super::placement::{Disc, Placement, Placer, heading};
 use super::plane::{Vector, add, distance, length, scale, sub};
+use super::scout::{Advice, Scout};
 use super::shape::Formation;
 use sastrugi_schemas::ParameterError;
 
@@ -102,7 +103,7 @@ pub enum EventKind {
         /// Number of the waypoint, from 0.
         waypoint: usize,
     },
-    /// The route was changed.
+    /// The team makes for its goal by another way.
     Replanned,
     /// A member is at its last target.
     Arrived,
@@ -140,13 +141,28 @@ pub struct TimedBox {
     pub squeezed: bool,
 }
 
+/// The way that a team makes for from a time on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TimedRoute {
+    /// Time, s.
+    pub time_s: f64,
+    /// Waypoints, m.
+    pub points_m: Vec<Vector>,
+}
+
 /// A team on its way along a route.
 #[derive(Clone, Debug)]
 pub struct Team<'a> {
     ground: &'a TeamGround<'a>,
     parameters: TeamParameters,
     formation: Formation,
+    /// What the team has seen, where it plans its way itself.
+    scout: Option<Scout<'a>>,
+    /// Waypoints that are still of use.
     route_m: Vec<Vector>,
+    /// Number of the first of them.
+    first: usize,
+    routes: Vec<TimedRoute>,
     placements: Vec<Placement>,
     crowd: Crowd<'a>,
     /// Losses to come, the next one last.
@@ -161,15 +177,20 @@ pub struct Team<'a> {
 }
 
 impl<'a> Team<'a> {
-    /// A team at the start of a route, in m; members are placed as at any waypoint. Costs and clearance of the ground count for detours alone.
+    /// A team at the start of a route, in m; members are placed as at any waypoint. A team with a sensing radius takes from the route its ends
+    /// and its time limit, and plans its way by the costs of the ground, which must be those of slopes alone; for others they count for
+    /// detours alone.
     ///
     /// # Errors
     /// Parameters out of range, a route without a length, or no room at its start.
     pub fn new(ground: &'a TeamGround<'a>, parameters: &TeamParameters, route_m: &[Vector]) -> Result<Self, TeamError> {
         parameters.check()?;
         let formation = parameters.formation()?;
-        let route_m = divided(route_m, parameters.leg_max_m())?;
         let route_length_m: f64 = route_m.windows(2).map(|pair| distance(pair[0], pair[1])).sum();
+        let mut scout = scout(ground, parameters, route_m)?;
+        let own_m = scout.as_mut().and_then(Scout::set_out);
+        let points_m = own_m.unwrap_or_else(|| route_m.to_vec());
+        let route_m = divided(&points_m, parameters.leg_max_m())?;
         let footing = Footing::new(ground, &route_m);
         let placements = placer(&footing, &formation, &route_m, parameters, &[]).all();
         let starts_m = starts(&footing, &formation, placements.first().ok_or(TeamError::Route)?, parameters.radius_m)?;
@@ -183,7 +204,10 @@ impl<'a> Team<'a> {
             crowd: Crowd::new(footing, parameters.crowd(), &starts_m, targets_m, speed_m_s, obstacles),
             ground,
             formation,
+            scout,
             route_m,
+            first: 0,
+            routes: vec![TimedRoute { time_s: 0.0, points_m }],
             placements,
             losses,
             metrics: Metrics::of(members),
@@ -224,27 +248,66 @@ impl<'a> Team<'a> {
             return self.outcome;
         }
         self.lose_due();
-        self.tune_speeds();
-        let before: Vec<Motion> = self.crowd.motions().to_vec();
-        let stuck = self.crowd.step(&self.order());
-        self.note(&before);
-        self.outcome = self.ended(stuck);
+        self.outcome =
+            if self.look() { self.advance() } else { Some(Outcome::Stuck { member: self.leader() as u32 + 1 }) };
         if let Some(outcome) = self.outcome {
             self.tell(None, EventKind::End(outcome));
         }
         self.outcome
     }
 
-    /// Leads the team along another route from where it is; the first waypoint is where its leader is to begin.
-    ///
-    /// # Errors
-    /// A route without a length.
-    pub fn reroute(&mut self, route_m: &[Vector]) -> Result<(), TeamError> {
-        self.route_m = divided(route_m, self.parameters.leg_max_m())?;
-        self.metrics.replans += 1;
-        self.tell(None, EventKind::Replanned);
-        self.place_anew(|slot, _| usize::from(slot == 0));
-        Ok(())
+    /// Speeds, and a step of all members.
+    fn advance(&mut self) -> Option<Outcome> {
+        self.tune_speeds();
+        let before: Vec<Motion> = self.crowd.motions().to_vec();
+        let stuck = self.crowd.step(&self.order());
+        self.note(&before);
+        self.ended(stuck)
+    }
+
+    /// Looks around where the team plans its way itself; false where no way is left.
+    fn look(&mut self) -> bool {
+        let leader_m = self.motion_in(0).position_m;
+        let Some(scout) = &mut self.scout else { return true };
+        match scout.look(leader_m) {
+            Advice::GoOn => true,
+            Advice::NoWay => false,
+            Advice::Lead { ahead_m, turns } => {
+                if turns {
+                    self.metrics.replans += 1;
+                    self.tell(None, EventKind::Replanned);
+                }
+                self.lead_on(&ahead_m);
+                true
+            }
+        }
+    }
+
+    /// Leads the team on from where its leader is. Waypoints that others have still to pass stay, thinned, so that their headings are those of
+    /// whole legs, not of every look around.
+    fn lead_on(&mut self, ahead_m: &[Vector]) {
+        let leader_m = self.motion_in(0).position_m;
+        // Straight to the second point where that may be travelled: the first is the node beside the leader.
+        let straight = ahead_m.get(1).is_some_and(|second_m| self.crowd.is_passable(leader_m, *second_m));
+        let points_m = [&[leader_m], &ahead_m[usize::from(straight)..]].concat();
+        let Ok(ahead_m) = divided(&points_m, self.parameters.leg_max_m()) else { return };
+        let passed = self.motion_in(0).next.min(self.route_m.len() - 1);
+        let next = self.order().into_iter().map(|member| self.crowd.motions()[member].next);
+        let first = next.fold(passed, usize::min).saturating_sub(1);
+        let apart_m = self.parameters.leg_max_m().min(self.parameters.spacing_m);
+        let is_near = |point_m: &Vector| distance(*point_m, leader_m) < apart_m;
+        let near = self.route_m[first..passed].iter().rev().take_while(|point_m| is_near(point_m)).count();
+        let kept = passed - near;
+        self.route_m = [&self.route_m[first..kept], &ahead_m].concat();
+        self.first += first;
+        self.routes.push(TimedRoute { time_s: self.time_s(), points_m });
+        // The leader's place is now waypoint `kept`; those beside and before the leader make for the one after.
+        self.place_anew(|_, motion| match motion.next {
+            next if next < kept => next - first,
+            next if next < passed => kept - first,
+            next => next - passed + kept + 1 - first,
+        });
+        self.enter_waypoint(kept + 1 - first);
     }
 
     /// Time since the start, s.
@@ -262,9 +325,14 @@ impl<'a> Team<'a> {
         &self.formation
     }
 
-    /// Waypoints with the targets at each, m.
+    /// Waypoints that are still of use with the targets at each, m.
     pub fn placements(&self) -> (&[Vector], &[Placement]) {
         (&self.route_m, &self.placements)
+    }
+
+    /// The ways that the team made for so far, in order of time.
+    pub fn routes(&self) -> &[TimedRoute] {
+        &self.routes
     }
 
     /// Figures so far.
@@ -302,6 +370,11 @@ impl<'a> Team<'a> {
     /// Members in order of priority.
     fn order(&self) -> Vec<usize> {
         self.formation.slots().iter().map(|slot| slot.member as usize - 1).collect()
+    }
+
+    /// The member in the first slot, from 0.
+    fn leader(&self) -> usize {
+        self.formation.slots()[0].member as usize - 1
     }
 
     fn motion_in(&self, slot: usize) -> &Motion {
@@ -359,11 +432,12 @@ impl<'a> Team<'a> {
             let next = if at > last && moved_m > self.parameters.arrive_m { last } else { at };
             self.crowd.redirect(member, targets_m, next);
         }
+        self.crowd.stand_on(footing);
     }
 
     /// Notes what happened in a step.
     fn note(&mut self, before: &[Motion]) {
-        let leader = self.formation.slots()[0].member as usize - 1;
+        let leader = self.leader();
         let after: Vec<Motion> = self.crowd.motions().to_vec();
         for (k, (before, after)) in before.iter().zip(&after).enumerate() {
             self.metrics.driven_m[k] += length(after.moved_m);
@@ -375,7 +449,7 @@ impl<'a> Team<'a> {
                 self.metrics.dodges += 1;
                 self.tell_seldom(k, 1, !before.dodging, EventKind::Dodge);
             }
-            if after.phase == Phase::Arrived && before.phase != Phase::Arrived {
+            if self.leads_to_goal() && after.phase == Phase::Arrived && before.phase != Phase::Arrived {
                 self.tell(Some(k as u32 + 1), EventKind::Arrived);
             }
             if k == leader && after.next != before.next && after.next < self.placements.len() {
@@ -398,17 +472,22 @@ impl<'a> Team<'a> {
         self.boxes.push(TimedBox { time_s: self.time_s(), corners_m, squeezed });
         if squeezed {
             self.metrics.squeezed += 1;
-            self.tell(None, EventKind::Squeezed { waypoint });
+            self.tell(None, EventKind::Squeezed { waypoint: self.first + waypoint });
         }
     }
 
     fn ended(&self, stuck: Option<usize>) -> Option<Outcome> {
         let mut phases = self.crowd.motions().iter().map(|motion| motion.phase);
-        if phases.all(|phase| matches!(phase, Phase::Arrived | Phase::Lost)) {
+        if self.leads_to_goal() && phases.all(|phase| matches!(phase, Phase::Arrived | Phase::Lost)) {
             return Some(Outcome::Arrived);
         }
         let out_of_time = (self.time_s() >= self.time_max_s).then_some(Outcome::Timeout);
         stuck.map(|member| Outcome::Stuck { member: member as u32 + 1 }).or(out_of_time)
+    }
+
+    /// False while the way that the team makes for ends where its knowledge ends.
+    fn leads_to_goal(&self) -> bool {
+        self.scout.as_ref().is_none_or(Scout::leads_to_goal)
     }
 
     fn tell(&mut self, member: Option<u32>, kind: EventKind) {
@@ -423,6 +502,18 @@ impl<'a> Team<'a> {
             self.tell(Some(member as u32 + 1), kind);
         }
     }
+}
+
+fn scout<'a>(
+    ground: &'a TeamGround<'a>,
+    parameters: &TeamParameters,
+    route_m: &[Vector],
+) -> Result<Option<Scout<'a>>, TeamError> {
+    let [Some(&start_m), Some(&goal_m)] = [route_m.first(), route_m.last()] else { return Err(TeamError::Route) };
+    let scout = parameters
+        .sensing_radius_m
+        .map(|radius_m| Scout::new(ground, radius_m, parameters.arrive_m, [start_m, goal_m]));
+    Ok(scout.transpose()?)
 }
 
 fn placer<'a>(

@@ -65,7 +65,7 @@ fn prop_every_plan_costs_what_a_fresh_search_over_the_known_cells_does() {
             };
             assert_eq!(found.cost.to_bits(), fresh.to_bits());
             walker.at = found.path[1];
-            let changed = walker.known.sense(walker.at, 2.5);
+            let changed = walker.known.sense(walker.at);
             walker.search.move_to(&walker.known, walker.at);
             walker.search.changed(&walker.known, changed);
         }
@@ -81,4 +81,31 @@ fn val_what_cannot_be_walked_is_refused() {
     assert!(message(f64::NAN, [2, 0]).contains("NaN"));
     assert!(message(2.0, [2, 2]).contains("none exists with four neighbours"));
     assert!(message(2.0, [2, 1]).contains("blocked"));
+}
+
+#[test]
+fn prop_all_within_the_radius_is_seen_and_nothing_else() {
+    let mut random = Random(72);
+    for radius_m in [1.5, 2.0, 4.7, 11.0, 1e9] {
+        let map = rough(19, 23, 0.2, 0.5, &mut random);
+        let costs = CostModel::new(SlopeCost::THESIS, None, &map).unwrap();
+        let ground = Ground { map: &map, costs: &costs, clearance: None };
+        let mut places = vec![random.below(19 * 23) as Node];
+        let mut known = Known::new(GridNetwork { ground, neighbourhood: Neighbourhood::Eight }, radius_m, places[0]);
+        for _ in 0..12 {
+            let before = known.seen.clone();
+            places.push(random.below(19 * 23) as Node);
+            let changed = known.sense(places[places.len() - 1]);
+            let within = |node: &Node, place: &Node| {
+                let ([r, c], [row, col]) = (map.place(*node), map.place(*place));
+                let [down, across] = [r.abs_diff(row) as f64, c.abs_diff(col) as f64];
+                down * down + across * across <= radius_m * radius_m
+            };
+            for node in 0..map.len() as Node {
+                assert_eq!(known.seen[node as usize], places.iter().any(|place| within(&node, place)));
+                let newly = known.seen[node as usize] && !before[node as usize];
+                assert!(!newly || map.around(node).all(|near| changed.binary_search(&near).is_ok()));
+            }
+        }
+    }
 }

@@ -14,6 +14,7 @@ use crate::study::entry::joined;
 use crate::study::{Entry, StudyError, keys};
 use sastrugi_mobility::registry;
 use sastrugi_mobility::vehicle::Vehicle;
+use sastrugi_navigation::SlopeCost;
 use sastrugi_navigation::pairs::{Pair, PairParameters, draw_pairs};
 use sastrugi_navigation::parameters::{Cost, RouteParameters, Search as Method};
 use sastrugi_numeric::Streams;
@@ -263,6 +264,8 @@ impl RouteSearch {
 pub struct PlannedRoutes {
     /// Steepest climb and descent, degrees.
     pub limits_deg: [f64; 2],
+    /// Cost of slopes.
+    pub slope: SlopeCost,
     /// Outer rings of the obstacles that are polygons, in the coordinates of the heights, m.
     pub obstacles: Vec<Vec<[f64; 2]>>,
     /// The routes in order.
@@ -464,8 +467,12 @@ impl Job for RouteJob {
         dem::write(&work.output(GROUND), &site.open_ground(), &read.info.crs, &Default::default())
             .map_err(JobError::io)?;
         let points = self.points(&routes);
-        let planned =
-            PlannedRoutes { limits_deg: site.map().limits().degrees(), obstacles: site.rings().to_vec(), routes };
+        let planned = PlannedRoutes {
+            limits_deg: site.map().limits().degrees(),
+            slope: site.ground().costs.slope(),
+            obstacles: site.rings().to_vec(),
+            routes,
+        };
         work.write(ROUTES, &serde_json::to_vec(&planned).map_err(JobError::new)?)?;
         let mut products = vec![Product::internal(ROUTES), Product::internal(GROUND)];
         products.extend(self.write_lines(work, &read, &place, (&planned.routes, &rows))?);

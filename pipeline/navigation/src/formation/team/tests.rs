@@ -185,21 +185,6 @@ fn val_the_last_member_cannot_be_lost() {
 }
 
 #[test]
-fn val_a_changed_route_is_followed() {
-    let map = map_of(200, 200, limits(30.0, 30.0), |_, _| 0.0);
-    let costs = thesis_costs(&map);
-    let on = TeamGround::new(ground(&map, &costs));
-    let mut team = Team::new(&on, &of(Shape::Wedge), &[[50.0, 100.0], [150.0, 100.0]]).unwrap();
-    assert!((0..300).all(|_| team.step().is_none()));
-    let here_m = team.motions()[0].position_m;
-    team.reroute(&[here_m, [80.0, 160.0]]).unwrap();
-    assert_eq!(team.run(|_| ()).unwrap(), Outcome::Arrived);
-    assert!(distance(team.motions()[0].position_m, [80.0, 160.0]) <= 6.0);
-    assert_eq!(team.metrics().replans, 1);
-    assert_eq!(team.reroute(&[here_m]).unwrap_err(), TeamError::Route);
-}
-
-#[test]
 fn val_a_team_without_room_or_route_is_refused() {
     let map = crate::testing::drawn(&["######", "#..###", "######"]);
     let costs = thesis_costs(&map);

@@ -19,7 +19,7 @@ use sastrugi_navigation::formation::draws::draw;
 use sastrugi_navigation::formation::parameters::Shape;
 use sastrugi_navigation::formation::{Outcome as Ended, Team, TeamError, TeamGround, TeamParameters};
 use sastrugi_navigation::vertices::Vertices;
-use sastrugi_navigation::{CostModel, Ground, Method, SlopeCost, SlopeLimits, TravelMap};
+use sastrugi_navigation::{CostModel, Ground, Method, SlopeLimits, TravelMap};
 use sastrugi_numeric::{Grid, Streams};
 use sastrugi_schemas::Kind;
 use sastrugi_schemas::kind::{read_parameters, schema_of};
@@ -356,8 +356,9 @@ impl Job for NavigateJob {
     }
 
     fn memory_bytes(&self) -> u64 {
-        // Heights, steps, components and the search of a detour; samples of the runs at hand.
-        (256 << 20) + 60 * self.field.cells
+        // Heights, steps, components and the search of a detour; samples of the runs at hand; what each of them has seen, and its search.
+        let seen = self.lead.parameters.sensing_radius_m.map_or(0, |_| 60 * rayon::current_num_threads() as u64);
+        (256 << 20) + (60 + seen) * self.field.cells
     }
 
     fn estimate(&self) -> Estimate {
@@ -373,7 +374,7 @@ impl Job for NavigateJob {
         let [up_deg, down_deg] = planned.limits_deg;
         let limits = SlopeLimits::new(up_deg, down_deg).map_err(JobError::new)?;
         let map = TravelMap::new(heights, limits).map_err(JobError::new)?;
-        let costs = CostModel::new(SlopeCost::THESIS, None, &map).map_err(JobError::new)?;
+        let costs = CostModel::new(planned.slope, None, &map).map_err(JobError::new)?;
         let ground = TeamGround::new(Ground { map: &map, costs: &costs, clearance: None });
         let site = Site {
             ground: &ground,

@@ -8,7 +8,8 @@ use sastrugi_navigation::formation::team::{Event, EventKind, Sample};
 use sastrugi_navigation::formation::{Outcome, Team, TeamParameters};
 use sastrugi_schemas::tables::{FormationEventRow, FormationSampleRow};
 use sastrugi_schemas::topics::{
-    DiscState, FormationBox, Member, MemberState, MovingDisc, TeamEvent, TeamEventKind, TeamRecording,
+    DiscState, FormationBox, Member, MemberState, MovingDisc, PlannedRoute as TimedRoute, TeamEvent, TeamEventKind,
+    TeamRecording,
 };
 
 /// Samples of a run as it goes on.
@@ -82,18 +83,41 @@ pub fn recording(team: &Team<'_>, recorder: &Recorder<'_>, site: &Site<'_>, rout
     TeamRecording {
         sample_rate_hz: *sample_rate_hz,
         members: (0..members).map(member).collect(),
-        route_m: route.points_m.clone(),
+        routes: planned(team, recorder, route),
         search_path_m: route.searched_m.clone(),
         vertices_m: site.vertices_m.to_vec(),
         boxes: boxes.collect(),
         obstacles: site.planned.obstacles.clone(),
         moving: obstacles.iter().map(disc).collect(),
-        events: team.events().iter().flat_map(|event| told(event, members, route)).collect(),
+        events: team.events().iter().flat_map(|event| told(event, members, &set_out(recorder, route))).collect(),
+    }
+}
+
+/// The given route with the heights of its search, or those that the team planned.
+fn planned(team: &Team<'_>, recorder: &Recorder<'_>, route: &PlannedRoute) -> Vec<TimedRoute> {
+    if recorder.parameters.sensing_radius_m.is_none() {
+        return vec![TimedRoute { time_s: 0.0, points_m: route.points_m.clone() }];
+    }
+    let own = team.routes().iter().map(|one| TimedRoute {
+        time_s: one.time_s,
+        points_m: one.points_m.iter().map(|point_m| recorder.on_ground(*point_m)).collect(),
+    });
+    own.collect()
+}
+
+/// What a team sets out on, after "4 members set out ".
+fn set_out(recorder: &Recorder<'_>, route: &PlannedRoute) -> String {
+    let length_m = distances_m(&route.points_m).last().copied().unwrap_or(0.0);
+    match recorder.parameters.sensing_radius_m {
+        None => format!("along {length_m:.1} m"),
+        Some(radius_m) => {
+            format!("without a route and see {radius_m} m far; the one that they do not know has {length_m:.1} m")
+        }
     }
 }
 
 /// An event with its sentence; a run that ends badly has two.
-fn told(event: &Event, members: usize, route: &PlannedRoute) -> Vec<TeamEvent> {
+fn told(event: &Event, members: usize, set_out: &str) -> Vec<TeamEvent> {
     let one = |kind: TeamEventKind, member: Option<u32>, text: String| TeamEvent {
         time_s: event.time_s,
         kind,
@@ -103,10 +127,7 @@ fn told(event: &Event, members: usize, route: &PlannedRoute) -> Vec<TeamEvent> {
     let own = |kind: TeamEventKind, text: &str| vec![one(kind, event.member, text.to_owned())];
     let end = |text: String| one(TeamEventKind::End, None, text);
     match &event.kind {
-        EventKind::Start => {
-            let length_m = distances_m(&route.points_m).last().copied().unwrap_or(0.0);
-            own(TeamEventKind::Start, &format!("{members} members set out along {length_m:.1} m"))
-        }
+        EventKind::Start => own(TeamEventKind::Start, &format!("{members} members set out {set_out}")),
         EventKind::Wait => own(TeamEventKind::Wait, "waits"),
         EventKind::Dodge => own(TeamEventKind::Dodge, "leaves the straight line to its target"),
         EventKind::Lost => own(TeamEventKind::Lost, "is lost and stays as an obstacle"),
@@ -114,7 +135,7 @@ fn told(event: &Event, members: usize, route: &PlannedRoute) -> Vec<TeamEvent> {
         EventKind::Squeezed { waypoint } => {
             own(TeamEventKind::Squeezed, &format!("waypoint {} has too little room for the formation", waypoint + 1))
         }
-        EventKind::Replanned => own(TeamEventKind::Replanned, "follows a new route"),
+        EventKind::Replanned => own(TeamEventKind::Replanned, "makes for its goal by another way"),
         EventKind::Arrived => own(TeamEventKind::Arrived, "is at its last target"),
         EventKind::End(outcome) => {
             let time_s = event.time_s;

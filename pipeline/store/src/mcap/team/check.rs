@@ -94,7 +94,12 @@ fn numbers(state: &MemberState) -> Vec<f64> {
 }
 
 fn lines(recording: &TeamRecording) -> Result<(), McapError> {
-    finite("the route", recording.route_m.as_flattened())?;
+    for route in &recording.routes {
+        finite(
+            &format!("the route at {} s", route.time_s),
+            &[route.points_m.as_flattened(), &[route.time_s]].concat(),
+        )?;
+    }
     finite("the path of the search", recording.search_path_m.as_flattened())?;
     finite("the roadmap", recording.vertices_m.as_flattened())?;
     for one in &recording.boxes {

@@ -124,8 +124,10 @@ pub(super) struct Drawing<'a> {
     terrain: &'a TerrainView<'a>,
     /// What the points of lines and walls count from: whole metres near the south-west corner and the lowest height.
     pub origin: [f64; 3],
-    /// The planned route on the ground, in the map frame.
-    pub route: Vec<[f64; 3]>,
+    /// Times and planned routes on the ground, in the map frame.
+    pub routes: Vec<(f64, Vec<[f64; 3]>)>,
+    /// Waypoints of a route that was planned before, in the map frame; those of routes planned on the way come and go.
+    pub waypoints: &'a [[f64; 3]],
     /// The path of the search on the ground, in the map frame.
     pub search_path: Vec<[f64; 3]>,
     /// Height of lines above the ground, m.
@@ -141,14 +143,18 @@ impl<'a> Drawing<'a> {
         Self {
             terrain,
             origin: terrain.origin_m(),
-            route: laid(terrain.dem, &recording.route_m),
+            routes: recording.routes.iter().map(|route| (route.time_s, laid(terrain.dem, &route.points_m))).collect(),
+            waypoints: match &recording.routes[..] {
+                [route] => &route.points_m,
+                _ => &[],
+            },
             search_path: laid(terrain.dem, &recording.search_path_m),
             lift_m: LIFT_RADII * radii().fold(f64::INFINITY, f64::min),
             wall_m: WALL_RADII * radii().fold(0.0, f64::max),
         }
     }
 
-    /// Where the terrain is drawn in full: under the members, along the route and the path of the search, and a cell around.
+    /// Where the terrain is drawn in full: under the members, along the routes and the path of the search, and a cell around.
     pub(super) fn corridor(&self, recording: &TeamRecording) -> Vec<Square> {
         let [dx, dy] = self.terrain.dem.geometry.cell;
         let cell = dx.max(dy);
@@ -157,7 +163,8 @@ impl<'a> Drawing<'a> {
             .members
             .iter()
             .flat_map(|member| member.states.iter().map(move |state| square(state.position_m, member.radius_m + cell)));
-        let lines = self.route.iter().chain(&self.search_path).map(|&point| square(point, cell));
+        let lines =
+            self.routes.iter().flat_map(|(_, route)| route).chain(&self.search_path).map(|&point| square(point, cell));
         under.chain(lines).collect()
     }
 

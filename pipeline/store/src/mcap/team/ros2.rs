@@ -18,8 +18,10 @@ use sastrugi_schemas::topics::{FormationBox, Member, MemberState, TeamEvent, Tea
 pub(super) fn messages(team: &TeamMcap, out: &mut Timeline) -> Result<(), McapError> {
     let (recording, drawing) = (team.recording, Drawing::new(team));
     terrain_messages(team.terrain, &drawing.corridor(recording), out)?;
-    let route = looking_ahead(&drawing.route);
-    out.add(&TEAM_ROUTE, 0.0, |t| encode(&path(route.into_iter().map(|(at, turned)| (t, at, turned)), t)?))?;
+    for (time_s, points_m) in &drawing.routes {
+        let poses = looking_ahead(points_m);
+        out.add(&TEAM_ROUTE, *time_s, |t| encode(&path(poses.into_iter().map(|(at, turned)| (t, at, turned)), t)?))?;
+    }
     out.add(&TEAM_MARKERS, 0.0, |t| encode(&markers(team, &drawing, t)?))?;
     let bodies = bodies(recording);
     for (sample, time_s) in samples(recording) {
@@ -85,7 +87,7 @@ fn markers(team: &TeamMcap, drawing: &Drawing, log_time: u64) -> Result<Vec<Mark
         all.push(marker(MarkerKind::Spheres, of, [2.0 * radius_m; 3], rgb, vec![drawing.on_ground(point)])?);
     }
     let walls: Vec<[f64; 3]> = recording.obstacles.iter().flat_map(|ring| drawing.wall(ring)).collect();
-    let waypoints = drawing.lifted(&recording.route_m);
+    let waypoints = drawing.lifted(drawing.waypoints);
     let search = drawing.lifted(&drawing.search_path);
     let (size, width) = ([radius_m; 3], [0.25 * radius_m, 0.25 * radius_m, 0.0]);
     for (kind, of, scale, rgb, points) in [

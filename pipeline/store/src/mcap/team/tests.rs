@@ -8,7 +8,7 @@ use foxglove::messages as fox;
 use proptest::prelude::*;
 use prost::Message as _;
 use sastrugi_numeric::{Grid, Surface};
-use sastrugi_schemas::topics::{DiscState, FormationBox, Member, MemberState, MovingDisc};
+use sastrugi_schemas::topics::{DiscState, FormationBox, Member, MemberState, MovingDisc, PlannedRoute};
 use std::collections::BTreeMap as Map;
 
 const EPOCH_NS: u64 = 1_700_000_000_000_000_000;
@@ -52,7 +52,7 @@ fn drive(dem: &Grid, seconds: usize) -> TeamRecording {
     TeamRecording {
         sample_rate_hz: 20.0,
         members: members.into(),
-        route_m: ends.into(),
+        routes: vec![PlannedRoute { time_s: 0.0, points_m: ends.into() }],
         search_path_m: (0..12).map(|k| on_ground(CORNER[0] + 15.0 + 2.5 * f64::from(k), CORNER[1] + 33.0)).collect(),
         vertices_m: (0..400)
             .map(|k| on_ground(CORNER[0] + 1.25 + 2.5 * f64::from(k % 20), CORNER[1] + 2.0 + 2.5 * f64::from(k / 20)))
@@ -286,7 +286,7 @@ fn val_impossible_recordings_are_refused() {
         (|r| r.moving[0].radius_m = f64::NAN, "the radius of moving_1 must be positive and finite, got NaN m"),
         (|r| r.members[1].states[2].position_m[2] = f64::NAN, "member_2 at 0.1 s holds NaN"),
         (|r| r.members[1].states[2].depth_error_m = Some(f64::INFINITY), "member_2 at 0.1 s holds inf"),
-        (|r| r.route_m[1][0] = f64::NAN, "the route holds NaN"),
+        (|r| r.routes[0].points_m[1][0] = f64::NAN, "the route at 0 s holds NaN"),
         (|r| r.boxes[1].corners_m[3][2] = f64::NAN, "the box at 0.5 s holds NaN"),
         (|r| r.obstacles[0].truncate(2), "obstacle 1 needs at least 3 corners, got 2"),
         (|r| r.events[1].member = Some(9), "squeezed at 1 s names an unknown member 9"),
@@ -305,9 +305,9 @@ fn val_a_bare_recording_is_written() {
     let mut scene = Scene::new(0);
     let recording = &mut scene.recording;
     recording.members.truncate(1);
-    for line in [&mut recording.route_m, &mut recording.search_path_m, &mut recording.vertices_m] {
-        line.clear();
-    }
+    recording.routes.clear();
+    recording.search_path_m.clear();
+    recording.vertices_m.clear();
     recording.boxes.clear();
     recording.obstacles.clear();
     recording.moving.clear();
@@ -317,12 +317,37 @@ fn val_a_bare_recording_is_written() {
     }
 }
 
+/// A team that plans on its way: each route comes when it is made for, and none of their waypoints is marked.
+#[test]
+fn val_routes_planned_on_the_way_come_one_after_the_other() {
+    let mut scene = Scene::new(2);
+    let first = scene.recording.routes[0].clone();
+    let [a, b, c] = [0, 1, 2].map(|k| first.points_m[k]);
+    scene.recording.routes = [(0.0, vec![a, b]), (0.7, vec![b, c]), (1.3, vec![c, a])]
+        .map(|(time_s, points_m)| PlannedRoute { time_s, points_m })
+        .into();
+    let (bytes, _) = scene.encode(McapFlavour::Viewer).unwrap();
+    let messages = read(&bytes);
+    let routes: Vec<(f64, [f64; 3])> = on(&messages, "/team/route")
+        .map(|message| {
+            let route = fox::PosesInFrame::decode(message.data.as_ref()).unwrap();
+            let at = route.poses[0].position.unwrap();
+            ((message.log_time - EPOCH_NS) as f64 * 1e-9, [at.x, at.y, at.z])
+        })
+        .collect();
+    assert_eq!(routes, [(0.0, a), (0.7, b), (1.3, c)]);
+    let graph = fox::SceneUpdate::decode(on(&messages, "/team/graph").next().unwrap().data.as_ref()).unwrap();
+    assert!(graph.entities.iter().find(|entity| entity.id == "waypoints").unwrap().spheres.is_empty());
+    let (bytes, _) = scene.encode(McapFlavour::Ros2).unwrap();
+    assert_eq!(on(&read(&bytes), "/team/route").count(), 3);
+}
+
 /// Holes in the terrain, and a team, obstacles and lines beyond it: numbers stay finite.
 #[test]
 fn val_no_ground_under_a_line() {
     let mut scene = Scene::new(1);
     scene.dem.values[50 * 120..70 * 120].fill(f64::NAN);
-    scene.recording.route_m.push([CORNER[0] + 400.0, CORNER[1] - 10.0, 3.0]);
+    scene.recording.routes[0].points_m.push([CORNER[0] + 400.0, CORNER[1] - 10.0, 3.0]);
     scene.recording.obstacles.push(vec![[0.0; 2], [1.0, 0.0], [0.0, 1.0]]);
     let (bytes, _) = scene.encode(McapFlavour::Viewer).unwrap();
     let messages = read(&bytes);
@@ -446,7 +471,7 @@ proptest! {
             let state = MemberState { position_m: at, heading_rad: heading, ..member.states[0] };
             member.states = times.iter().map(|&time_s| MemberState { time_s, ..state }).collect();
         }
-        recording.route_m = vec![at, [0.0; 3], at];
+        recording.routes[0].points_m = vec![at, [0.0; 3], at];
         recording.vertices_m = vec![at];
         recording.boxes.iter_mut().for_each(|one| one.corners_m[0] = at);
         for flavour in [McapFlavour::Viewer, McapFlavour::Ros2] {

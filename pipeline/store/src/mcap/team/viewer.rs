@@ -31,7 +31,9 @@ pub(super) fn messages(team: &TeamMcap, out: &mut Timeline) -> Result<(), McapEr
     out.add(&mesh_topic::TOPIC, 0.0, |t| Ok(terrain_mesh(team.terrain, &near, timestamp(t)?).encode_to_vec()))?;
     out.add(&terrain_grid::TOPIC, 0.0, |t| Ok(terrain_from_above(team.terrain, timestamp(t)?).encode_to_vec()))?;
     out.add(&team_shape::TOPIC, 0.0, |t| Ok(shape(team, &drawing, timestamp(t)?).encode_to_vec()))?;
-    out.add(&team_route::TOPIC, 0.0, |t| Ok(route(&drawing, timestamp(t)?).encode_to_vec()))?;
+    for (time_s, points_m) in &drawing.routes {
+        out.add(&team_route::TOPIC, *time_s, |t| Ok(route(points_m, timestamp(t)?).encode_to_vec()))?;
+    }
     out.add(&team_paths::TOPIC, 0.0, |t| Ok(paths(recording, &drawing, timestamp(t)?).encode_to_vec()))?;
     out.add(&team_graph::TOPIC, 0.0, |t| Ok(graph(recording, &drawing, timestamp(t)?).encode_to_vec()))?;
     let names: Vec<String> = recording.members.iter().map(|member| member.name.clone()).collect();
@@ -118,8 +120,8 @@ fn sphere(drawing: &Drawing, [x, y, z]: [f64; 3], diameter_m: f64, rgb: [u8; 3])
     }
 }
 
-fn route(drawing: &Drawing, time: Timestamp) -> fox::PosesInFrame {
-    let poses = looking_ahead(&drawing.route).into_iter().map(|(at, turned)| pose(at, turned));
+fn route(points_m: &[[f64; 3]], time: Timestamp) -> fox::PosesInFrame {
+    let poses = looking_ahead(points_m).into_iter().map(|(at, turned)| pose(at, turned));
     fox::PosesInFrame { timestamp: Some(time), frame_id: MAP.to_owned(), poses: poses.collect() }
 }
 
@@ -151,7 +153,7 @@ fn paths(recording: &TeamRecording, drawing: &Drawing, time: Timestamp) -> fox::
 
 fn graph(recording: &TeamRecording, drawing: &Drawing, time: Timestamp) -> fox::SceneUpdate {
     let diameter_m = recording.members.first().map_or(0.0, |member| member.radius_m);
-    let waypoints = drawing.lifted(&recording.route_m);
+    let waypoints = drawing.lifted(drawing.waypoints);
     let spheres = waypoints.into_iter().map(|at| sphere(drawing, at, diameter_m, ROUTE)).collect();
     let waypoints = fox::SceneEntity { spheres, ..entity(time, MAP, "waypoints", false) };
     let search = line(drawing, drawing.lifted(&drawing.search_path), SEARCH);
