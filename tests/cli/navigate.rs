@@ -93,8 +93,18 @@ fn val_refusals() {
             65,
             "the start (1, 2) lies outside of the terrain, which covers x from 238933 to 239204",
         ),
-        ("238990.5,3765350.5", "238990.2,3765350.3", 65, "start and goal are both row 31, column 57"),
-        ("238990.5,3765350.5", "238940.5,3765110.5", 65, "the goal (row 271, column 7, height NaN m) is blocked"),
+        (
+            "238990.5,3765350.5",
+            "238990.2,3765350.3",
+            65,
+            "the start (238990.5, 3765350.5) and the goal (238990.2, 3765350.3) lie in the same cell of 1 x 1 m",
+        ),
+        (
+            "238990.5,3765350.5",
+            "238940.5,3765110.5",
+            65,
+            "the goal (238940.5, 3765110.5) cannot be entered: there is no height in its cell",
+        ),
         ("238990", "239010,3765150", 2, "`--start 238990`: it takes 2 numbers"),
     ] {
         let call = sastrugi_in(folder.path(), &["navigate", &dem, "--start", start, "--goal", goal, "-o", "r.geojson"]);

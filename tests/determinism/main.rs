@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may end where it stands")]
 
-use sastrugi_tests::{area, called, differing, program, sastrugi_in, small_study, sums, write};
+use sastrugi_tests::{area, called, differing, program, routed_study, sastrugi_in, sums, write};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -29,18 +29,18 @@ fn assert_same(a: &BTreeMap<String, String>, b: &BTreeMap<String, String>, what:
 
 #[test]
 fn gold_threads_change_nothing() {
-    let one = run_fresh(&small_study(), &["--threads", "1"]);
+    let one = run_fresh(&routed_study(), &["--threads", "1"]);
     for threads in ["2", "8"] {
-        assert_same(&one, &run_fresh(&small_study(), &["--threads", threads]), threads);
+        assert_same(&one, &run_fresh(&routed_study(), &["--threads", threads]), threads);
     }
 }
 
 #[test]
 fn gold_shards_change_nothing() {
-    let whole = run_fresh(&small_study(), &[]);
+    let whole = run_fresh(&routed_study(), &[]);
     for count in [1, 3] {
         let folder = area();
-        write(folder.path(), "study.toml", &small_study());
+        write(folder.path(), "study.toml", &routed_study());
         let mut merge = vec!["merge".to_owned()];
         for index in 1..=count {
             let (shard, part) = (format!("{index}/{count}"), format!("part{index}"));
@@ -80,9 +80,9 @@ fn run_with_kills(folder: &Path, whole: &BTreeMap<String, String>, pauses: &[Dur
 /// Kills at moments spread over the run's time (the moments need no seed: any of them must do).
 #[test]
 fn gold_kills_change_nothing() {
-    let whole = run_fresh(&small_study(), &[]);
+    let whole = run_fresh(&routed_study(), &[]);
     let folder = area();
-    write(folder.path(), "study.toml", &small_study());
+    write(folder.path(), "study.toml", &routed_study());
     let pauses = [5, 40, 80, 120, 170, 230, 300, 380, 470, 570, 700, 900].map(Duration::from_millis);
     assert_same(&whole, &run_with_kills(folder.path(), &whole, &pauses), "after kills");
     let left: Vec<String> = std::fs::read_dir(folder.path())
@@ -145,21 +145,21 @@ fn gold_a_native_build_changes_nothing() {
         .unwrap();
     assert!(built.success());
     let folder = area();
-    write(folder.path(), "study.toml", &small_study());
+    write(folder.path(), "study.toml", &routed_study());
     let mut command = Command::new(target.join("release/sastrugi"));
     let call = called(command.args(["run", "study.toml", "-o", "release", "--quiet"]).current_dir(folder.path()));
     assert_eq!(call.code, 0, "{}", call.stderr);
-    assert_same(&run_fresh(&small_study(), &[]), &sums(&folder.path().join("release")), "target-cpu=native");
+    assert_same(&run_fresh(&routed_study(), &[]), &sums(&folder.path().join("release")), "target-cpu=native");
 }
 
 /// Streams go by id: one more terrain changes no artifact of the others.
 #[test]
 fn gold_an_added_terrain_changes_no_other_byte() {
     let folder = area();
-    write(folder.path(), "study.toml", &small_study());
+    write(folder.path(), "study.toml", &routed_study());
     let before = run(folder.path(), &[]);
     let added = "[[terrain]]\nid = \"added\"\nkind = \"weierstrass_mandelbrot\"\nsize_px = [64, 64]\n\n[[terrain]]\nid = \"smooth\"";
-    write(folder.path(), "study.toml", &small_study().replacen("[[terrain]]\nid = \"smooth\"", added, 1));
+    write(folder.path(), "study.toml", &routed_study().replacen("[[terrain]]\nid = \"smooth\"", added, 1));
     let plan = sastrugi_in(folder.path(), &["plan", "study.toml", "--json"]);
     let plan: serde_json::Value = serde_json::from_str(&plan.stdout).unwrap();
     let stale: Vec<&str> = plan["stale"].as_array().unwrap().iter().filter_map(|s| s["item"].as_str()).collect();
@@ -178,13 +178,13 @@ fn gold_an_added_terrain_changes_no_other_byte() {
 #[test]
 fn gold_an_edited_study_drops_its_orphans() {
     let folder = area();
-    write(folder.path(), "study.toml", &small_study());
+    write(folder.path(), "study.toml", &routed_study());
     run(folder.path(), &[]);
-    write(folder.path(), "study.toml", &small_study().replace("count = 2\n", "count = 1\n"));
+    write(folder.path(), "study.toml", &routed_study().replace("count = 2\n", "count = 1\n"));
     let after = run(folder.path(), &[]);
     assert!(!after.keys().any(|p| p.contains("rough-0002")));
     assert!(!folder.path().join("release.work/items/terrain/rough-0002").join("record.json").exists());
     let kept = std::fs::read_dir(folder.path().join("release.work/items/terrain/rough-0002"));
     assert!(kept.map_or(true, |mut entries| entries.next().is_none()));
-    assert_same(&after, &run_fresh(&small_study().replace("count = 2\n", "count = 1\n"), &[]), "edited or fresh");
+    assert_same(&after, &run_fresh(&routed_study().replace("count = 2\n", "count = 1\n"), &[]), "edited or fresh");
 }

@@ -106,6 +106,36 @@ fn val_runs_have_rows_samples_events_and_recordings() {
     assert!(runs.iter().all(|row| number(row, "spacing_m").is_nan() == (text(row, "formation") == "custom")));
 }
 
+/// A team that knows the route beside teams that plan on what they see: all arrive, those that see little plan anew, and their recordings hold
+/// every route.
+#[test]
+fn val_teams_plan_on_what_they_see() {
+    let folder = area();
+    let (head, _) = STUDY.split_once("[[navigate]]").unwrap();
+    let team = "[[navigate]]\nid = \"team\"\nroute = \"ways\"\nformation = \"wedge\"\nspacing_m = 4.0\n";
+    let seeing = team.replace("\"team\"", "\"seeing\"") + "sweep.sensing_radius_m = [8.0, 500.0]\n";
+    let sums = run(folder.path(), &[head, team, &seeing].concat(), &[]);
+    let release = folder.path().join("release");
+    let (runs, events) = (rows(&release, "formations"), rows(&release, "formation_events"));
+    assert_eq!(runs.len(), 2 * 2 * 3);
+    let mut replans = BTreeMap::new();
+    for run in &runs {
+        assert_eq!(text(run, "outcome"), "arrived", "{run:?}");
+        let of = |row: &&Row| ["terrain_id", "run_id"].iter().all(|key| text(row, key) == text(run, key));
+        let told = events.iter().filter(of).filter(|row| text(row, "kind") == "replanned").count();
+        assert_eq!(told as f64, number(run, "replans"));
+        *replans.entry(text(run, "stage_id").to_owned()).or_insert(0.0) += number(run, "replans");
+        let info = sastrugi_in(&release, &["info", text(run, "path"), "--json"]);
+        let info: serde_json::Value = serde_json::from_str(&info.stdout).unwrap();
+        let routes = info["topics"]["/team/route"].as_u64().unwrap();
+        let sees_little = text(run, "stage_id").contains("8");
+        assert!(if sees_little { routes > 5 } else { routes == 1 }, "{}: {routes}", text(run, "run_id"));
+        assert!(sums.contains_key(text(run, "path")));
+    }
+    let counts: Vec<bool> = replans.values().map(|count| *count > 0.0).collect();
+    assert_eq!(counts.iter().filter(|planned| **planned).count(), 1, "{replans:?}");
+}
+
 #[test]
 fn val_draws_differ_from_run_to_run_and_stay() {
     let folder = area();

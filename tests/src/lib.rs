@@ -137,6 +137,45 @@ missions = "short"
     )
 }
 
+/// The small study with routes: missions along them, and teams that plan on what they see.
+pub fn routed_study() -> String {
+    small_study()
+        + r#"
+[[missions]]
+id = "planned"
+kind = "routed"
+of = "short"
+vehicle = "husky_a200"
+route = { cost = "band_rms", plan_cell_m = 0.1 }
+
+[[traverse]]
+id = "along"
+missions = "planned"
+
+[[route]]
+id = "ways"
+terrains = ["rough"]
+pairs = 2
+border_m = 1.5
+plan_cell_m = 0.1
+max_up_deg = 60.0
+max_down_deg = 60.0
+
+[[navigate]]
+id = "team"
+route = "ways"
+formation = "wedge"
+spacing_m = 0.8
+radius_m = 0.1
+arrive_m = 0.2
+speed_m_s = 0.4
+speed_min_m_s = 0.1
+speed_max_m_s = 0.8
+sensing_radius_m = 2.5
+drawn_losses = 1
+"#
+}
+
 /// One row of a table: values by column; text, numbers, or null.
 pub type Row = BTreeMap<String, serde_json::Value>;
 

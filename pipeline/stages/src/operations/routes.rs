@@ -147,9 +147,17 @@ impl Site {
     /// The pair of nodes nearest to two points in the coordinates of the heights, m.
     ///
     /// # Errors
-    /// A point that is not on the map.
-    pub fn pair(&self, [start, goal]: [[f64; 2]; 2]) -> Result<Pair, JobError> {
-        Ok(Pair { start: self.node("start", start)?, goal: self.node("goal", goal)?, draws: 1 })
+    /// A point that is not on the map or cannot be entered, or both in one cell.
+    pub fn pair(&self, [start_m, goal_m]: [[f64; 2]; 2]) -> Result<Pair, JobError> {
+        let pair = Pair { start: self.node("start", start_m)?, goal: self.node("goal", goal_m)?, draws: 1 };
+        if pair.start != pair.goal {
+            return Ok(pair);
+        }
+        let ([x, y], [dx, dy]) = (start_m, self.map.cell_m());
+        Err(JobError::input(format!(
+            "the start ({x}, {y}) and the goal ({}, {}) lie in the same cell of {dx} x {dy} m; choose points farther apart",
+            goal_m[0], goal_m[1]
+        )))
     }
 
     fn node(&self, name: &str, [x, y]: [f64; 2]) -> Result<Node, JobError> {
@@ -162,7 +170,12 @@ impl Site {
             ))
         };
         let (row, col) = g.cell_at(x, y).ok_or_else(outside)?;
-        Ok(self.map.node(row, col))
+        let node = self.map.node(row, col);
+        if !self.map.is_blocked(node) {
+            return Ok(node);
+        }
+        let there = if self.map.height_m(node).is_finite() { "an obstacle covers" } else { "there is no height in" };
+        Err(JobError::input(format!("the {name} ({x}, {y}) cannot be entered: {there} its cell; choose another point")))
     }
 
     /// Nodes as points in the coordinates of the heights, with their heights, m.

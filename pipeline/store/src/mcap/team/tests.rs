@@ -328,14 +328,14 @@ fn val_routes_planned_on_the_way_come_one_after_the_other() {
         .into();
     let (bytes, _) = scene.encode(McapFlavour::Viewer).unwrap();
     let messages = read(&bytes);
-    let routes: Vec<(f64, [f64; 3])> = on(&messages, "/team/route")
+    let routes: Vec<(u64, [f64; 3])> = on(&messages, "/team/route")
         .map(|message| {
             let route = fox::PosesInFrame::decode(message.data.as_ref()).unwrap();
             let at = route.poses[0].position.unwrap();
-            ((message.log_time - EPOCH_NS) as f64 * 1e-9, [at.x, at.y, at.z])
+            (message.log_time - EPOCH_NS, [at.x, at.y, at.z])
         })
         .collect();
-    assert_eq!(routes, [(0.0, a), (0.7, b), (1.3, c)]);
+    assert_eq!(routes, [(0, a), (700_000_000, b), (1_300_000_000, c)]);
     let graph = fox::SceneUpdate::decode(on(&messages, "/team/graph").next().unwrap().data.as_ref()).unwrap();
     assert!(graph.entities.iter().find(|entity| entity.id == "waypoints").unwrap().spheres.is_empty());
     let (bytes, _) = scene.encode(McapFlavour::Ros2).unwrap();
