@@ -8,8 +8,8 @@ use sastrugi_schemas::Record;
 use sastrugi_schemas::study::McapFlavour;
 use sastrugi_schemas::tables::SampleRow;
 use sastrugi_schemas::topics::{
-    CommandSample, ImuSample, Member, MemberState, Recording, StateSample, TeamRecording, VehicleOutline, WheelOutline,
-    WheelSample, WheelState,
+    CommandSample, ImuSample, Member, MemberState, PlannedRoute, Recording, StateSample, TeamRecording, VehicleOutline,
+    WheelOutline, WheelSample, WheelState,
 };
 use sastrugi_store::dem::{self, Crs, WriteOptions};
 use sastrugi_store::mcap::{self, MissionMcap, TeamMcap, TerrainView};
@@ -149,7 +149,7 @@ fn team(dem: &Grid) -> TeamRecording {
     TeamRecording {
         sample_rate_hz: 20.0,
         members: (1..=4).map(member).collect(),
-        route_m: vec![place(5.0, 25.0), place(42.0, 25.0)],
+        routes: vec![PlannedRoute { time_s: 0.0, points_m: vec![place(5.0, 25.0), place(42.0, 25.0)] }],
         search_path_m: vec![],
         vertices_m: (0..100_000).map(|k| place(0.15 * f64::from(k % 330), 0.15 * f64::from(k / 330))).collect(),
         boxes: vec![],
