@@ -150,6 +150,10 @@ fn val_obstacles_are_kept_clear_of() {
     assert!(points.iter().filter(inside).all(|row| number(row, "y_m") < 18.0));
     assert!(points.iter().filter(inside).count() > 0);
     assert!(sums(&release).keys().any(|path| path.starts_with("mask/r-1")));
+    let blocked = sastrugi_store::dem::read_classes(&release.join("route/hills-0001/r.blocked.tif")).unwrap();
+    let at = |x: f64, y: f64| blocked.geometry.cell_at(x, y).map(|(row, col)| blocked.at(row, col));
+    assert_eq!([at(55.5, 50.5), at(48.5, 50.5), at(55.5, 18.5)], [Some(1); 3], "the wall and its margin");
+    assert_eq!([at(45.5, 50.5), at(55.5, 10.5)], [Some(0); 2]);
 
     let folder = area();
     write(folder.path(), "wall.geojson", &polygon(-5.0));

@@ -4,7 +4,7 @@ use crate::ReportError;
 use crate::content::{Figure, Numbers, number};
 use crate::data::{Data, of_key};
 use crate::questions::relief::{MAP_WIDTH, exaggeration_words, extent};
-use crate::questions::routes::maps::{DARK, LIGHT, draw, legend_track, track};
+use crate::questions::routes::maps::{DARK, LIGHT, closed, draw, ground, legend_track, track};
 use crate::questions::sql::quoted;
 use crate::render::axis::Axis;
 use crate::render::chart::{Entry, Mark, Plot, WIDTH};
@@ -13,7 +13,7 @@ use crate::render::map::{Key, Map};
 use crate::render::svg::{Paint, Stroke, Symbol};
 use crate::render::{number as set, picture, thin};
 use sastrugi_numeric::{Grid, sums};
-use sastrugi_schemas::tables::{FormationRow, FormationSampleRow};
+use sastrugi_schemas::tables::{FormationRow, FormationSampleRow, RouteRow};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Errors up to this share of the spacing are in range (Bayrak, 2008, section 5.3).
@@ -212,7 +212,12 @@ pub fn tracks(data: &Data, scene: Scene) -> Result<Option<Figure>, ReportError> 
     let now: Vec<&FormationSampleRow> = members.iter().filter_map(|m| nearest(m, time_s)).collect();
     let middle = now.iter().find(|s| s.member == member).or(now.first());
     let (Some(middle), Some(terrain)) = (middle, data.terrain(&run.terrain_id)) else { return Ok(None) };
-    let Some(heights) = data.files.grid(&terrain.path)? else { return Ok(None) };
+    let of_run = |route: &&RouteRow| (&route.terrain_id, &route.route_id) == (&run.terrain_id, &run.route_id);
+    let heights = match data.routes.iter().find(of_run) {
+        Some(route) => ground(data, &terrain.path, route)?,
+        None => data.files.grid(&terrain.path)?,
+    };
+    let Some(heights) = heights else { return Ok(None) };
     let spacing = if run.spacing_m > 0.0 { run.spacing_m } else { 10.0 };
     let grid = about(&heights, (middle.x_m, middle.y_m), WINDOW_SPACINGS * spacing);
     let Some(range) = grid.range() else { return Ok(None) };
@@ -221,7 +226,7 @@ pub fn tracks(data: &Data, scene: Scene) -> Result<Option<Figure>, ReportError> 
     let state = |lost: bool| now.iter().any(|s| (s.state == "lost") == lost);
     let ends = [(Symbol::Disc, marks, state(false)), (Symbol::Cross, "lost", state(true))];
     let ends = ends.into_iter().filter(|e| e.2).map(|e| (Mark::Symbol(e.0, Paint::Ink), e.1.to_owned()));
-    let entries: Vec<Entry> = now.iter().map(entry).chain(ends).collect();
+    let entries: Vec<Entry> = now.iter().map(entry).chain(ends).chain(closed(&grid)).collect();
     let mut map = Map::new(&picture::relief(&grid, range, factor, PIXELS)?, MAP_WIDTH, &Key::Entries(&entries));
     map.clip(&format!("{id}-clip"));
     for own in &members {

@@ -2,6 +2,7 @@
 
 use super::{assert_sound, made_up, report, rows};
 use crate::data::Data;
+use sastrugi_numeric::Grid;
 
 /// Routes and teams alone, on `per_group` terrains in each of three groups.
 fn navigated(per_group: usize) -> Data {
@@ -34,6 +35,24 @@ fn val_ratios_are_paired_with_the_grid() {
         assert!(summary.figures.iter().any(|f| f == figure), "{figure}");
     }
     assert!(page.contains("3 maps, one for each group"));
+}
+
+/// What a route's obstacles block is grey on the maps of routes and of tracks; the legend says what that means.
+#[test]
+fn val_obstacles_are_seen_on_maps() {
+    let (mut data, mut shelf) = made_up::parts(1, 24);
+    let legends = |data: &Data| report(data).0["index.html"].matches("cannot be entered").count();
+    assert_eq!(legends(&data), 0);
+    let paths =
+        data.routes.iter().map(|r| (format!("route/{}/{}.blocked.tif", r.terrain_id, r.stage_id), &r.terrain_id));
+    for (path, terrain) in paths {
+        let heights = &shelf.grids[&data.terrain(terrain).unwrap().path];
+        let codes = (0..heights.values.len()).map(|k| u8::from(k % heights.cols() == heights.cols() / 2)).collect();
+        let blocked = Grid { geometry: heights.geometry, values: codes };
+        shelf.classes.insert(path, blocked);
+    }
+    data.files = Box::new(shelf);
+    assert!(legends(&data) >= 3, "{}", legends(&data));
 }
 
 /// Three terrains are too few for an interval: the ends stand alone.

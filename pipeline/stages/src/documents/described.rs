@@ -17,7 +17,10 @@ pub const FOLDERS: [(&str, &str); 11] = [
     ("texture/", "synthesised textures, GeoTIFF, float32 metres, no data -9999"),
     ("classes/", "roughness classes: 0 low, 1 semi, 2 high, 255 none; `.raw.tif` before closing"),
     ("fit/", "covariance fits (JSON), with background, residual and the cells used"),
-    ("route/", "planned routes, GeoJSON in the terrain's own coordinates (m), not RFC 7946's WGS84"),
+    (
+        "route/",
+        "planned routes, GeoJSON in the terrain's own coordinates (m), not RFC 7946's WGS84; `.blocked.tif`: 1 where obstacles keep routes out",
+    ),
     ("mcap/", "one recording per mission, or run of a team"),
     ("tables/", "Parquet, units and descriptions in the column metadata"),
     ("report/", "report: `index.html`, one offline page"),

@@ -22,7 +22,7 @@ use sastrugi_schemas::Kind;
 use sastrugi_schemas::Record;
 use sastrugi_schemas::study::{RoughnessSection, RouteItem};
 use sastrugi_schemas::tables::{RoutePointRow, RouteRow};
-use sastrugi_store::{dem, geojson};
+use sastrugi_store::{dem, digest, geojson};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeSet;
@@ -32,6 +32,8 @@ use std::sync::Arc;
 pub const STAGE: &str = "route";
 /// The heights that were planned on, without data where a cell cannot be entered.
 pub const GROUND: &str = "ground.tif";
+/// Cells that obstacles block.
+const BLOCKED: &str = "blocked.tif";
 /// The planned routes, for teams.
 const ROUTES: &str = "routes.json";
 /// The planned routes, for the release.
@@ -401,6 +403,14 @@ impl RouteJob {
         Ok(Some(Product::released(LINES, self.release_path(), None)))
     }
 
+    /// Writes the cells that obstacles block; nothing where there are none.
+    fn write_blocked(&self, work: &Work<'_>, site: &Site, read: &dem::Dem) -> Result<Option<Product>, JobError> {
+        let Some(blocked) = site.blocked_cells() else { return Ok(None) };
+        dem::write_classes(&work.output(BLOCKED), &blocked, &read.info.crs).map_err(JobError::io)?;
+        let path = format!("route/{}/{}.blocked.tif", self.terrain, self.search.id);
+        Ok(Some(Product::released(BLOCKED, path, Some(digest::classes(&blocked)))))
+    }
+
     fn points(&self, planned: &[PlannedRoute]) -> Vec<RoutePointRow> {
         let of_route = |route: &PlannedRoute| {
             let forms = [("searched", &route.searched_m), ("smoothed", &route.points_m)];
@@ -476,6 +486,7 @@ impl Job for RouteJob {
         work.write(ROUTES, &serde_json::to_vec(&planned).map_err(JobError::new)?)?;
         let mut products = vec![Product::internal(ROUTES), Product::internal(GROUND)];
         products.extend(self.write_lines(work, &read, &place, (&planned.routes, &rows))?);
+        products.extend(self.write_blocked(work, &site, &read)?);
         let mut outcome = Outcome { products, notes: notes(&rows) };
         outcome.write_rows(work, points)?;
         outcome.write_rows(work, rows)?;

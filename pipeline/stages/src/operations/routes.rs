@@ -195,6 +195,15 @@ impl Site {
         heights
     }
 
+    /// Cells that cannot be entered though they have a height: 1, others 0; `None` where there are none. The geometry is that of the ground
+    /// planned on.
+    pub fn blocked_cells(&self) -> Option<Grid<u8>> {
+        let heights = self.map.heights();
+        let nodes = heights.values.iter().zip(0..);
+        let values: Vec<u8> = nodes.map(|(z, node)| u8::from(z.is_finite() && self.map.is_blocked(node))).collect();
+        values.contains(&1).then(|| Grid { geometry: heights.geometry, values })
+    }
+
     /// Cells that may be entered.
     pub fn free_cells(&self) -> usize {
         (0..self.map.len() as Node).filter(|node| !self.map.is_blocked(*node)).count()

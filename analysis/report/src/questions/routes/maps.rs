@@ -7,10 +7,12 @@ use crate::data::{Data, of_key};
 use crate::questions::relief::{MAP_WIDTH, exaggeration_words, extent};
 use crate::questions::sql::quoted;
 use crate::render::chart::{Entry, Mark};
+use crate::render::colour::NO_DATA;
 use crate::render::hillshade::exaggeration;
 use crate::render::map::{Key, Map};
 use crate::render::svg::{Paint, SERIES, Stroke, Symbol};
 use crate::render::{number as set, picture, thin};
+use sastrugi_numeric::Grid;
 use sastrugi_schemas::tables::{RoutePointRow, RouteRow};
 
 /// Largest number of groups that are drawn.
@@ -76,7 +78,7 @@ fn figure(
 ) -> Result<Option<Figure>, ReportError> {
     let Some(first) = routes.first() else { return Ok(None) };
     let Some(terrain) = data.terrain(&first.terrain_id) else { return Ok(None) };
-    let Some(grid) = data.files.grid(&terrain.path)? else { return Ok(None) };
+    let Some(grid) = ground(data, &terrain.path, first)? else { return Ok(None) };
     let Some(range) = grid.range() else { return Ok(None) };
     let factor = exaggeration(terrain.rms_slope);
     let picture = picture::relief(&grid, range, factor, PIXELS)?;
@@ -88,7 +90,7 @@ fn figure(
     };
     let ends =
         [(Symbol::Ring, "start"), (Symbol::Disc, "goal")].map(|(s, w)| (Mark::Symbol(s, Paint::Ink), w.to_owned()));
-    let entries: Vec<Entry> = routes.iter().map(entry).chain(ends).collect();
+    let entries: Vec<Entry> = routes.iter().map(entry).chain(ends).chain(closed(&grid)).collect();
     let mut map = Map::new(&picture, MAP_WIDTH, &Key::Entries(&entries));
     map.clip(&format!("{id}-clip"));
     for route in routes {
@@ -109,6 +111,27 @@ fn figure(
         svg: map.svg,
         numbers: Numbers::select(&condition, routes.iter().copied(), &columns),
     }))
+}
+
+/// Heights of a terrain, without those of the cells that a route's obstacles block. `None` where the release has no such file.
+pub fn ground(data: &Data, path: &str, route: &RouteRow) -> Result<Option<Grid>, ReportError> {
+    let Some(mut heights) = data.files.grid(path)? else { return Ok(None) };
+    let blocked = format!("route/{}/{}.blocked.tif", route.terrain_id, route.stage_id);
+    let Some(blocked) = data.files.classes(&blocked)? else { return Ok(Some(heights)) };
+    let geometry = heights.geometry;
+    for (k, height) in heights.values.iter_mut().enumerate() {
+        let (x, y) = (geometry.x(k % geometry.cols), geometry.y(k / geometry.cols));
+        if blocked.geometry.cell_at(x, y).is_some_and(|(row, col)| blocked.at(row, col) == 1) {
+            *height = f64::NAN;
+        }
+    }
+    Ok(Some(heights))
+}
+
+/// What the legend says of cells without data, where there are any.
+pub fn closed(grid: &Grid) -> Option<Entry> {
+    let any = grid.finite_count() < grid.values.len();
+    any.then(|| (Mark::Fill(Paint::Fixed(NO_DATA)), "cannot be entered".to_owned()))
 }
 
 /// The smoothed path of a route; the nothing where its points are not held.
