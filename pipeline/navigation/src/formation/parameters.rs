@@ -216,7 +216,7 @@ impl TeamParameters {
         for (k, loss) in self.losses.iter().enumerate() {
             ParameterError::not_negative("time_s", loss.time_s).map_err(|e| e.within(&format!("losses.{k}")))?;
             let lost = formation.lose(loss.member);
-            lost.map_err(|e| ParameterError::new(format!("losses.{k}"), format!("cannot be: failed to {e}")))?;
+            lost.map_err(|e| ParameterError::new(format!("losses.{k}"), format!("cannot happen: {e}")))?;
         }
         match formation.slots().len() > self.drawn_losses as usize {
             true => Ok(()),
@@ -311,5 +311,5 @@ impl TeamParameters {
 }
 
 fn refused(key: &str, error: &FormationError) -> ParameterError {
-    ParameterError::new(key, format!("cannot be: failed to {error}"))
+    ParameterError::new(key, format!("cannot form a team: {error}"))
 }

@@ -82,20 +82,20 @@ impl Pattern {
     }
 }
 
-/// A formation that cannot be taken up. Messages read after "failed to".
+/// A formation that cannot be taken up.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FormationError {
     /// No slot 1.
-    #[error("form a team: no slot has the id 1, which leads")]
+    #[error("no slot has the id 1, which leads")]
     Leaderless,
     /// Two slots with the same id.
-    #[error("form a team: two slots have the id {0}; ids are unique")]
+    #[error("two slots have the id {0}; ids are unique")]
     Duplicate(u32),
     /// A slot other than the first without a predecessor.
-    #[error("form a team: slot {0} has no predecessor; every slot but 1 follows one with a smaller id")]
+    #[error("slot {0} has no predecessor; every slot but 1 follows one with a smaller id")]
     Unled(u32),
     /// A predecessor that is not smaller, or not there.
-    #[error("form a team: slot {slot} follows slot {predecessor}; it must follow a slot with a smaller id that exists")]
+    #[error("slot {slot} follows slot {predecessor}; it must follow a slot with a smaller id that exists")]
     Predecessor {
         /// Slot.
         slot: u32,
@@ -103,17 +103,17 @@ pub enum FormationError {
         predecessor: u32,
     },
     /// Too many slots.
-    #[error("form a team: {0} slots are too many; a team has at most {MEMBERS_MAX} members")]
+    #[error("{0} slots are too many; a team has at most {MEMBERS_MAX} members")]
     Size(usize),
     /// A leader that follows another slot.
-    #[error("form a team: slot 1 leads, but follows slot {0}")]
+    #[error("slot 1 leads, but follows slot {0}")]
     Led(u32),
     /// An offset that is not finite.
-    #[error("form a team: the offset of slot {0} is not finite")]
+    #[error("the offset of slot {0} is not finite")]
     Offset(u32),
     /// A slot nearer the front than one of higher priority.
     #[error(
-        "form a team: slot {slot} lies {depth_m} m behind the leader, nearer the front than slot {ahead} at {ahead_m} m; lower ids lie nearer the front"
+        "slot {slot} lies {depth_m} m behind the leader, nearer the front than slot {ahead} at {ahead_m} m; lower ids lie nearer the front"
     )]
     Order {
         /// Slot.
@@ -126,7 +126,7 @@ pub enum FormationError {
         ahead_m: f64,
     },
     /// Two slots too near each other.
-    #[error("form a team: slots {first} and {second} lie {distance_m:.3} m apart; members of radius {radius_m} m need at least {} m", 2.0 * radius_m)]
+    #[error("slots {first} and {second} lie {distance_m:.3} m apart; members of radius {radius_m} m need at least {} m", 2.0 * radius_m)]
     Crowded {
         /// Slot.
         first: u32,
@@ -138,10 +138,10 @@ pub enum FormationError {
         radius_m: f64,
     },
     /// A member that holds no slot.
-    #[error("rearrange the team: member {0} is not in it, or was lost before")]
+    #[error("member {0} is not in the team, or was lost before")]
     NotThere(u32),
     /// No member is left.
-    #[error("rearrange the team: its last member is lost")]
+    #[error("no member would be left")]
     TeamLost,
 }
 

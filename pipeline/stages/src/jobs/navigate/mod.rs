@@ -172,6 +172,7 @@ impl NavigateJob {
                 let row = FormationRow { outcome: "no_room".to_owned(), ..row };
                 return Ok(Led { products: Vec::new(), row, samples: Vec::new(), events: Vec::new() });
             }
+            Err(TeamError::Parameter(error)) => return Err(fail(JobError::new(error))),
             Err(error) => return Err(fail(JobError::new(format!("failed to {error}")))),
         };
         let outcome = team.run(|team| recorder.sample(team)).map_err(|e| fail(JobError::new(e)))?;
