@@ -202,10 +202,10 @@ fn val_wrong_teams_are_refused_with_their_line() {
     let cases = [
         ("route = \"ways\"\nformation = \"wedge\"", "route = \"way\"\nformation = \"wedge\"", "did you mean \"ways\"?"),
         ("formation = \"wedge\"", "formation = \"vee\"", "vee"),
-        ("formation = \"wedge\"", "formation = \"wedge\"\nradius_m = 4.0", "apart; members of radius 4 m need"),
+        ("formation = \"wedge\"", "formation = \"wedge\"\nradius_m = 4.0", "slots 1 and 2 lie 7.071 m apart"),
         ("count = 2\ndrawn", "count = 0\ndrawn", "`count` is 0"),
         ("drawn_losses = 1", "drawn_losses = 4", "one must stay"),
-        ("member = 2 }", "member = 4 }", "member 4 is not in it"),
+        ("member = 2 }", "member = 4 }", "member 4 is not in the team"),
         ("predecessor = 1, depth_m = 8.0", "predecessor = 3, depth_m = 8.0", "follows slot 3"),
         ("drawn_obstacles = 2", "drawn_obstacle = 2", "drawn_obstacles"),
         ("method = \"roadmap\"", "sweep.method = [\"roadmap\", \"grid\"]", "name one of its searches"),

@@ -2,7 +2,8 @@
 //!
 //! Two marks of one line with no other between them have an edge if every step from one to the other may be taken; it is directed, as
 //! limits are. (The thesis looks at the slope from end to end, which can hide a cliff.) An edge costs the sum of its steps, times the
-//! factors of [`crate::clearance`] at both ends.
+//! factors of [`crate::clearance`] at both ends. Vertices lie where heights say so, whatever travel costs: other costs than slope are
+//! better planned on the grid.
 
 use crate::cost::Spot;
 use crate::line::Ground;

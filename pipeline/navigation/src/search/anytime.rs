@@ -1,10 +1,16 @@
-//! Anytime weighted A* (Hansen and Zhou, 2007).
+//! Anytime weighted A* that repairs its path (ARA*; Likhachev, Gordon and Thrun, 2003).
 //!
-//! Vertices come in the order of cost so far plus `weight` times the bound: a path is found soon, and the search goes on to better ones
-//! until its budget of expansions is spent or none can be better. The cost over the smallest sum of cost so far and plain bound among the
-//! vertices left is a proven bound on cost over optimum. Budgets count expansions, never time: the same call finds the same path.
+//! Vertices come in the order of cost so far plus `weight` times the bound: a path is found soon. Then the excess of the weight over 1 is
+//! halved, again and again, and only what lies cheaper than the path found is looked at anew, until the budget of expansions is spent or
+//! no path can be cheaper. A vertex is expanded once for each weight: one that becomes cheaper after that is put off until the next, as
+//! otherwise searches under a large weight can expand the same vertices without end. The cost over the smallest sum of cost so far and
+//! plain bound among the vertices left is a proven bound on cost over optimum. Budgets count expansions, never time: the same call finds
+//! the same path.
 
 use super::{Found, NONE, Network, Open, Queue, cost_along, path_to};
+
+/// Excess of the weight over 1 below which the weight is 1.
+const EXCESS_MIN: f64 = 0.01;
 
 /// How the search ended.
 #[derive(Clone, Debug, PartialEq)]
@@ -17,43 +23,131 @@ pub enum Outcome {
     Spent,
 }
 
-/// The best path that `budget` expansions find, with a weight of 1 or above.
+/// The best path that `budget` expansions find, with a first weight of 1 or above.
 pub fn search(network: &impl Network, start: u32, goal: u32, weight: f64, budget: u64) -> Outcome {
-    let mut costs = vec![f64::INFINITY; network.len()];
-    let mut parents = vec![NONE; network.len()];
-    let mut open = Queue::default();
-    open.push(Open::new(0.0, 0.0, start));
-    let mut expansions = 0;
-    costs[start as usize] = 0.0;
-    let hope = |next: &Open, costs: &[f64]| {
-        let sum = next.so_far() + network.bound(next.vertex(), goal);
-        Some(sum).filter(|sum| next.so_far() <= costs[next.vertex() as usize] && *sum < costs[goal as usize])
-    };
-    while expansions < budget
-        && let Some(next) = open.pop()
-    {
-        if hope(&next, &costs).is_none() {
-            continue;
+    let mut search = Search::new(network, start, goal);
+    let mut weight = weight;
+    while search.spend(weight, budget) && search.least_left().is_some() {
+        weight = if weight - 1.0 > 2.0 * EXCESS_MIN { 0.5 * (1.0 + weight) } else { 1.0 };
+        search.begin_round(weight);
+    }
+    search.outcome()
+}
+
+struct Search<'a, N> {
+    network: &'a N,
+    goal: u32,
+    costs: Vec<f64>,
+    parents: Vec<u32>,
+    /// Round in which each vertex was last expanded.
+    rounds: Vec<u32>,
+    round: u32,
+    open: Queue,
+    /// Vertices that became cheaper after they were expanded in this round.
+    put_off: Vec<u32>,
+    expansions: u64,
+}
+
+impl<'a, N: Network> Search<'a, N> {
+    fn new(network: &'a N, start: u32, goal: u32) -> Self {
+        let mut search = Self {
+            network,
+            goal,
+            costs: vec![f64::INFINITY; network.len()],
+            parents: vec![NONE; network.len()],
+            rounds: vec![0; network.len()],
+            round: 1,
+            open: Queue::default(),
+            put_off: Vec::new(),
+            expansions: 0,
+        };
+        search.costs[start as usize] = 0.0;
+        search.open.push(Open::new(0.0, 0.0, start));
+        search
+    }
+
+    /// Expands until no vertex left promises a path within `weight` of the one found; false where the budget is spent before.
+    fn spend(&mut self, weight: f64, budget: u64) -> bool {
+        while let Some(next) = self.open.pop() {
+            if next.sum() >= self.costs[self.goal as usize] {
+                self.open.push(next);
+                return true;
+            }
+            let is_old = next.so_far() > self.costs[next.vertex() as usize];
+            if is_old || self.rounds[next.vertex() as usize] == self.round {
+                continue;
+            }
+            if self.expansions == budget {
+                self.open.push(next);
+                return false;
+            }
+            self.expand(&next, weight);
         }
-        expansions += 1;
-        network.edges(next.vertex(), |target, cost| {
+        true
+    }
+
+    fn expand(&mut self, next: &Open, weight: f64) {
+        self.expansions += 1;
+        self.rounds[next.vertex() as usize] = self.round;
+        self.network.edges(next.vertex(), |target, cost| {
             let through = next.so_far() + cost;
-            if through < costs[target as usize] {
-                costs[target as usize] = through;
-                parents[target as usize] = next.vertex();
-                open.push(Open::new(through + weight * network.bound(target, goal), through, target));
+            if through >= self.costs[target as usize] {
+                return;
+            }
+            self.costs[target as usize] = through;
+            self.parents[target as usize] = next.vertex();
+            match self.rounds[target as usize] == self.round {
+                true => self.put_off.push(target),
+                false => {
+                    self.open.push(Open::new(
+                        through + weight * self.network.bound(target, self.goal),
+                        through,
+                        target,
+                    ));
+                }
             }
         });
     }
-    let left = open.iter().filter_map(|next| hope(next, &costs)).reduce(f64::min);
-    match left {
-        _ if costs[goal as usize].is_finite() => {
-            let path = path_to(goal, &parents);
-            // Below the cost of the goal where a vertex on the path has become cheaper since.
-            let cost = cost_along(network, &path);
-            Outcome::Found(Found { path, cost, expansions }, left.map_or(1.0, |sum| (cost / sum).max(1.0)))
+
+    /// Cost so far plus plain bound of a vertex that may lead to a cheaper path than the one found.
+    fn hope(&self, vertex: u32) -> Option<f64> {
+        let sum = self.costs[vertex as usize] + self.network.bound(vertex, self.goal);
+        Some(sum).filter(|sum| *sum < self.costs[self.goal as usize])
+    }
+
+    /// Vertices left that may lead to a cheaper path.
+    fn left(&self) -> impl Iterator<Item = u32> {
+        let is_new = |open: &&Open| open.so_far() <= self.costs[open.vertex() as usize];
+        let open = self.open.iter().filter(is_new).map(Open::vertex);
+        let open = open.filter(|vertex| self.rounds[*vertex as usize] != self.round);
+        open.chain(self.put_off.iter().copied()).filter(|vertex| self.hope(*vertex).is_some())
+    }
+
+    fn least_left(&self) -> Option<f64> {
+        self.left().filter_map(|vertex| self.hope(vertex)).reduce(f64::min)
+    }
+
+    /// Orders what is left by another weight.
+    fn begin_round(&mut self, weight: f64) {
+        let left: Vec<u32> = self.left().collect();
+        self.open = Queue::default();
+        for vertex in left {
+            let so_far = self.costs[vertex as usize];
+            self.open.push(Open::new(so_far + weight * self.network.bound(vertex, self.goal), so_far, vertex));
         }
-        Some(_) => Outcome::Spent,
-        None => Outcome::NoPath,
+        self.put_off.clear();
+        self.round += 1;
+    }
+
+    fn outcome(&self) -> Outcome {
+        let left = self.least_left();
+        if self.costs[self.goal as usize].is_infinite() {
+            return left.map_or(Outcome::NoPath, |_| Outcome::Spent);
+        }
+        let path = path_to(self.goal, &self.parents);
+        // Below the cost of the goal where a vertex on the path has become cheaper since.
+        let cost = cost_along(self.network, &path);
+        let ratio = left.map_or(1.0, |sum| (cost / sum).max(1.0));
+        Outcome::Found(Found { path, cost, expansions: self.expansions }, ratio)
     }
 }

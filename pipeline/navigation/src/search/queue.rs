@@ -18,6 +18,11 @@ impl Open {
         self.vertex
     }
 
+    /// What the vertices are ordered by.
+    pub(crate) fn sum(&self) -> f64 {
+        f64::from_bits(self.sum)
+    }
+
     /// Cost so far.
     pub(crate) fn so_far(&self) -> f64 {
         f64::from_bits(self.so_far)

@@ -55,7 +55,7 @@ pub fn kinds() -> Vec<Kind> {
             }
             Method::Anytime => (
                 "weighted A* over every cell that improves its path, within a bound or a number of expansions",
-                "Likhachev, Gordon and Thrun (2003); Hansen and Zhou (2007)",
+                "Likhachev, Gordon and Thrun (2003)",
             ),
         };
         Kind { family: "route", kind: method.name(), summary, source, parameters: schema() }

@@ -42,6 +42,25 @@ fn prop_the_proven_bound_holds_and_falls_with_the_budget() {
     assert!(loose > 20, "{loose}");
 }
 
+/// Under one weight a vertex would be expanded again whenever it becomes cheaper, for minutes on such a map of 500 x 500 cells.
+#[test]
+fn val_an_anytime_search_without_a_budget_takes_a_few_times_the_work_of_astar() {
+    let map = hills(200, 145.0, 6, 95);
+    let costs = thesis_costs(&map);
+    let mut random = Random(96);
+    for neighbourhood in NEIGHBOURHOODS {
+        let grid = GridNetwork { ground: ground(&map, &costs), neighbourhood };
+        for weight in [1.5, 2.0, 10.0] {
+            let Some([start, goal]) = ends(&map, &mut random) else { continue };
+            let Some(optimum) = astar::search(&grid, start, goal) else { continue };
+            let Outcome::Found(found, ratio) = search(&grid, start, goal, weight, u64::MAX) else { panic!() };
+            assert_eq!(ratio, 1.0);
+            assert!((found.cost / optimum.cost - 1.0).abs() < 1e-12);
+            assert!(found.expansions <= 12 * optimum.expansions + 1000, "{} {}", found.expansions, optimum.expansions);
+        }
+    }
+}
+
 #[test]
 fn val_a_weight_of_one_is_astar() {
     let map = hills(60, 2000.0, 4, 91);
