@@ -114,11 +114,10 @@ def check_viewer(path, messages, recording):
         expect(list(message.speed_m_s) == [math.hypot(*s["velocity_m_s"][:2]) for s in states], f"{path}: speeds")
     triangles = mesh_triangles(path, messages["/terrain/mesh"][0][1])
     contacts = [np.array(state["position_m"]) for member in members for state in member["states"][::10]]
-    route = [np.array(values(pose.position)) for pose in messages["/team/route"][0][1].poses]
-    worst, lost = off_mesh(triangles, contacts + route)
+    routes = [(time - epoch, [values(pose.position) for pose in message.poses]) for time, message in messages["/team/route"]]
+    check_planned(path, routes, recording)
+    worst, lost = off_mesh(triangles, contacts + [np.array(point) for _, route in routes for point in route])
     expect(lost == 0 and worst <= GROUND_TOLERANCE_M, f"{path}: {lost} points beside the mesh, {worst} m off it")
-    waypoints = [np.array(point) for point in recording["route_m"]]
-    expect(all(any((w == r).all() for r in route) for w in waypoints), f"{path}: the route lacks a waypoint")
     graph = {entity.id: entity for entity in messages["/team/graph"][0][1].entities}
     dashes = graph["vertices"].lines[0]
     ends = lifted(dashes.points, dashes.pose.position)
@@ -140,6 +139,14 @@ def check_viewer(path, messages, recording):
     return len(triangles)
 
 
+def check_planned(path, found, recording):
+    """Every route comes at its time and passes its waypoints."""
+    times = [round(route["time_s"] * 1e9) for route in recording["routes"]]
+    expect([time for time, _ in found] == times, f"{path}: routes at {[time for time, _ in found]}, not at {times}")
+    for (_, points), route in zip(found, recording["routes"]):
+        expect(all(waypoint in points for waypoint in route["points_m"]), f"{path}: a route lacks a waypoint")
+
+
 def check_events(path, found, recording, unit):
     names = {member["number"]: member["name"] for member in recording["members"]}
     expected = [
@@ -150,7 +157,7 @@ def check_events(path, found, recording, unit):
 
 
 def check_bag(path, messages, recording):
-    members = recording["members"]
+    members, epoch = recording["members"], messages["/tf"][0][0]
     for sample, (_, message) in enumerate(messages["/tf"]):
         found = [(t.child_frame_id, values(t.transform.translation), values(t.transform.rotation)) for t in message.transforms]
         check_frames(path, sample, found, recording)
@@ -167,14 +174,15 @@ def check_bag(path, messages, recording):
             expect(values(message.twist.twist.angular) == [0, 0, 0], f"{path}: {name} turns")
         driven = messages[f"/{name}/path"][0][1].poses
         expect([values(p.pose.position) for p in driven] == [s["position_m"] for s in states[::5]], f"{path}: path of {name}")
-        start = messages["/tf"][0][0]
-        stamps = [check_ros2.stamp_ns(pose.header.stamp) - start for pose in driven]
+        stamps = [check_ros2.stamp_ns(pose.header.stamp) - epoch for pose in driven]
         expect(stamps == [round(s["time_s"] * 1e9) for s in states[::5]], f"{path}: times on the path of {name}")
-    route = [pose_values(pose.pose)[:3] for pose in messages["/team/route"][0][1].poses]
-    expect(all(waypoint in route for waypoint in recording["route_m"]), f"{path}: the route lacks a waypoint")
+    routes = messages["/team/route"]
+    check_planned(path, [(t - epoch, [pose_values(p.pose)[:3] for p in m.poses]) for t, m in routes], recording)
     markers = {marker.ns: marker for marker in messages["/team/markers"][0][1].markers}
-    expect(set(markers) == {m["name"] for m in members} | {
-        "moving_1", "start", "goal", "obstacles", "waypoints", "search_path", "vertices"}, f"{path}: markers {sorted(markers)}")
+    drawn = {m["name"] for m in members} | {"moving_1", "start", "goal", "obstacles", "search_path", "vertices"}
+    # Waypoints of routes that are planned on the way come and go.
+    drawn |= {"waypoints"} if len(recording["routes"]) == 1 else set()
+    expect(set(markers) == drawn, f"{path}: markers {sorted(markers)}")
     expect(all(markers[m["name"]].frame_locked for m in members), f"{path}: markers of members stand still")
     origin = messages["/tf_static"][0][1].transforms[0].transform.translation
     off = np.abs(lifted(markers["vertices"].points, origin) - np.array(recording["vertices_m"])).max()
@@ -191,9 +199,10 @@ def check_routes(path, recording):
     expect("WGS 84" in collection["note"], f"{path}: the note is missing")
     (feature,) = collection["features"]
     expect(rasterio.features.is_valid_geom(feature["geometry"]), f"{path}: the geometry is not valid")
-    expect(feature["geometry"]["coordinates"] == recording["route_m"], f"{path}: other coordinates than recorded")
+    route = recording["routes"][0]["points_m"]
+    expect(feature["geometry"]["coordinates"] == route, f"{path}: other coordinates than recorded")
     expect(feature["properties"] == {"route_id": "a-0001", "cost": 31.25}, f"{path}: properties {feature['properties']}")
-    x, y, _ = np.array(recording["route_m"]).T
+    x, y, _ = np.array(route).T
     bounds = rasterio.features.bounds(feature["geometry"])
     expect(bounds == (x.min(), y.min(), x.max(), y.max()), f"{path}: bounds {bounds}")
 

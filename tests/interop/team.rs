@@ -11,6 +11,7 @@ use sastrugi_store::geojson::{Route, write_routes};
 use sastrugi_store::mcap::{TeamMcap, TerrainView, bag_metadata, write_team};
 use sastrugi_tests::{area, write};
 use std::collections::BTreeMap;
+use std::path::Path;
 
 const CORNER: [f64; 2] = [400_000.0, 5_000_000.0];
 const SAMPLES: usize = 201;
@@ -48,6 +49,10 @@ fn run(dem: &Grid) -> TeamRecording {
             .collect(),
     };
     let disc = |sample| DiscState { time_s: time(sample), position_m: place(dem, 50.0 - time(sample), 10.0) };
+    let route = |time_s: f64, points: &[[f64; 2]]| PlannedRoute {
+        time_s,
+        points_m: points.iter().map(|&[x, y]| place(dem, x, y)).collect(),
+    };
     let event = |time_s: f64, kind, member| TeamEvent { time_s, kind, member, text: "as it was planned".to_owned() };
     let bounds = |time_s: f64, squeezed| FormationBox {
         time_s,
@@ -57,10 +62,10 @@ fn run(dem: &Grid) -> TeamRecording {
     TeamRecording {
         sample_rate_hz: 10.0,
         members: vec![member(1, 0.0, 0.0), member(2, 3.0, -1.0), member(3, 3.0, 5.0)],
-        routes: vec![PlannedRoute {
-            time_s: 0.0,
-            points_m: [[15.0, 15.0], [25.0, 25.5], [35.0, 35.0]].map(|[x, y]| place(dem, x, y)).into(),
-        }],
+        routes: vec![
+            route(0.0, &[[15.0, 15.0], [25.0, 25.5], [35.0, 35.0]]),
+            route(8.0, &[[23.0, 23.0], [30.0, 26.5], [35.0, 35.0]]),
+        ],
         search_path_m: [[15.0, 15.0], [15.0, 25.0], [35.0, 25.0], [35.0, 35.0]].map(|[x, y]| place(dem, x, y)).into(),
         vertices_m: (0..300).map(|k| place(dem, 2.0 + f64::from(k % 20), 2.0 + f64::from(k / 20))).collect(),
         boxes: vec![bounds(0.0, false), bounds(4.0, false), bounds(8.0, true)],
@@ -71,30 +76,40 @@ fn run(dem: &Grid) -> TeamRecording {
 }
 
 /// Recordings of a team as mcap-protobuf-support, rosbags, mcap-ros2-support and Rerun read them, and routes as GDAL and PROJ do: the
-/// recorded numbers.
+/// recorded numbers, of a route that was planned before and of routes that are planned on the way.
 #[test]
 fn val_readers_agree_with_a_team() {
     let Some(python) = python() else { return };
-    let folder = area();
-    let path = folder.path();
     let dem = saddle();
-    let (recording, terrain) = (run(&dem), TerrainView::new(&dem, None).unwrap());
+    for routes in [1, 2] {
+        let folder = area();
+        let mut recording = run(&dem);
+        recording.routes.truncate(routes);
+        write_files(folder.path(), &dem, &recording);
+        let call = check(&python, "check_team.py", &[folder.path()]);
+        assert_eq!(call.code, 0, "{}{}", call.stdout, call.stderr);
+    }
+}
+
+/// What check_team.py reads.
+fn write_files(folder: &Path, dem: &Grid, recording: &TeamRecording) {
+    let terrain = TerrainView::new(dem, None).unwrap();
     let record = BTreeMap::from([("run_id".to_owned(), "team-0001".to_owned())]);
     let metadata = BTreeMap::from([("run".to_owned(), record)]);
     for (flavour, name) in [(McapFlavour::Viewer, "viewer"), (McapFlavour::Ros2, "ros2")] {
         let team = TeamMcap {
             flavour,
-            recording: &recording,
+            recording,
             terrain: &terrain,
             start_m: [CORNER[0] + 15.0, CORNER[1] + 15.0],
             goal_m: [CORNER[0] + 35.0, CORNER[1] + 35.0],
             epoch_ns: 1_700_000_000_000_000_000,
             metadata: &metadata,
         };
-        let summary = write_team(&path.join(name).join("run.mcap"), &team).unwrap();
-        write(path, &format!("{name}.sha256"), &summary.content_sha256);
+        let summary = write_team(&folder.join(name).join("run.mcap"), &team).unwrap();
+        write(folder, &format!("{name}.sha256"), &summary.content_sha256);
         if flavour == McapFlavour::Ros2 {
-            write(&path.join(name), "metadata.yaml", &bag_metadata("run.mcap", &summary));
+            write(&folder.join(name), "metadata.yaml", &bag_metadata("run.mcap", &summary));
         }
     }
     let properties = serde_json::json!({ "route_id": "a-0001", "cost": 31.25 });
@@ -103,8 +118,6 @@ fn val_readers_agree_with_a_team() {
         properties: properties.as_object().unwrap().clone(),
     }];
     let crs = Crs { epsg: Some(32633), ..Crs::default() };
-    write_routes(&path.join("routes.geojson"), Some(&crs), &routes).unwrap();
-    write(path, "recording.json", &serde_json::to_string(&recording).unwrap());
-    let call = check(&python, "check_team.py", &[path]);
-    assert_eq!(call.code, 0, "{}{}", call.stdout, call.stderr);
+    write_routes(&folder.join("routes.geojson"), Some(&crs), &routes).unwrap();
+    write(folder, "recording.json", &serde_json::to_string(recording).unwrap());
 }
