@@ -201,7 +201,7 @@ impl Site {
         let heights = self.map.heights();
         let nodes = heights.values.iter().zip(0..);
         let values: Vec<u8> = nodes.map(|(z, node)| u8::from(z.is_finite() && self.map.is_blocked(node))).collect();
-        values.contains(&1).then(|| Grid { geometry: heights.geometry, values })
+        values.contains(&1).then_some(Grid { geometry: heights.geometry, values })
     }
 
     /// Cells that may be entered.
