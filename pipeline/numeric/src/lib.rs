@@ -17,6 +17,7 @@ pub mod counter;
 pub mod fft;
 pub mod filters;
 pub mod grid;
+pub mod ground;
 pub mod ops;
 pub mod resample;
 mod simd;
@@ -27,5 +28,6 @@ pub mod turns;
 
 pub use counter::{Counter, Poisson};
 pub use grid::{Geometry, Grid};
+pub use ground::{Ground, GroundClass, GroundGrid, GroundPoint, NoGround};
 pub use streams::{Stream, Streams};
 pub use surface::Surface;

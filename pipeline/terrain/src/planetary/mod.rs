@@ -34,6 +34,7 @@
 
 mod assemble;
 mod craters;
+mod ground;
 pub mod levels;
 mod params;
 mod processes;
@@ -44,6 +45,7 @@ mod texture;
 mod world;
 
 pub(crate) use assemble::Assembly;
+pub use ground::{BYTES_PER_TILE as GROUND_BYTES_PER_TILE, Clearing, View, WorldGround};
 pub use levels::Window;
 pub(crate) use params::{Lattice, WHOLE_TOLERANCE, Work, window_in_reach};
 pub use params::{Planetary, RawPlanetary};

@@ -18,7 +18,7 @@ const DEFAULT_SIZE_PX: [u32; 2] = [512, 512];
 /// Largest K.
 const ANCHOR_LEVEL_MAX: u32 = 40;
 /// Lattice points are counted up to here, so that they are whole numbers in double precision.
-const LATTICE_MAX: f64 = (1u64 << 52) as f64;
+pub(super) const LATTICE_MAX: f64 = (1u64 << 52) as f64;
 /// A quotient this near to a whole number is that number.
 pub const WHOLE_TOLERANCE: f64 = 1e-6;
 /// How often the largest basic spacing chosen unasked is doubled.

@@ -89,6 +89,8 @@ pub struct Rocks {
     spacing_m: f64,
     bins: Vec<Bin>,
     amplitudes: Amplitudes,
+    /// Disks that no rock reaches into: centre and radius, lattice units.
+    clearings: Vec<([f64; 2], f64)>,
 }
 
 /// One rock.
@@ -145,7 +147,21 @@ impl Rocks {
     pub fn new(parameters: RockParameters, spacing_m: f64, counter: Counter) -> Self {
         let bins = parameters.bins(spacing_m);
         let coarsest = bins.last().map_or(0, |bin| bin.zoom);
-        Self { parameters, counter, spacing_m, bins, amplitudes: Amplitudes::new(ROUGHNESS_HURST, spacing_m, coarsest) }
+        let amplitudes = Amplitudes::new(ROUGHNESS_HURST, spacing_m, coarsest);
+        Self { parameters, counter, spacing_m, bins, amplitudes, clearings: Vec::new() }
+    }
+
+    /// Takes away the rocks that may reach into disks: centres and radii, lattice units.
+    pub fn keep_out(&mut self, clearings: Vec<([f64; 2], f64)>) {
+        self.clearings = clearings;
+    }
+
+    /// Whether a rock of a longest half axis may reach into a clearing.
+    fn is_cleared(&self, [x, y]: [f64; 2], long: f64) -> bool {
+        self.clearings.iter().any(|(centre, radius)| {
+            let ([dx, dy], reach) = ([x - centre[0], y - centre[1]], radius + long);
+            dx * dx + dy * dy < reach * reach
+        })
     }
 
     /// Parameters.
@@ -208,6 +224,9 @@ impl Rocks {
         let here = coverage(centre);
         let wanted = if here > 0.0 { self.parameters.law(here).density(diameter_m) } else { 0.0 };
         if own.at(STAYS).uniform() * bin.bound >= wanted * diameter_m * diameter_m {
+            return None;
+        }
+        if self.is_cleared(centre, long) {
             return None;
         }
         let height_m = self.height_m(diameter_m, here);

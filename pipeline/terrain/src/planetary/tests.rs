@@ -2,6 +2,7 @@
 
 mod agreement;
 mod craters;
+mod ground;
 mod refusals;
 mod rocks;
 mod texture;
