@@ -4,6 +4,7 @@
 //! * [`vehicle`] holds vehicles as data, their contact with the ground, the steering, and [`vehicle::drive`], which
 //!   turns one mission into a [`Recording`](sastrugi_schemas::topics::Recording).
 //! * [`metrics`] turns recorded poses into the figures and rows of the tables `missions` and `samples`.
+//! * [`rover`] holds rovers that find their own way over any ground.
 //! * [`registry`] lists the vehicles.
 //!
 //! No file, clock, thread or environment is touched; the only random draws are those of [`missions`].
@@ -11,4 +12,5 @@
 pub mod metrics;
 pub mod missions;
 pub mod registry;
+pub mod rover;
 pub mod vehicle;

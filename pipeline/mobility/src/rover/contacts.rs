@@ -1,0 +1,77 @@
+//! Rocks that a rover met: those higher than its clearance that came under it.
+
+use super::pose::{Chassis, Pose};
+use super::sand::PlaneSums;
+use sastrugi_numeric::{Ground, GroundClass, NoGround};
+
+/// Half side of the square whose sand a rock is measured from, m.
+const AROUND_M: f64 = 0.75;
+
+/// Counts of contacts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Contacts {
+    /// Rocks above the clearance that came under the rover: between or under its wheels.
+    pub anywhere: u32,
+    /// Of those, the ones that its centre line passed over.
+    pub on_centre_line: u32,
+    /// Whether one is under it now: anywhere, and on the centre line.
+    now: [bool; 2],
+}
+
+impl Contacts {
+    /// Looks under the rover. A rock counts once for as long as it stays there.
+    ///
+    /// # Errors
+    /// Ground that is not known.
+    pub fn look(
+        &mut self,
+        ground: &impl Ground,
+        pose: &Pose,
+        chassis: &Chassis,
+        clearance_m: f64,
+    ) -> Result<(), NoGround> {
+        let (a, t) = (chassis.axle_m, chassis.track_m);
+        let mut now = [false; 2];
+        for left in [-t, -0.5 * t, 0.0, 0.5 * t, t] {
+            for ahead in [-a, -0.5 * a, 0.0, 0.5 * a, a] {
+                let met = stands_above(ground, pose.to_ground([ahead, left]), clearance_m)?;
+                now[0] |= met;
+                now[1] |= met && left == 0.0;
+            }
+        }
+        self.anywhere += u32::from(now[0] && !self.now[0]);
+        self.on_centre_line += u32::from(now[1] && !self.now[1]);
+        self.now = now;
+        Ok(())
+    }
+}
+
+/// Whether a rock stands higher than the clearance above the sand around it.
+fn stands_above(ground: &impl Ground, at: [f64; 2], clearance_m: f64) -> Result<bool, NoGround> {
+    let [x, y] = at;
+    let here = ground.at(x, y)?;
+    if here.class != GroundClass::Rock {
+        return Ok(false);
+    }
+    Ok(here.height_m - sand_height_m(ground, at)? > clearance_m)
+}
+
+/// Height of the sand under a rock: the plane through the sand around it; its lowest height where there is too little sand.
+pub fn sand_height_m(ground: &impl Ground, [x, y]: [f64; 2]) -> Result<f64, NoGround> {
+    let step_m = ground.cell_m().max(AROUND_M / 10.0);
+    let reach = libm::ceil(AROUND_M / step_m) as i32;
+    let mut sums = PlaneSums::default();
+    let mut lowest = f64::INFINITY;
+    let level = ground.at(x, y)?.height_m;
+    for i in -reach..=reach {
+        for j in -reach..=reach {
+            let offset = [f64::from(i) * step_m, f64::from(j) * step_m];
+            let point = ground.at(x + offset[0], y + offset[1])?;
+            lowest = lowest.min(point.height_m);
+            if point.class == GroundClass::Sand {
+                sums.add(offset, point.height_m - level);
+            }
+        }
+    }
+    Ok(sums.plane().map_or(lowest, |plane| level + plane.level_m))
+}

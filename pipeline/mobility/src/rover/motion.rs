@@ -1,0 +1,81 @@
+//! How a command is carried out: exactly, unless noise is asked for.
+
+use super::draws::{CycleDraws, Purpose};
+use super::policies::Command;
+use super::pose::Pose;
+use sastrugi_schemas::ParameterError;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Noise of sensing and moving; without any by default.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct NoiseParameters {
+    /// Standard deviation of sensed heights, m.
+    pub height_m: f64,
+    /// Share of a commanded drive that is lost to slip, below 1.
+    pub slip: f64,
+    /// Standard deviation of that share from cycle to cycle.
+    pub slip_deviation: f64,
+    /// Standard deviation of a turn over the turn.
+    pub turn: f64,
+    /// Standard deviation of the drift of the heading over 1 m of driving, rad; it grows with the square root of the distance.
+    pub drift_rad: f64,
+    /// Whether the rover knows its place by its own commands alone: errors of turns, drift and slip go unnoticed.
+    pub dead_reckoning: bool,
+}
+
+impl NoiseParameters {
+    /// # Errors
+    /// A value out of range.
+    pub fn check(&self) -> Result<(), ParameterError> {
+        ParameterError::not_negative("height_m", self.height_m)?;
+        if !(0.0..1.0).contains(&self.slip) {
+            return Err(ParameterError::new("slip", format!("is {}; it must be 0 or above and below 1", self.slip)));
+        }
+        ParameterError::not_negative("slip_deviation", self.slip_deviation)?;
+        ParameterError::not_negative("turn", self.turn)?;
+        ParameterError::not_negative("drift_rad", self.drift_rad).map(|_| ())
+    }
+}
+
+/// Where a rover truly is, and where it believes to be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Poses {
+    /// In truth.
+    pub real: Pose,
+    /// By its own reckoning.
+    pub believed: Pose,
+}
+
+/// What was carried out of a command.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Moved {
+    /// Turn to the left, rad.
+    pub turn_rad: f64,
+    /// Drive ahead, m.
+    pub drive_m: f64,
+}
+
+impl Poses {
+    /// Carries out a command.
+    pub fn carry_out(&mut self, command: &Command, noise: &NoiseParameters, draws: &CycleDraws) -> Moved {
+        let error = if noise.turn > 0.0 { noise.turn * draws.normal(Purpose::Heading) } else { 0.0 };
+        let turn_rad = command.turn_rad * (1.0 + error);
+        let slip_error =
+            if noise.slip_deviation > 0.0 { noise.slip_deviation * draws.normal(Purpose::Slip) } else { 0.0 };
+        let drive_m = command.drive_m * (1.0 - (noise.slip + slip_error).clamp(0.0, 1.0));
+        let drift_rad = if noise.drift_rad > 0.0 {
+            noise.drift_rad * drive_m.abs().sqrt() * draws.normal(Purpose::Drift)
+        } else {
+            0.0
+        };
+        self.real = self.real.turned(turn_rad).driven(drive_m).turned(drift_rad);
+        self.believed = if noise.dead_reckoning {
+            self.believed.turned(command.turn_rad).driven(command.drive_m)
+        } else {
+            self.real
+        };
+        Moved { turn_rad, drive_m }
+    }
+}

@@ -1,0 +1,439 @@
+//! Every number of a rover and of its trial, as a study writes it.
+
+use super::motion::NoiseParameters;
+use super::policies::{Policy, SchoppersLike, SchoppersRules, SojournerLike, SojournerRules};
+use super::pose::Chassis;
+use super::sensing::{RaySensor, RectangleSensor, Sensor};
+use super::starts::{self, Start};
+use super::trial::Task;
+use sastrugi_numeric::Streams;
+use sastrugi_schemas::ParameterError;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Most rovers of a trial: four digits in their ids.
+const ROVERS_MAX: u32 = 9999;
+/// Most rays or rectangles along a side of a sensor.
+const PARTS_MAX: usize = 64;
+
+/// The Sojourner-like navigator: rays, hazards, turning away and back to the goal.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct SojournerParameters {
+    /// Factor of all lengths of body, sensor and drives; not of the hazard heights and the clearance.
+    pub scale: f64,
+    /// Axles ahead of and behind the centre, m (our choice, about the flight rover's).
+    pub axle_m: f64,
+    /// Wheels beside the centre line, m (our choice).
+    pub track_m: f64,
+    /// Nose ahead of the centre, m (our choice).
+    pub nose_m: f64,
+    /// Height of the sensor above the plane of the wheels' contacts, m (our choice).
+    pub sensor_height_m: f64,
+    /// Columns of rays to the left of the centre line, from left to right, m (the paper: 20 rays; their places are our choice).
+    pub columns_m: Vec<f64>,
+    /// Where the rays of a column are aimed, beyond the nose, m (our choice).
+    pub rows_m: Vec<f64>,
+    /// Hazard height, m (our choice: the radius of a wheel).
+    pub hazard_step_m: f64,
+    /// Largest difference of heights in a view without a hazard, m (our choice: the diameter of a wheel).
+    pub hazard_span_m: f64,
+    /// Largest tilt, deg (our choice).
+    pub tilt_max_deg: f64,
+    /// Turn of a cycle, deg (our choice).
+    pub turn_deg: f64,
+    /// Standard deviation of a turn away from a hazard, rad (our choice).
+    pub turn_noise_rad: f64,
+    /// Drive straight on after a hazard, m (our choice).
+    pub pass_m: f64,
+    /// Drive of a cycle, m (the paper: at most the radius of a wheel, 65 mm).
+    pub step_m: f64,
+    /// Error of the bearing to the goal that is let be, rad (our choice).
+    pub bearing_tolerance_rad: f64,
+    /// Distance from the goal at which a rover has arrived, m (our choice).
+    pub goal_tolerance_m: f64,
+    /// Rocks that stand higher above the sand count as contacts when they come under the rover, m (our choice: the diameter of a wheel).
+    pub clearance_m: f64,
+    /// Farthest drive, m (our choice; the longest of the paper: 902.5).
+    pub distance_limit_m: f64,
+    /// Most cycles (our choice).
+    pub cycle_limit: u32,
+}
+
+impl Default for SojournerParameters {
+    fn default() -> Self {
+        Self {
+            scale: 1.0,
+            axle_m: 0.25,
+            track_m: 0.20,
+            nose_m: 0.32,
+            sensor_height_m: 0.25,
+            columns_m: vec![0.30, 0.15, 0.0, -0.15, -0.30],
+            rows_m: vec![0.10, 0.20, 0.30, 0.45],
+            hazard_step_m: 0.065,
+            hazard_span_m: 0.13,
+            tilt_max_deg: 30.0,
+            turn_deg: 15.0,
+            turn_noise_rad: 0.03,
+            pass_m: 0.5,
+            step_m: 0.065,
+            bearing_tolerance_rad: 0.12,
+            goal_tolerance_m: 0.5,
+            clearance_m: 0.13,
+            distance_limit_m: 1500.0,
+            cycle_limit: 60_000,
+        }
+    }
+}
+
+/// The Schoppers-like navigator: four rectangles, safe or unsafe, by perfect sensing.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct SchoppersParameters {
+    /// Factor of all lengths of body, sensor and drives; not of the clearance.
+    pub scale: f64,
+    /// Axles ahead of and behind the centre, m (our choice).
+    pub axle_m: f64,
+    /// Wheels beside the centre line, m (our choice).
+    pub track_m: f64,
+    /// Near edge of the sensor ahead of the centre, m (our choice).
+    pub sensor_near_m: f64,
+    /// Extent of the sensor ahead, m (the paper: 1).
+    pub sensor_length_m: f64,
+    /// Extent of the sensor to both sides together, m (the paper: 2).
+    pub sensor_width_m: f64,
+    /// Rectangles of the sensor, side by side, at least 2 (the paper: 4).
+    pub rectangles: u32,
+    /// Rocks that stand higher above the sand make a rectangle unsafe, and count as contacts when they come under the rover, m (our choice:
+    /// the diameter of a wheel).
+    pub clearance_m: f64,
+    /// Steepest safe sand, deg (our choice).
+    pub slope_max_deg: f64,
+    /// Largest tilt of the rover itself, deg (our choice).
+    pub tilt_max_deg: f64,
+    /// Turn of a cycle, deg (our choice).
+    pub turn_deg: f64,
+    /// Drive of a cycle, m (our choice).
+    pub step_m: f64,
+    /// Error of the bearing at which it turns to the goal whatever is beside it, rad (our choice).
+    pub bearing_tolerance_rad: f64,
+    /// Drive after a turn away before it turns to the goal again, m (our choice).
+    pub commit_m: f64,
+    /// Factor of that after a full turn without a way (our choice).
+    pub commit_growth: f64,
+    /// Largest such drive, m (our choice).
+    pub commit_max_m: f64,
+    /// Nearer to the goal by this, the drive is the first one again, m (our choice).
+    pub progress_m: f64,
+    /// Distance from the goal at which a rover has arrived, m (our choice).
+    pub goal_tolerance_m: f64,
+    /// Farthest drive, m (our choice).
+    pub distance_limit_m: f64,
+    /// Most cycles (our choice).
+    pub cycle_limit: u32,
+}
+
+impl Default for SchoppersParameters {
+    fn default() -> Self {
+        Self {
+            scale: 1.0,
+            axle_m: 0.25,
+            track_m: 0.20,
+            sensor_near_m: 0.3,
+            sensor_length_m: 1.0,
+            sensor_width_m: 2.0,
+            rectangles: 4,
+            clearance_m: 0.13,
+            slope_max_deg: 25.0,
+            tilt_max_deg: 30.0,
+            turn_deg: 10.0,
+            step_m: 0.1,
+            bearing_tolerance_rad: 0.05,
+            commit_m: 0.6,
+            commit_growth: 1.5,
+            commit_max_m: 8.0,
+            progress_m: 1.0,
+            goal_tolerance_m: 0.5,
+            distance_limit_m: 1000.0,
+            cycle_limit: 20_000,
+        }
+    }
+}
+
+/// A navigator with its numbers.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Navigator {
+    /// Rays.
+    Sojourner(SojournerParameters),
+    /// Rectangles.
+    Schoppers(SchoppersParameters),
+}
+
+/// Where rovers start.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Starts {
+    /// At equal angles on a circle about the common goal.
+    #[default]
+    Circle,
+    /// At drawn places in a disk, with goals `distance_m` away in drawn directions.
+    Drawn,
+}
+
+/// A trial: what is the same whatever the navigator.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct RoverParameters {
+    /// Rovers on each world, 1 to 9999 (the paper: 100).
+    pub rovers: u32,
+    /// Where they start.
+    pub starts: Starts,
+    /// Centre of the circle or disk, m; for circles the goal.
+    pub centre_m: [f64; 2],
+    /// Radius of the circle or disk, m (the paper: 25).
+    pub radius_m: f64,
+    /// Distance from drawn starts to their goals, m.
+    pub distance_m: f64,
+    /// Radius around starts and goals that is kept free of rocks, m (our choice); on planetary worlds alone.
+    pub clear_m: f64,
+    /// Distance of the samples of the ground, m (the paper: 0.02); on planetary worlds alone, other terrains have their cells.
+    pub cell_m: f64,
+    /// Speed of a drive, m/s (our choice).
+    pub speed_m_s: f64,
+    /// Speed of a turn, deg/s (our choice).
+    pub turn_rate_deg_s: f64,
+    /// Noise of sensing and moving.
+    pub noise: NoiseParameters,
+}
+
+impl Default for RoverParameters {
+    fn default() -> Self {
+        Self {
+            rovers: 100,
+            starts: Starts::Circle,
+            centre_m: [0.0; 2],
+            radius_m: 25.0,
+            distance_m: 40.0,
+            clear_m: 0.6,
+            cell_m: 0.02,
+            speed_m_s: 0.01,
+            turn_rate_deg_s: 7.0,
+            noise: NoiseParameters::default(),
+        }
+    }
+}
+
+impl RoverParameters {
+    /// # Errors
+    /// A value out of range, or starts that are their goals.
+    pub fn check(&self) -> Result<(), ParameterError> {
+        if !(1..=ROVERS_MAX).contains(&self.rovers) {
+            return Err(ParameterError::new("rovers", format!("is {}; it must be 1 to {ROVERS_MAX}", self.rovers)));
+        }
+        if let Some(at) = self.centre_m.iter().find(|at| !at.is_finite()) {
+            return Err(ParameterError::new("centre_m", format!("holds {at}; it must hold finite numbers")));
+        }
+        ParameterError::positive("radius_m", self.radius_m)?;
+        ParameterError::positive("distance_m", self.distance_m)?;
+        ParameterError::not_negative("clear_m", self.clear_m)?;
+        ParameterError::positive("cell_m", self.cell_m)?;
+        ParameterError::positive("speed_m_s", self.speed_m_s)?;
+        ParameterError::positive("turn_rate_deg_s", self.turn_rate_deg_s)?;
+        self.noise.check().map_err(|e| e.within("noise"))
+    }
+
+    /// Starts and goals; draws are those of the streams.
+    pub fn starts(&self, streams: &Streams) -> Vec<Start> {
+        match self.starts {
+            Starts::Circle => starts::on_circle(self.rovers, self.centre_m, self.radius_m),
+            Starts::Drawn => starts::drawn(self.rovers, self.centre_m, self.radius_m, self.distance_m, streams),
+        }
+    }
+
+    /// Distance from starts to goals, m.
+    pub fn straight_m(&self) -> f64 {
+        match self.starts {
+            Starts::Circle => self.radius_m,
+            Starts::Drawn => self.distance_m,
+        }
+    }
+}
+
+fn all_positive(values: &[(&str, f64)]) -> Result<(), ParameterError> {
+    values.iter().try_for_each(|(key, value)| ParameterError::positive(key, *value).map(|_| ()))
+}
+
+fn angle(key: &str, value_deg: f64) -> Result<(), ParameterError> {
+    ParameterError::between(key, value_deg, 0.0, 90.0).map(|_| ())
+}
+
+/// A list of 1 to 64 lengths that goes one way.
+fn in_order(key: &str, values: &[f64], rising: bool) -> Result<(), ParameterError> {
+    let goes = |w: &[f64]| if rising { w[0] < w[1] } else { w[0] > w[1] };
+    let ordered = values.iter().all(|v| v.is_finite()) && values.windows(2).all(goes);
+    if ordered && (1..=PARTS_MAX).contains(&values.len()) {
+        return Ok(());
+    }
+    let way = if rising { "rise" } else { "fall" };
+    Err(ParameterError::new(key, format!("must hold 1 to {PARTS_MAX} numbers that {way}")))
+}
+
+fn cycles(limit: u32) -> Result<(), ParameterError> {
+    if limit > 0 { Ok(()) } else { Err(ParameterError::new("cycle_limit", "is 0; it must be 1 or more")) }
+}
+
+impl SojournerParameters {
+    /// # Errors
+    /// A value out of range.
+    pub fn check(&self) -> Result<(), ParameterError> {
+        all_positive(&[
+            ("scale", self.scale),
+            ("axle_m", self.axle_m),
+            ("track_m", self.track_m),
+            ("nose_m", self.nose_m),
+            ("sensor_height_m", self.sensor_height_m),
+            ("hazard_step_m", self.hazard_step_m),
+            ("hazard_span_m", self.hazard_span_m),
+            ("step_m", self.step_m),
+            ("goal_tolerance_m", self.goal_tolerance_m),
+            ("clearance_m", self.clearance_m),
+            ("distance_limit_m", self.distance_limit_m),
+        ])?;
+        in_order("columns_m", &self.columns_m, false)?;
+        in_order("rows_m", &self.rows_m, true)?;
+        ParameterError::positive("rows_m.0", self.rows_m[0])?;
+        angle("tilt_max_deg", self.tilt_max_deg)?;
+        angle("turn_deg", self.turn_deg)?;
+        ParameterError::not_negative("turn_noise_rad", self.turn_noise_rad)?;
+        ParameterError::not_negative("pass_m", self.pass_m)?;
+        ParameterError::not_negative("bearing_tolerance_rad", self.bearing_tolerance_rad)?;
+        cycles(self.cycle_limit)
+    }
+
+    fn sensor(&self) -> RaySensor {
+        let scaled = |values: &[f64]| values.iter().map(|v| v * self.scale).collect();
+        RaySensor {
+            nose_m: self.nose_m * self.scale,
+            behind_nose_m: 0.02 * self.scale,
+            height_m: self.sensor_height_m * self.scale,
+            columns_m: scaled(&self.columns_m),
+            rows_m: scaled(&self.rows_m),
+            step_m: self.hazard_step_m,
+            span_m: self.hazard_span_m,
+            tilt_max_rad: self.tilt_max_deg.to_radians(),
+        }
+    }
+
+    fn rules(&self) -> SojournerRules {
+        SojournerRules {
+            goal_tolerance_m: self.goal_tolerance_m,
+            turn_rad: self.turn_deg.to_radians(),
+            turn_noise_rad: self.turn_noise_rad,
+            pass_m: self.pass_m * self.scale,
+            step_m: self.step_m * self.scale,
+            bearing_tolerance_rad: self.bearing_tolerance_rad,
+        }
+    }
+}
+
+impl SchoppersParameters {
+    /// # Errors
+    /// A value out of range.
+    pub fn check(&self) -> Result<(), ParameterError> {
+        all_positive(&[
+            ("scale", self.scale),
+            ("axle_m", self.axle_m),
+            ("track_m", self.track_m),
+            ("sensor_length_m", self.sensor_length_m),
+            ("sensor_width_m", self.sensor_width_m),
+            ("clearance_m", self.clearance_m),
+            ("step_m", self.step_m),
+            ("commit_m", self.commit_m),
+            ("commit_max_m", self.commit_max_m),
+            ("progress_m", self.progress_m),
+            ("goal_tolerance_m", self.goal_tolerance_m),
+            ("distance_limit_m", self.distance_limit_m),
+        ])?;
+        ParameterError::not_negative("sensor_near_m", self.sensor_near_m)?;
+        if !(2..=PARTS_MAX as u32).contains(&self.rectangles) {
+            let message = format!("is {}; it must be 2 to {PARTS_MAX}", self.rectangles);
+            return Err(ParameterError::new("rectangles", message));
+        }
+        angle("slope_max_deg", self.slope_max_deg)?;
+        angle("tilt_max_deg", self.tilt_max_deg)?;
+        angle("turn_deg", self.turn_deg)?;
+        ParameterError::not_negative("bearing_tolerance_rad", self.bearing_tolerance_rad)?;
+        if !(self.commit_growth >= 1.0 && self.commit_growth.is_finite()) {
+            let message = format!("is {}; it must be a finite number, 1 or above", self.commit_growth);
+            return Err(ParameterError::new("commit_growth", message));
+        }
+        cycles(self.cycle_limit)
+    }
+
+    fn sensor(&self) -> RectangleSensor {
+        RectangleSensor {
+            near_m: self.sensor_near_m * self.scale,
+            length_m: self.sensor_length_m * self.scale,
+            width_m: self.sensor_width_m * self.scale,
+            count: self.rectangles as usize,
+            clearance_m: self.clearance_m,
+            slope_max: libm::tan(self.slope_max_deg.to_radians()),
+            tilt_max_rad: self.tilt_max_deg.to_radians(),
+        }
+    }
+
+    fn rules(&self) -> SchoppersRules {
+        SchoppersRules {
+            goal_tolerance_m: self.goal_tolerance_m,
+            turn_rad: self.turn_deg.to_radians(),
+            step_m: self.step_m * self.scale,
+            bearing_tolerance_rad: self.bearing_tolerance_rad,
+            commit_m: self.commit_m * self.scale,
+            commit_growth: self.commit_growth,
+            commit_max_m: self.commit_max_m * self.scale,
+            progress_m: self.progress_m,
+        }
+    }
+}
+
+impl Navigator {
+    /// # Errors
+    /// A value out of range.
+    pub fn check(&self) -> Result<(), ParameterError> {
+        match self {
+            Self::Sojourner(p) => p.check(),
+            Self::Schoppers(p) => p.check(),
+        }
+    }
+
+    /// A policy at the start.
+    pub fn policy(&self) -> Box<dyn Policy> {
+        match self {
+            Self::Sojourner(p) => Box::new(SojournerLike::new(p.rules())),
+            Self::Schoppers(p) => Box::new(SchoppersLike::new(p.rules())),
+        }
+    }
+
+    /// The task of its rovers in a trial.
+    pub fn task(&self, trial: &RoverParameters) -> Task {
+        let (sensor, scale, axle_m, track_m) = match self {
+            Self::Sojourner(p) => (Sensor::Rays(p.sensor()), p.scale, p.axle_m, p.track_m),
+            Self::Schoppers(p) => (Sensor::Rectangles(p.sensor()), p.scale, p.axle_m, p.track_m),
+        };
+        let (goal_tolerance_m, clearance_m, distance_limit_m, cycle_limit) = match self {
+            Self::Sojourner(p) => (p.goal_tolerance_m, p.clearance_m, p.distance_limit_m, p.cycle_limit),
+            Self::Schoppers(p) => (p.goal_tolerance_m, p.clearance_m, p.distance_limit_m, p.cycle_limit),
+        };
+        Task {
+            chassis: Chassis { axle_m: axle_m * scale, track_m: track_m * scale },
+            sensor,
+            noise: trial.noise,
+            goal_tolerance_m,
+            clearance_m,
+            distance_limit_m,
+            cycle_limit,
+            speed_m_s: trial.speed_m_s,
+            turn_rate_rad_s: trial.turn_rate_deg_s.to_radians(),
+        }
+    }
+}

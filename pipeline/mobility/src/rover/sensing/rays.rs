@@ -1,0 +1,150 @@
+//! Ranges along rays: columns of rays ahead, each column a strip of ground.
+//!
+//! A ray leaves the front of the rover and aims at a point of the plane of the body ahead; it is followed to twice that range. What
+//! it hits has the height v above that plane. A column is a hazard where
+//!
+//! * a ray hits nothing (a drop-off),
+//! * |v| exceeds the hazard height,
+//! * v differs by more than that from one row to the next, or from the next column, of which the higher is the hazard,
+//! * it holds the highest of all hits, and these differ by more than the span.
+//!
+//! The paper gives 20 ranges and a tilt; the flight rover avoided rocks, slopes and drop-offs (Mishkin et al., 1998). Their geometry and
+//! their rules are ours. Distances are in plan.
+
+use super::{Area, Ray, View};
+use crate::rover::draws::{CycleDraws, Purpose};
+use crate::rover::pose::{Body, Pose};
+use sastrugi_numeric::{Ground, NoGround};
+
+/// Rays are followed to this many nominal ranges.
+const REACH: f64 = 2.0;
+/// A ray leaves this share of its column's offset from the centre line.
+const SPREAD: f64 = 0.3;
+/// Steps along a ray, in cells of the ground.
+const STEP_CELLS: f64 = 0.5;
+
+/// Geometry and limits of a sensor of rays.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RaySensor {
+    /// Nose ahead of the centre, m.
+    pub nose_m: f64,
+    /// The rays leave this far behind the nose, m.
+    pub behind_nose_m: f64,
+    /// Height of their origin above the plane of the body, m.
+    pub height_m: f64,
+    /// Offsets of the columns to the left, from left to right, m.
+    pub columns_m: Vec<f64>,
+    /// Where the rays of a column are aimed, beyond the nose, near ones first, m.
+    pub rows_m: Vec<f64>,
+    /// Hazard height, m.
+    pub step_m: f64,
+    /// Largest difference of heights in a view without a hazard, m.
+    pub span_m: f64,
+    /// Largest tilt, rad.
+    pub tilt_max_rad: f64,
+}
+
+impl RaySensor {
+    pub(super) fn look(
+        &self,
+        ground: &impl Ground,
+        pose: &Pose,
+        body: &Body,
+        noise_m: f64,
+        draws: &CycleDraws,
+    ) -> Result<View, NoGround> {
+        let mut rays = Vec::with_capacity(self.columns_m.len() * self.rows_m.len());
+        for left in &self.columns_m {
+            for ahead in &self.rows_m {
+                let mut ray = self.follow(ground, pose, body, [*ahead, *left])?;
+                if noise_m > 0.0 {
+                    let error_m = noise_m * draws.normal_of(Purpose::Height, rays.len());
+                    ray.height_m = ray.height_m.map(|v| v + error_m);
+                }
+                rays.push(ray);
+            }
+        }
+        let heights: Vec<Option<f64>> = rays.iter().map(|ray| ray.height_m).collect();
+        let hazards = self.hazards(&heights);
+        let areas = (0..hazards.len()).map(|k| self.strip(k, hazards[k])).collect();
+        Ok(View { areas, rays, tilted: body.tilt_rad() > self.tilt_max_rad })
+    }
+
+    /// The ground under a column, halfway to its neighbours.
+    fn strip(&self, column: usize, hazard: bool) -> Area {
+        let at = |k: usize| self.columns_m[k];
+        let last = self.columns_m.len() - 1;
+        let half_gap = |a: usize, b: usize| 0.5 * (at(a) - at(b)).abs();
+        let (gap_left, gap_right) = match (column > 0, column < last) {
+            (true, true) => (half_gap(column, column - 1), half_gap(column, column + 1)),
+            (true, false) => (half_gap(column, column - 1), half_gap(column, column - 1)),
+            (false, true) => (half_gap(column, column + 1), half_gap(column, column + 1)),
+            (false, false) => (self.nose_m, self.nose_m),
+        };
+        let far = self.nose_m + self.rows_m.iter().fold(0.0, |far: f64, row| far.max(*row));
+        Area::between([self.nose_m, far], [at(column) - gap_right, at(column) + gap_left], hazard)
+    }
+
+    /// The ray of a row and a column.
+    fn follow(
+        &self,
+        ground: &impl Ground,
+        pose: &Pose,
+        body: &Body,
+        [row, column]: [f64; 2],
+    ) -> Result<Ray, NoGround> {
+        let from = [self.nose_m - self.behind_nose_m, SPREAD * column];
+        let aim = [self.nose_m + row - from[0], column - from[1]];
+        let range_m = (aim[0] * aim[0] + aim[1] * aim[1]).sqrt();
+        let steps = libm::ceil(REACH * range_m / (STEP_CELLS * ground.cell_m())).max(1.0) as u32;
+        let point = |t: f64| [from[0] + t * aim[0], from[1] + t * aim[1]];
+        let above = |t: f64| self.height_m * (1.0 - t);
+        let space = |t: f64, z: f64| {
+            let [x, y] = pose.to_ground(point(t));
+            [x, y, z]
+        };
+        let from_m = space(0.0, body.height_at_m(from) + self.height_m);
+        let mut last = f64::INFINITY;
+        for n in 0..=steps {
+            let t = REACH * f64::from(n) / f64::from(steps);
+            let [x, y] = pose.to_ground(point(t));
+            let gap = above(t) - (ground.at(x, y)?.height_m - body.height_at_m(point(t)));
+            if gap <= 0.0 {
+                // Between the last step and this one, as far as both are off; at the origin itself there is no last one.
+                let back = if last.is_finite() { gap / (gap - last) } else { 0.0 };
+                let hit = t - back * REACH / f64::from(steps);
+                let to_m = space(hit, body.height_at_m(point(hit)) + above(hit));
+                return Ok(Ray { from_m, to_m, height_m: Some(above(hit)) });
+            }
+            last = gap;
+        }
+        Ok(Ray { from_m, to_m: space(REACH, body.height_at_m(point(REACH)) + above(REACH)), height_m: None })
+    }
+
+    /// Hazard of each column, from the heights column by column.
+    pub(super) fn hazards(&self, heights: &[Option<f64>]) -> Vec<bool> {
+        let rows = self.rows_m.len();
+        let columns: Vec<&[Option<f64>]> = heights.chunks_exact(rows).collect();
+        let alone = |column: &&[Option<f64>]| {
+            let too_high = column.iter().any(|v| v.is_none_or(|v| v.abs() > self.step_m));
+            let step = |w: &[Option<f64>]| w[0].zip(w[1]).is_some_and(|(a, b)| (a - b).abs() > self.step_m);
+            too_high || column.windows(2).any(step)
+        };
+        let mut hazards: Vec<bool> = columns.iter().map(alone).collect();
+        for k in 1..columns.len() {
+            for (left, right) in columns[k - 1].iter().zip(columns[k]) {
+                let Some((left, right)) = left.zip(*right) else { continue };
+                hazards[k - 1] |= left - right > self.step_m;
+                hazards[k] |= right - left > self.step_m;
+            }
+        }
+        let hits = heights.iter().enumerate().filter_map(|(k, v)| v.map(|v| (k, v)));
+        let lowest = hits.clone().map(|(_, v)| v).fold(f64::INFINITY, f64::min);
+        if let Some((highest, v)) = hits.max_by(|a, b| a.1.total_cmp(&b.1))
+            && v - lowest > self.span_m
+        {
+            hazards[highest / rows] = true;
+        }
+        hazards
+    }
+}
