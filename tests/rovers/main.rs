@@ -4,7 +4,7 @@
 
 use rayon::prelude::*;
 use sastrugi_mobility::rover::{
-    Drive, Navigator, RoverParameters, SchoppersParameters, SojournerParameters, drive,
+    Cycle, Drive, Navigator, RoverParameters, SchoppersParameters, SojournerParameters, Start, drive,
 };
 use sastrugi_numeric::{Counter, Streams};
 use sastrugi_terrain::planetary::{Clearing, Planetary, RawPlanetary};
@@ -12,7 +12,8 @@ use serde_json::json;
 
 /// Flat sand with rocks of 0.04 to 4 m, on which the specification's figures were measured.
 fn world(coverage: f64) -> Planetary {
-    let processes = json!([{"kind": "rocks", "coverage": coverage, "diameter_min_m": 0.04, "diameter_max_m": 4.0}]);
+    let rocks = json!({"kind": "rocks", "coverage": coverage, "diameter_min_m": 0.04, "diameter_max_m": 4.0});
+    let processes = json!([rocks]);
     let raw = RawPlanetary {
         size_px: Some([16, 16]),
         basic_spacing_m: Some(0.01),
@@ -31,7 +32,7 @@ fn trial(navigator: &Navigator, parameters: &RoverParameters, coverage: f64, see
     let ground = world(coverage).ground(&streams, parameters.cell_m, &clearings, 400).unwrap();
     let task = navigator.task(parameters);
     let noise = Counter::new(&mut Streams::for_seed(seed, "rover").stream("noise"));
-    let one = |(k, start): (usize, &sastrugi_mobility::rover::Start)| {
+    let one = |(k, start): (usize, &Start)| {
         let mut policy = navigator.policy();
         drive(&ground.view(), &task, policy.as_mut(), start, noise.at(k as i64), |_| {})
     };
@@ -51,25 +52,90 @@ fn summary(drives: &[Drive]) -> [f64; 6] {
     [distance_m, drives[0].straight_m / distance_m, mean(e), least, most, reached]
 }
 
+/// Trials on several worlds together.
+fn pooled(navigator: &Navigator, parameters: &RoverParameters, coverage: f64, worlds: u64) -> Vec<Drive> {
+    (0..worlds).flat_map(|seed| trial(navigator, parameters, coverage, seed)).collect()
+}
+
+/// Acceptance 18, 100 rovers of 25 m: d0 over the mean distance falls with the density of rocks and lies in 0.04 to 0.16 at 17.6 % (the paper:
+/// 25 / 280 = 0.089), the spread of e is least at 6.9 %. Over eight worlds a single one has had 0.05 to 0.13 at 17.6 %: the
+/// band is 3 of their standard deviations wide on either side, false alarm below 0.5 % for another seed; this one is fixed.
 #[test]
-#[ignore = "prints"]
-fn stat_explore() {
-    for (coverage, seeds) in [(0.069, 2), (0.088, 2), (0.118, 2), (0.176, 4)] {
-        for seed in 0..seeds {
-            let began = std::time::Instant::now();
-            let drives = trial(
-                &Navigator::Sojourner(SojournerParameters::default()),
-                &RoverParameters::default(),
-                coverage,
-                seed,
-            );
-            println!("sojourner {coverage} {seed}: {:.3?} {:.1} s contacts {} {}", summary(&drives), began.elapsed().as_secs_f64(), drives.iter().map(|d| d.contacts.anywhere).sum::<u32>(), drives.iter().filter(|d| d.contacts.on_centre_line > 0).count());
+#[ignore = "slow: ./test --full"]
+fn stat_sojourner_like_rovers_slow_down_with_rocks() {
+    let navigator = Navigator::Sojourner(SojournerParameters::default());
+    let mut last = [f64::INFINITY, 0.0];
+    for coverage in [0.069, 0.088, 0.118, 0.176] {
+        let drives = trial(&navigator, &RoverParameters::default(), coverage, 1);
+        let [distance_m, ratio, e, least, most, reached] = summary(&drives);
+        println!("{coverage}: {distance_m:.1} m, {ratio:.3}, e {e:.3} ({least:.3} to {most:.3}), {reached:.2} arrived");
+        assert!(ratio < last[0], "{coverage}: {ratio}");
+        assert!(coverage > 0.1 || reached >= 0.98);
+        if coverage == 0.069 {
+            last[1] = most - least;
         }
+        assert!(most - least >= last[1], "{coverage}: spread {}", most - least);
+        assert!(coverage != 0.176 || (0.04..=0.16).contains(&ratio), "{ratio}");
+        last[0] = ratio;
     }
-    for seed in 0..4 {
-        let began = std::time::Instant::now();
-        let parameters = RoverParameters { radius_m: 40.0, ..RoverParameters::default() };
-        let drives = trial(&Navigator::Schoppers(SchoppersParameters::default()), &parameters, 0.088, seed);
-        println!("schoppers {seed}: {:.3?} {:.1} s contacts {} {}", summary(&drives), began.elapsed().as_secs_f64(), drives.iter().map(|d| d.contacts.anywhere).sum::<u32>(), drives.iter().filter(|d| d.contacts.on_centre_line > 0).count());
-    }
+}
+
+/// Acceptance 19: Schoppers-like rovers at 8.8 % over 40 m: d0 over the mean distance in 0.85 to 0.93 (the paper: 40 / 44.9 = 0.891), at
+/// least 95 % arrive, and at least 95 % pass no rock above the clearance on their centre line. Rovers that face the goal at
+/// the start, which the paper does not say, have 0.94.
+#[test]
+#[ignore = "slow: ./test --full"]
+fn stat_schoppers_like_rovers_arrive() {
+    let navigator = Navigator::Schoppers(SchoppersParameters::default());
+    let parameters = RoverParameters { radius_m: 40.0, ..RoverParameters::default() };
+    let drives = pooled(&navigator, &parameters, 0.088, 4);
+    let [distance_m, ratio, e, least, most, reached] = summary(&drives);
+    println!("{distance_m:.1} m, {ratio:.3}, e {e:.3} ({least:.3} to {most:.3}), {reached:.3} arrived");
+    assert!((0.85..=0.93).contains(&ratio) && reached >= 0.95);
+    let clean = mean(drives.iter().map(|d| f64::from(u8::from(d.contacts.on_centre_line == 0))));
+    assert!(clean >= 0.95, "{clean}");
+}
+
+/// With room for one tile of the ground and for all, rovers do the same to the last bit (section 11).
+#[test]
+fn prop_tracks_do_not_depend_on_the_cache() {
+    let parameters = RoverParameters { rovers: 3, radius_m: 6.0, ..RoverParameters::default() };
+    let navigator = Navigator::Sojourner(SojournerParameters::default());
+    let [small, large] = [1, 64].map(|tiles| {
+        let streams = Streams::for_seed(3, "terrain");
+        let ground = world(0.118).ground(&streams, 0.02, &[], tiles).unwrap();
+        let starts = parameters.starts(&Streams::for_seed(3, "rover"));
+        let noise = Counter::new(&mut Streams::for_seed(3, "rover").stream("noise"));
+        let track = |(k, start): (usize, &Start)| {
+            let mut track = Vec::new();
+            let each = |cycle: &Cycle<'_>| track.push((cycle.poses.real, cycle.view.clone()));
+            let ended = drive(
+                &ground.view(),
+                &navigator.task(&parameters),
+                navigator.policy().as_mut(),
+                start,
+                noise.at(k as i64),
+                each,
+            );
+            (ended, track)
+        };
+        let tracks: Vec<_> = starts.iter().enumerate().map(track).collect();
+        (tracks, ground.tiles_made())
+    });
+    assert_eq!(small.0, large.0);
+    assert!(small.1 > large.1, "{} {}", small.1, large.1);
+}
+
+/// A changed world far from a rover's way changes nothing: common random numbers. The navigators of a pair with another clearance share
+/// world, starts and noise.
+#[test]
+fn prop_designs_share_their_noise() {
+    let parameters = RoverParameters { rovers: 4, radius_m: 5.0, ..RoverParameters::default() };
+    let of = |clearance_m: f64| {
+        let navigator = Navigator::Sojourner(SojournerParameters { clearance_m, ..Default::default() });
+        trial(&navigator, &parameters, 0.088, 9)
+    };
+    let (a, b) = (of(0.13), of(0.02));
+    assert!(a.iter().zip(&b).all(|(a, b)| a.last == b.last && a.distance_m == b.distance_m));
+    assert!(a.iter().zip(&b).any(|(a, b)| a.contacts != b.contacts));
 }

@@ -38,5 +38,5 @@ pub use parameters::{Navigator, RoverParameters, SchoppersParameters, SojournerP
 pub use policies::{Command, Policy, Situation, Stop};
 pub use pose::{Body, Chassis, Pose};
 pub use sensing::{Area, Ray, Sensor, View};
-pub use starts::Start;
+pub use starts::{Facing, Start};
 pub use trial::{Cycle, Drive, Ending, Task, drive};

@@ -4,7 +4,7 @@ use super::motion::NoiseParameters;
 use super::policies::{Policy, SchoppersLike, SchoppersRules, SojournerLike, SojournerRules};
 use super::pose::Chassis;
 use super::sensing::{RaySensor, RectangleSensor, Sensor};
-use super::starts::{self, Start};
+use super::starts::{self, Facing, Start};
 use super::trial::Task;
 use sastrugi_numeric::Streams;
 use sastrugi_schemas::ParameterError;
@@ -194,6 +194,8 @@ pub struct RoverParameters {
     pub radius_m: f64,
     /// Distance from drawn starts to their goals, m.
     pub distance_m: f64,
+    /// Which way rovers face at the start (our choice; those that face the goal come out better).
+    pub facing: Facing,
     /// Radius around starts and goals that is kept free of rocks, m (our choice); on planetary worlds alone.
     pub clear_m: f64,
     /// Distance of the samples of the ground, m (the paper: 0.02); on planetary worlds alone, other terrains have their cells.
@@ -214,6 +216,7 @@ impl Default for RoverParameters {
             centre_m: [0.0; 2],
             radius_m: 25.0,
             distance_m: 40.0,
+            facing: Facing::Drawn,
             clear_m: 0.6,
             cell_m: 0.02,
             speed_m_s: 0.01,
@@ -244,9 +247,10 @@ impl RoverParameters {
 
     /// Starts and goals; draws are those of the streams.
     pub fn starts(&self, streams: &Streams) -> Vec<Start> {
+        let Self { rovers, centre_m, radius_m, distance_m, facing, .. } = *self;
         match self.starts {
-            Starts::Circle => starts::on_circle(self.rovers, self.centre_m, self.radius_m),
-            Starts::Drawn => starts::drawn(self.rovers, self.centre_m, self.radius_m, self.distance_m, streams),
+            Starts::Circle => starts::on_circle(rovers, centre_m, radius_m, facing, streams),
+            Starts::Drawn => starts::drawn(rovers, centre_m, radius_m, distance_m, facing, streams),
         }
     }
 

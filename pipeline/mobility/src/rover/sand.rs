@@ -57,4 +57,3 @@ impl SandPlane {
         self.level_m + (self.slopes[0] * x + self.slopes[1] * y)
     }
 }
-

@@ -86,13 +86,7 @@ impl RaySensor {
     }
 
     /// The ray of a row and a column.
-    fn follow(
-        &self,
-        ground: &impl Ground,
-        pose: &Pose,
-        body: &Body,
-        [row, column]: [f64; 2],
-    ) -> Result<Ray, NoGround> {
+    fn follow(&self, ground: &impl Ground, pose: &Pose, body: &Body, [row, column]: [f64; 2]) -> Result<Ray, NoGround> {
         let from = [self.nose_m - self.behind_nose_m, SPREAD * column];
         let aim = [self.nose_m + row - from[0], column - from[1]];
         let range_m = (aim[0] * aim[0] + aim[1] * aim[1]).sqrt();
@@ -122,7 +116,7 @@ impl RaySensor {
     }
 
     /// Hazard of each column, from the heights column by column.
-    pub(super) fn hazards(&self, heights: &[Option<f64>]) -> Vec<bool> {
+    pub(crate) fn hazards(&self, heights: &[Option<f64>]) -> Vec<bool> {
         let rows = self.rows_m.len();
         let columns: Vec<&[Option<f64>]> = heights.chunks_exact(rows).collect();
         let alone = |column: &&[Option<f64>]| {

@@ -62,7 +62,8 @@ impl RectangleSensor {
         let standing = SandPlane { level_m: 0.0, slopes: body.slopes };
         let area = |number: usize| {
             let plane = sums[number].plane().or(everywhere).unwrap_or(standing);
-            let steep = plane.slopes[0] * plane.slopes[0] + plane.slopes[1] * plane.slopes[1] > self.slope_max * self.slope_max;
+            let steep =
+                plane.slopes[0] * plane.slopes[0] + plane.slopes[1] * plane.slopes[1] > self.slope_max * self.slope_max;
             let above = |p: &Pixel| p.height_m - body.height_m - plane.height_m(p.at);
             let rock = pixels[number].iter().any(|p| p.is_rock && above(p) > self.clearance_m);
             Area::between([self.near_m, self.near_m + self.length_m], self.sides(number), steep || rock)
