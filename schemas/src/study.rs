@@ -454,6 +454,28 @@ pub struct NavigateItem {
     pub sweep: BTreeMap<String, Vec<serde_json::Value>>,
 }
 
+/// `[[rover]]` around the parameters of a navigator and its trial.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RoverItem {
+    /// Id, `[a-z0-9][a-z0-9.-]{0,63}`, unique in the study; rovers are named `<id>-0001` ...
+    pub id: String,
+    /// Navigator: see `sastrugi kinds`.
+    pub kind: String,
+    /// Ids of the terrains, textures or DEMs to drive on; the id of a replicated item stands for all of them. Of a `planetary` terrain rovers
+    /// drive on the whole world, which is made around them, not on its window alone; rocks and albedo of other terrains are those of their maps.
+    pub terrains: Vec<String>,
+    /// Distance between two rows of `rover_samples` of a rover, m; 0 for a row every cycle; 0.5 when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sample_m: Option<f64>,
+    /// Explicit seed of starts and noise instead of the study's.
+    #[serde(default)]
+    pub seed: Option<u64>,
+    /// One stage per value of a parameter: `sweep.<parameter> = [...]`.
+    #[serde(default)]
+    pub sweep: BTreeMap<String, Vec<serde_json::Value>>,
+}
+
 /// `[[traverse]]` around the parameters of a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]

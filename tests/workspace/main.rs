@@ -22,7 +22,7 @@ fn allowed() -> BTreeMap<&'static str, BTreeSet<&'static str>> {
         ("stages", stages),
         ("cli", "stages report store schemas"),
         ("fixtures", "numeric"),
-        ("tests", "schemas numeric statistics store fixtures"),
+        ("tests", "schemas numeric statistics terrain mobility store fixtures"),
         (
             "benches",
             "schemas numeric roughness statistics terrain texture mobility navigation store stages report fixtures",

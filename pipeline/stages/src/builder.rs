@@ -43,8 +43,8 @@ pub struct Heightfield {
     pub kind: String,
     /// Full parameters.
     pub parameters: Value,
-    /// Words of its random streams.
-    pub stream: Option<String>,
+    /// Its random streams; measured DEMs have none.
+    pub streams: Option<Streams>,
     /// Its path in the release.
     pub release_path: String,
     /// Number of cells; for a measured DEM whose file does not state it, as many as it may hold.
@@ -53,6 +53,13 @@ pub struct Heightfield {
     pub cell_m: Option<f64>,
     /// Shape and place, where they are known before the run.
     pub geometry: Option<Geometry>,
+}
+
+impl Heightfield {
+    /// Words of its random streams.
+    pub fn stream(&self) -> Option<String> {
+        self.streams.as_ref().map(Streams::label)
+    }
 }
 
 /// A graph under construction, with what later sections refer to.

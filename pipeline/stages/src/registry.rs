@@ -32,7 +32,7 @@ pub enum Form {
 }
 
 /// Sections in the order in which they may refer to one another.
-pub const SECTIONS: [Section; 10] = [
+pub const SECTIONS: [Section; 11] = [
     Section {
         name: "dem",
         form: Form::Array,
@@ -95,6 +95,13 @@ pub const SECTIONS: [Section; 10] = [
         envelope: schema_of::<envelope::NavigateItem>,
         kinds: jobs::navigate::kinds,
         add: jobs::navigate::add,
+    },
+    Section {
+        name: "rover",
+        form: Form::Array,
+        envelope: schema_of::<envelope::RoverItem>,
+        kinds: jobs::rover::kinds,
+        add: jobs::rover::add,
     },
     Section {
         name: hypotheses::SECTION,

@@ -20,6 +20,8 @@ pub mod psd;
 pub mod replicates;
 pub mod route_points;
 pub mod routes;
+pub mod rover_samples;
+pub mod rovers;
 pub mod samples;
 pub mod scoreboard;
 pub mod structure;
@@ -44,6 +46,8 @@ pub use psd::PsdRow;
 pub use replicates::ReplicateRow;
 pub use route_points::RoutePointRow;
 pub use routes::RouteRow;
+pub use rover_samples::RoverSampleRow;
+pub use rovers::RoverRow;
 pub use samples::SampleRow;
 pub use scoreboard::{ScoreCovarianceRow, ScoreRow};
 pub use structure::StructureRow;
@@ -114,7 +118,7 @@ impl Table {
 }
 
 /// All tables, in the order of the report and of `schema`.
-pub const ALL: [&Table; 24] = [
+pub const ALL: [&Table; 26] = [
     &TerrainRow::TABLE,
     &SurfaceRow::TABLE,
     &FitRow::TABLE,
@@ -137,6 +141,8 @@ pub const ALL: [&Table; 24] = [
     &FormationRow::TABLE,
     &FormationSampleRow::TABLE,
     &FormationEventRow::TABLE,
+    &RoverRow::TABLE,
+    &RoverSampleRow::TABLE,
     &LogRow::TABLE,
     &DemFitRow::TABLE,
 ];

@@ -28,6 +28,7 @@ pub mod pose;
 mod sand;
 pub mod sensing;
 pub mod starts;
+pub mod track;
 pub mod trial;
 
 #[cfg(test)]
@@ -39,4 +40,5 @@ pub use policies::{Command, Policy, Situation, Stop};
 pub use pose::{Body, Chassis, Pose};
 pub use sensing::{Area, Ray, Sensor, View};
 pub use starts::{Facing, Start};
+pub use track::Track;
 pub use trial::{Cycle, Drive, Ending, Task, drive};

@@ -161,7 +161,8 @@ impl Default for SchoppersParameters {
 }
 
 /// A navigator with its numbers.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(untagged)]
 pub enum Navigator {
     /// Rays.
     Sojourner(SojournerParameters),
@@ -401,6 +402,19 @@ impl SchoppersParameters {
 }
 
 impl Navigator {
+    /// Name of the Sojourner-like one in studies and tables.
+    pub const SOJOURNER: &str = "sojourner_like";
+    /// Name of the Schoppers-like one.
+    pub const SCHOPPERS: &str = "schoppers_like";
+
+    /// Name in studies and tables.
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Self::Sojourner(_) => Self::SOJOURNER,
+            Self::Schoppers(_) => Self::SCHOPPERS,
+        }
+    }
+
     /// # Errors
     /// A value out of range.
     pub fn check(&self) -> Result<(), ParameterError> {

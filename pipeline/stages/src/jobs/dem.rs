@@ -55,7 +55,7 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
             replicate: None,
             kind: original::extension(&item.file),
             parameters: recipe(&item),
-            stream: None,
+            streams: None,
             release_path: format!("dem/{id}.metric.tif"),
             cells: claimed.cells,
             cell_m: claimed.cell_m,

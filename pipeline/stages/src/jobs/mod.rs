@@ -11,6 +11,7 @@ pub mod original;
 pub mod rasters;
 pub mod roughness;
 pub mod route;
+pub mod rover;
 pub mod scoreboard;
 pub mod surface;
 pub mod terrain;

@@ -75,7 +75,7 @@ impl RoughnessJob {
             share_high: summary.shares.high,
             share_border_m: summary.share_border_m,
             psd_slope: summary.psd_slope,
-            stream: self.field.stream.clone(),
+            stream: self.field.stream(),
             path: self.field.release_path.clone(),
         }
     }

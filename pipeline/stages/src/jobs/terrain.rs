@@ -64,7 +64,7 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
                 replicate: Some(one.replicate),
                 kind: item.kind.clone(),
                 parameters: generator.parameters(),
-                stream: Some(streams.label()),
+                streams: Some(streams.clone()),
                 release_path: format!("terrain/{}.tif", one.id),
                 cells: generator.geometry().len() as u64,
                 cell_m: Some(generator.geometry().cell.into_iter().fold(f64::INFINITY, f64::min)),
@@ -79,7 +79,7 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
                 item: field.item.clone(),
                 parents,
                 inputs: Vec::new(),
-                stream: field.stream.clone(),
+                stream: field.stream(),
                 job: Box::new(job),
             };
             builder.node(node)?;

@@ -155,7 +155,7 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
                     replicate: Some(one.replicate),
                     kind: method.clone(),
                     parameters: parameters(&item, &matched, synthesis.as_ref()),
-                    stream: Some(streams.label()),
+                    streams: Some(streams.clone()),
                     release_path: format!("texture/{id}.tif"),
                     cells: match (&base, &fill) {
                         (Some(Base { cells, .. }), _) | (None, Some((_, cells))) => *cells,
@@ -189,7 +189,7 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
                     streams,
                     geotiff: builder.study.head.geotiff,
                 };
-                let stream = field.stream.clone();
+                let stream = field.stream();
                 let node = Node { item: field.item.clone(), parents, inputs: Vec::new(), stream, job: Box::new(job) };
                 builder.node(node)?;
                 builder.heightfields.insert(id.clone(), field);

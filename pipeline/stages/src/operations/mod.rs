@@ -8,5 +8,6 @@ pub mod masks;
 pub mod place;
 pub mod roughness;
 pub mod routes;
+pub mod rovers;
 pub mod terrains;
 pub mod textures;

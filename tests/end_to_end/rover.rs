@@ -1,0 +1,186 @@
+//! Studies of rovers: tables, refusals, the same bytes however they are made.
+
+use sastrugi_tests::{Row, area, differing, rows, sastrugi_in, sums, write};
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+const STUDY: &str = r#"
+[study]
+name = "rovers"
+seed = 3
+date = "2026-01-01"
+pairing = "common"
+
+[[terrain]]
+id = "sparse"
+kind = "planetary"
+group = "sparse"
+count = 2
+size_m = [20.0, 20.0]
+cell_m = 0.16
+basic_spacing_m = 0.02
+origin_m = [-9.92, -9.92]
+processes = [{ kind = "texture", roughness_m = 0.005 }, { kind = "rocks", coverage = 0.069, diameter_min_m = 0.1 }]
+
+[[terrain]]
+id = "dense"
+kind = "planetary"
+group = "dense"
+count = 2
+size_m = [20.0, 20.0]
+cell_m = 0.16
+basic_spacing_m = 0.02
+origin_m = [-9.92, -9.92]
+processes = [{ kind = "texture", roughness_m = 0.005 }, { kind = "rocks", coverage = 0.15, diameter_min_m = 0.1 }]
+
+[[terrain]]
+id = "plate"
+kind = "multifractal"
+size_px = [128, 128]
+cell_m = 0.1
+
+[[rover]]
+id = "rays"
+kind = "sojourner_like"
+terrains = ["sparse", "dense"]
+rovers = 6
+radius_m = 8.0
+sample_m = 1.0
+
+[[rover]]
+id = "boxes"
+kind = "schoppers_like"
+terrains = ["dense"]
+rovers = 3
+starts = "drawn"
+radius_m = 4.0
+distance_m = 9.0
+sweep.clearance_m = [0.13, 0.2]
+
+[[rover]]
+id = "plates"
+kind = "sojourner_like"
+terrains = ["plate"]
+rovers = 4
+centre_m = [6.0, 6.0]
+radius_m = 5.0
+hazard_step_m = 1.0
+hazard_span_m = 2.0
+tilt_max_deg = 80.0
+"#;
+
+fn number(row: &Row, column: &str) -> f64 {
+    row[column].as_f64().or(row[column].as_i64().map(|n| n as f64)).unwrap_or(f64::NAN)
+}
+
+fn text<'a>(row: &'a Row, column: &str) -> &'a str {
+    row[column].as_str().unwrap_or_default()
+}
+
+fn run(folder: &Path, study: &str, more: &[&str]) -> BTreeMap<String, String> {
+    write(folder, "study.toml", study);
+    let arguments = ["run", "study.toml", "-o", "release", "--quiet"].into_iter().chain(more.iter().copied());
+    let call = sastrugi_in(folder, &arguments.collect::<Vec<_>>());
+    assert_eq!(call.code, 0, "{}", call.stderr);
+    sums(&folder.join("release"))
+}
+
+#[test]
+fn val_rovers_have_rows_and_samples() {
+    let folder = area();
+    run(folder.path(), STUDY, &[]);
+    let release = folder.path().join("release");
+    let (rovers, samples) = (rows(&release, "rovers"), rows(&release, "rover_samples"));
+    assert_eq!(rovers.len(), 2 * 2 * 6 + 2 * 2 * 3 + 4);
+    for rover in &rovers {
+        let of = |row: &&Row| ["terrain_id", "rover_id"].iter().all(|key| text(row, key) == text(rover, key));
+        let own: Vec<&Row> = samples.iter().filter(of).collect();
+        let [straight_m, distance_m, residual_m, e] =
+            ["straight_m", "distance_m", "residual_m", "efficiency"].map(|column| number(rover, column));
+        assert!((e - straight_m / (distance_m + residual_m)).abs() < 1e-12 && e <= 1.0 && e > 0.0);
+        let reached = text(rover, "outcome") == "reached";
+        assert_eq!(reached, rover["note"].is_null());
+        assert!(!reached || residual_m <= 0.5);
+        assert!(own.len() as f64 >= distance_m / 1.2, "{} samples over {distance_m} m", own.len());
+        assert_eq!(number(own[0], "x_m"), number(rover, "start_x_m"));
+        let areas = text(own[0], "hazards").len();
+        assert_eq!(areas, if text(rover, "navigator") == "sojourner_like" { 5 } else { 4 });
+        assert!(number(rover, "max_tilt_deg") >= 0.0 && number(rover, "rms_pitch_rate_deg_s") >= 0.0);
+    }
+    let mean = |group: &str| {
+        let of_group = rovers.iter().filter(|row| text(row, "group") == group && text(row, "stage_id") == "rays");
+        of_group.map(|row| number(row, "efficiency")).sum::<f64>() / 12.0
+    };
+    assert!(mean("sparse") > mean("dense"), "{} {}", mean("sparse"), mean("dense"));
+    // Starts, headings and noise are shared by densities and by the values of a sweep.
+    let starts = |stage: &str, group: &str| -> BTreeSet<String> {
+        let of = rovers.iter().filter(|row| text(row, "stage_id") == stage && text(row, "group") == group);
+        of.map(|row| ["start_x_m", "start_heading_deg", "goal_y_m"].map(|c| row[c].to_string()).join(" ")).collect()
+    };
+    assert_eq!(starts("rays", "sparse"), starts("rays", "dense"));
+    assert_eq!(starts("boxes-0.13", "dense"), starts("boxes-0.2", "dense"));
+    assert_eq!(starts("boxes-0.13", "dense").len(), 6);
+}
+
+/// The window of a planetary terrain is a picture: rovers go beyond it. Other ground ends where it ends, and that is said.
+#[test]
+fn val_worlds_go_on_and_grids_end() {
+    let folder = area();
+    let study = STUDY.replace("radius_m = 8.0", "radius_m = 14.0").replace("radius_m = 5.0", "radius_m = 6.0");
+    write(folder.path(), "study.toml", &study);
+    let call = sastrugi_in(folder.path(), &["run", "study.toml", "-o", "release", "--quiet"]);
+    assert_eq!(call.code, 0, "{}", call.stderr);
+    let rovers = rows(&folder.path().join("release"), "rovers");
+    let of = |stage: &str| rovers.iter().filter(|row| text(row, "stage_id") == stage).collect::<Vec<_>>();
+    assert!(of("rays").iter().all(|row| text(row, "outcome") != "off_ground"));
+    let off: Vec<&str> =
+        of("plates").iter().filter(|row| text(row, "outcome") == "off_ground").map(|row| text(row, "note")).collect();
+    assert!(!off.is_empty() && off.iter().all(|note| note.starts_with("there is no ground at x = ")), "{off:?}");
+}
+
+#[test]
+fn prop_a_release_of_rovers_has_the_same_bytes() {
+    let (one, two) = (area(), area());
+    let [first, second] =
+        [(&one, "1"), (&two, "2")].map(|(folder, threads)| run(folder.path(), STUDY, &["--threads", threads]));
+    assert_eq!(differing(&first, &second), Vec::<String>::new());
+    let shards = area();
+    write(shards.path(), "study.toml", STUDY);
+    for shard in ["1/2", "2/2"] {
+        let name = format!("part-{}", &shard[..1]);
+        let call = sastrugi_in(shards.path(), &["run", "study.toml", "-o", &name, "--shard", shard, "--quiet"]);
+        assert_eq!(call.code, 0, "{}", call.stderr);
+    }
+    let call = sastrugi_in(shards.path(), &["merge", "part-1", "part-2", "-o", "release", "--quiet"]);
+    assert_eq!(call.code, 0, "{}", call.stderr);
+    assert_eq!(differing(&first, &sums(&shards.path().join("release"))), Vec::<String>::new());
+}
+
+/// Refusals of section 8, one sentence each.
+#[test]
+fn val_wrong_studies_are_refused() {
+    let folder = area();
+    for (from, to, words) in [
+        ("rovers = 6", "rovers = 0", "rover \"rays\": `rovers` is 0; it must be 1 to 9999"),
+        (
+            "kind = \"sojourner_like\"\nterrains = [\"sparse\"",
+            "kind = \"flier\"\nterrains = [\"sparse\"",
+            "`flier` is not a navigator",
+        ),
+        ("radius_m = 8.0", "radius_m = 0.0", "`radius_m` is 0"),
+        ("sample_m = 1.0", "sample_m = -1.0", "`sample_m` is -1"),
+        ("sample_m = 1.0", "cell_m = 0.03", "1.5 times the basic spacing"),
+        ("sample_m = 1.0", "clearence_m = 0.1", "did you mean"),
+        ("terrains = [\"plate\"]", "terrains = []", "`terrains` is empty"),
+        ("terrains = [\"plate\"]", "terrains = [\"plait\"]", "names \"plait\""),
+        ("hazard_step_m = 1.0", "hazard_step_m = -1.0", "`hazard_step_m` is -1"),
+        ("hazard_step_m = 1.0", "noise = { slip = 2.0 }", "`noise.slip` is 2"),
+    ] {
+        assert!(STUDY.contains(from), "{from}");
+        write(folder.path(), "study.toml", &STUDY.replace(from, to));
+        let call = sastrugi_in(folder.path(), &["run", "study.toml", "-o", "release", "--quiet"]);
+        let told: String = call.stderr.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert_eq!(call.code, 2, "{to}: {told}");
+        assert!(told.contains(words), "{to}: {told}");
+    }
+}
