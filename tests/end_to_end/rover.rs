@@ -105,6 +105,11 @@ fn val_rovers_have_rows_and_samples() {
         assert_eq!(number(own[0], "x_m"), number(rover, "start_x_m"));
         let areas = text(own[0], "hazards").len();
         assert_eq!(areas, if text(rover, "navigator") == "sojourner_like" { 5 } else { 4 });
+        // The way of one that knows the whole map is the shortest, to within the cells of that map.
+        let oracle_m = number(rover, "oracle_m");
+        assert_eq!(oracle_m.is_nan(), text(rover, "oracle") == "none");
+        assert!(oracle_m.is_nan() || oracle_m >= straight_m - 0.2);
+        assert!(!(number(rover, "contacts") == 0.0 && distance_m + residual_m < oracle_m - 0.2), "{rover:?}");
         assert!(number(rover, "max_tilt_deg") >= 0.0 && number(rover, "rms_pitch_rate_deg_s") >= 0.0);
     }
     let mean = |group: &str| {

@@ -43,10 +43,11 @@ super::table! {
         efficiency_half_limit: f64 ["1"],
         /// Farthest that it may drive.
         distance_limit_m: f64 ["m"],
-        /// Shortest way for a rover that knows the whole map; null where there is none, or none was sought.
+        /// Shortest way to the goal for a rover that knows the whole map; null where there is none. `straight_m` over it is the efficiency that the
+        /// ground allows.
         oracle_m: f64 ["m"],
-        /// `found`, `none` where no way exists at this clearance; null where none was sought.
-        oracle: Option<String> [""],
+        /// `found`, or `none` where no way exists that keeps the wheels clear of rocks above the clearance and off steep sand.
+        oracle: String [""],
         /// Time driving and turning.
         time_s: f64 ["s"],
         /// Cycles of sensing and deciding.

@@ -1,7 +1,7 @@
 //! Rocks that a rover met: those higher than its clearance that came under it.
 
 use super::pose::{Chassis, Pose};
-use super::sand::PlaneSums;
+use super::sand::{PlaneSums, SandPlane};
 use sastrugi_numeric::{Ground, GroundClass, NoGround};
 
 /// Half side of the square whose sand a rock is measured from, m.
@@ -56,22 +56,32 @@ fn stands_above(ground: &impl Ground, at: [f64; 2], clearance_m: f64) -> Result<
     Ok(here.height_m - sand_height_m(ground, at)? > clearance_m)
 }
 
-/// Height of the sand under a rock: the plane through the sand around it; its lowest height where there is too little sand.
-pub fn sand_height_m(ground: &impl Ground, [x, y]: [f64; 2]) -> Result<f64, NoGround> {
+/// Height of the sand at a point, m.
+fn sand_height_m(ground: &impl Ground, at: [f64; 2]) -> Result<f64, NoGround> {
+    sand_plane(ground, at).map(|plane| plane.level_m)
+}
+
+/// The plane of the sand around a point, from there; level at the lowest height where there is too little sand.
+///
+/// # Errors
+/// Ground that is not known.
+pub fn sand_plane(ground: &impl Ground, [x, y]: [f64; 2]) -> Result<SandPlane, NoGround> {
     let step_m = ground.cell_m().max(AROUND_M / 10.0);
     let reach = libm::ceil(AROUND_M / step_m) as i32;
     let mut sums = PlaneSums::default();
     let mut lowest = f64::INFINITY;
-    let level = ground.at(x, y)?.height_m;
+    // Heights near 0, where squares lose no digits.
+    let level_m = ground.at(x, y)?.height_m;
     for i in -reach..=reach {
         for j in -reach..=reach {
             let offset = [f64::from(i) * step_m, f64::from(j) * step_m];
             let point = ground.at(x + offset[0], y + offset[1])?;
             lowest = lowest.min(point.height_m);
             if point.class == GroundClass::Sand {
-                sums.add(offset, point.height_m - level);
+                sums.add(offset, point.height_m - level_m);
             }
         }
     }
-    Ok(sums.plane().map_or(lowest, |plane| level + plane.level_m))
+    let around = sums.plane().map(|plane| SandPlane { level_m: level_m + plane.level_m, ..plane });
+    Ok(around.unwrap_or(SandPlane { level_m: lowest, slopes: [0.0; 2] }))
 }

@@ -4,7 +4,8 @@
 //! * [`policies`] decide on a view: the trait [`Policy`], and two navigators that know nothing else.
 //! * [`motion`] carries out what was decided, with slip and drift where they are asked for.
 //! * [`trial`] drives one rover from a start to a goal; [`starts`] places starts and goals; [`contacts`] counts the rocks met;
-//!   [`efficiency`] judges.
+//!   [`efficiency`](mod@efficiency) judges.
+//! * [`obstacles`] maps what a rover that knows everything would keep clear of, to tell hard ground from a poor navigator.
 //! * [`parameters`] holds every number with its source.
 //!
 //! # Source
@@ -22,10 +23,11 @@ pub mod contacts;
 pub mod draws;
 pub mod efficiency;
 pub mod motion;
+pub mod obstacles;
 pub mod parameters;
 pub mod policies;
 pub mod pose;
-mod sand;
+pub mod sand;
 pub mod sensing;
 pub mod starts;
 pub mod track;

@@ -247,6 +247,31 @@ fn prop_draws_are_named() {
     assert_ne!(first, a.normal(Purpose::Heading));
 }
 
+/// The map of obstacles blocks the cells of a rock above the limit, on a slope as on level ground, no others; steep sand and unknown ground
+/// wholly.
+#[test]
+fn val_obstacles_are_mapped() {
+    use super::obstacles::{ObstacleLimits, block_rows, blocked, map_geometry};
+    let limits = ObstacleLimits { height_m: 0.13, slope_max: 0.4 };
+    let map = map_geometry([-1.0, -1.0, 1.3, 1.0]);
+    assert_eq!((map.rows, map.cols, map.origin), (20, 25, [-1.0, -1.0]));
+    let of = |ground: &Made| -> Vec<bool> {
+        (0..block_rows(&map)).flat_map(|row| blocked(ground, &map, row, &limits)).collect()
+    };
+    for slopes in [[0.0, 0.0], [0.2, -0.3]] {
+        let ground = Made { slopes, ..Made::flat(&[([0.31, -0.42], 0.15, 0.2), ([-0.6, 0.6], 0.15, 0.1)]) };
+        for (k, blocked) in of(&ground).into_iter().enumerate() {
+            let [x, y] = [map.x(k % map.cols), map.y(k / map.cols)];
+            let away = ((x - 0.31) * (x - 0.31) + (y + 0.42) * (y + 0.42)).sqrt();
+            assert!(blocked || away > 0.10, "free at {x} {y}");
+            assert!(!blocked || away < 0.15 + 0.08, "blocked at {x} {y}");
+        }
+    }
+    let steep = Made { slopes: [0.5, 0.0], ..Made::flat(&[]) };
+    let unknown = Made { known_m: 0.5, ..Made::flat(&[]) };
+    assert!(of(&steep).into_iter().all(|blocked| blocked) && of(&unknown).into_iter().all(|blocked| blocked));
+}
+
 /// Slip shortens drives; a rover that reckons its place by its commands then stops short of the goal, lost.
 #[test]
 fn val_slip_goes_unnoticed_by_dead_reckoning() {

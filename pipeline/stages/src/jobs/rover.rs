@@ -2,7 +2,7 @@
 
 use crate::builder::{BuildError, Builder, HEIGHTS, Heightfield, common};
 use crate::job::{Estimate, ItemRef, Job, JobError, Outcome, Work};
-use crate::operations::rovers::{self, Grounds};
+use crate::operations::rovers::{self, Grounds, Oracle};
 use crate::revision::Room;
 use crate::runner::graph::Node;
 use crate::study::entry::joined;
@@ -156,7 +156,7 @@ struct Driven {
 
 impl RoverJob {
     /// Drives a rover from its start.
-    fn drive(&self, ground: &impl Ground, number: usize, start: &Start, noise: Counter) -> Driven {
+    fn drive(&self, ground: &impl Ground, number: usize, start: &Start, noise: Counter, oracle: Oracle) -> Driven {
         let trial = &self.trial;
         let task = trial.navigator.task(&trial.parameters);
         let mut policy = trial.navigator.policy();
@@ -189,8 +189,8 @@ impl RoverJob {
             efficiency: drive.efficiency(),
             efficiency_half_limit: drive.efficiency_at_half(task.distance_limit_m),
             distance_limit_m: task.distance_limit_m,
-            oracle_m: f64::NAN,
-            oracle: None,
+            oracle_m: oracle.length_m(),
+            oracle: oracle.name().to_owned(),
             time_s: drive.time_s,
             cycles: drive.cycles.into(),
             turns: drive.turns.into(),
@@ -245,7 +245,7 @@ impl Job for RoverJob {
     }
 
     fn rooms(&self) -> &'static [Room] {
-        &[Room::Mobility, Room::Terrain, Room::Roughness]
+        &[Room::Mobility, Room::Navigation, Room::Terrain, Room::Roughness]
     }
 
     fn memory_bytes(&self) -> u64 {
@@ -264,9 +264,10 @@ impl Job for RoverJob {
         let starts = parameters.starts(&self.streams);
         let noise = Counter::new(&mut self.streams.stream("noise"));
         let grounds = Grounds::new(&self.field, &work.parent(&self.field.item, HEIGHTS)?, parameters, &starts)?;
+        let oracles = rovers::oracles(&grounds, &self.trial.navigator.task(parameters), &starts)?;
         let one = |(k, start): (usize, &Start)| match &grounds {
-            Grounds::World(world) => self.drive(&world.view(), k, start, noise),
-            Grounds::Grid(grid) => self.drive(grid, k, start, noise),
+            Grounds::World(world) => self.drive(&world.view(), k, start, noise, oracles[k]),
+            Grounds::Grid(grid) => self.drive(grid, k, start, noise, oracles[k]),
         };
         let mut driven: Vec<Driven> = starts.par_iter().enumerate().map(one).collect();
         let mut outcome = Outcome { products: Vec::new(), notes: notes(&driven) };

@@ -3,8 +3,12 @@
 use crate::builder::Heightfield;
 use crate::job::JobError;
 use crate::operations::dem::input_error;
-use sastrugi_mobility::rover::trial::Task;
-use sastrugi_mobility::rover::{Drive, Ending, RoverParameters, Start};
+use rayon::prelude::*;
+use sastrugi_mobility::rover::obstacles;
+use sastrugi_mobility::rover::{Drive, Ending, RoverParameters, Start, Task};
+use sastrugi_navigation::map::Neighbourhood;
+use sastrugi_navigation::obstacles::block_cells;
+use sastrugi_navigation::{CostModel, Method, RouteError, RouteSettings, SlopeCost, SlopeLimits, TravelMap, line};
 use sastrugi_numeric::{Grid, GroundGrid, Streams};
 use sastrugi_schemas::ParameterError;
 use sastrugi_store::dem;
@@ -13,6 +17,10 @@ use std::path::Path;
 
 /// Tiles of a world that are kept: 400 squares of 5 m at samples of 2 cm, 0.24 GB.
 const TILES: usize = 400;
+/// How far the map of an oracle reaches beyond all starts and goals, m.
+const BEYOND_M: f64 = 10.0;
+/// Limit of slopes of a map whose steep cells are blocked, deg.
+const LEVEL_DEG: f64 = 45.0;
 /// Maps of a terrain beside its heights.
 const CLASS: &str = "class.tif";
 const ALBEDO: &str = "albedo.tif";
@@ -70,6 +78,66 @@ impl Grounds {
     pub fn memory_bytes(field: &Heightfield) -> u64 {
         if field.kind == planetary::KIND { TILES as u64 * GROUND_BYTES_PER_TILE } else { 40 * field.cells }
     }
+}
+
+/// The way of a rover that knows the whole map.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Oracle {
+    /// Its length, m.
+    Found(f64),
+    /// There is none, on the map around all starts and goals.
+    None,
+}
+
+impl Oracle {
+    /// Name in tables.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Found(_) => "found",
+            Self::None => "none",
+        }
+    }
+
+    /// Length; NaN where there is no way.
+    pub fn length_m(&self) -> f64 {
+        match self {
+            Self::Found(length_m) => *length_m,
+            Self::None => f64::NAN,
+        }
+    }
+}
+
+/// For each start the shortest way that keeps the wheels clear of rocks above the clearance and off steep sand: lines at any angle over a map of 0.1 m cells, which reaches beyond all starts and goals.
+///
+/// # Errors
+/// A map that cannot be planned on.
+pub fn oracles(grounds: &Grounds, task: &Task, starts: &[Start]) -> Result<Vec<Oracle>, JobError> {
+    let places = || starts.iter().flat_map(|s| [s.start_m, s.goal_m]);
+    let end = |axis: usize, sign: f64| places().map(|at| sign * at[axis]).fold(f64::NEG_INFINITY, f64::max) + BEYOND_M;
+    let geometry = obstacles::map_geometry([-end(0, -1.0), -end(1, -1.0), end(0, 1.0), end(1, 1.0)]);
+    let limits = task.obstacle_limits();
+    let row = |n: usize| match grounds {
+        Grounds::World(world) => obstacles::blocked(&world.view(), &geometry, n, &limits),
+        Grounds::Grid(grid) => obstacles::blocked(grid, &geometry, n, &limits),
+    };
+    let marked: Vec<bool> = (0..obstacles::block_rows(&geometry)).into_par_iter().flat_map_iter(row).collect();
+    let free = SlopeLimits::new(LEVEL_DEG, LEVEL_DEG).map_err(JobError::new)?;
+    let mut map = TravelMap::new(Grid::filled(geometry, 0.0), free).map_err(JobError::new)?;
+    block_cells(&mut map, &marked, task.obstacle_margin_m(geometry.mean_cell())).map_err(JobError::new)?;
+    let costs = CostModel::new(SlopeCost::Linear { up: 0.0, down: 0.0 }, None, &map).map_err(JobError::new)?;
+    let ground = line::Ground { map: &map, costs: &costs, clearance: None };
+    let settings =
+        RouteSettings { method: Method::ThetaStar, neighbourhood: Neighbourhood::Eight, ..Default::default() };
+    let one = |start: &Start| -> Result<Oracle, JobError> {
+        let cell = |[x, y]: [f64; 2]| geometry.cell_at(x, y).map(|(row, col)| [row, col]);
+        let (Some(from), Some(to)) = (cell(start.start_m), cell(start.goal_m)) else { return Ok(Oracle::None) };
+        match sastrugi_navigation::plan(&ground, &settings, from, to) {
+            Ok(route) => Ok(Oracle::Found(route.smoothed_score.length_m)),
+            Err(RouteError::NoPath { .. } | RouteError::Blocked { .. }) => Ok(Oracle::None),
+            Err(other) => Err(JobError::new(other)),
+        }
+    };
+    starts.par_iter().map(one).collect()
 }
 
 /// Any word: whether a world has samples at a distance does not depend on its draws.
