@@ -1,10 +1,10 @@
-//! Rocks that a rover met: those higher than its clearance that came under it.
+//! Rocks that a rover met: those higher than its clearance that came under it, above the plane of the sand around the rover.
 
 use super::pose::{Chassis, Pose};
 use super::sand::{PlaneSums, SandPlane};
 use sastrugi_numeric::{Ground, GroundClass, NoGround};
 
-/// Half side of the square whose sand a rock is measured from, m.
+/// Half side of the square whose sand makes a plane, m.
 const AROUND_M: f64 = 0.75;
 
 /// Counts of contacts.
@@ -32,9 +32,21 @@ impl Contacts {
     ) -> Result<(), NoGround> {
         let (a, t) = (chassis.axle_m, chassis.track_m);
         let mut now = [false; 2];
+        // The sand is asked for only where there is a rock.
+        let mut sand = None;
         for left in [-t, -0.5 * t, 0.0, 0.5 * t, t] {
             for ahead in [-a, -0.5 * a, 0.0, 0.5 * a, a] {
-                let met = stands_above(ground, pose.to_ground([ahead, left]), clearance_m)?;
+                let [x, y] = pose.to_ground([ahead, left]);
+                let point = ground.at(x, y)?;
+                if point.class != GroundClass::Rock {
+                    continue;
+                }
+                let plane = match sand {
+                    Some(plane) => plane,
+                    None => *sand.insert(sand_plane(ground, pose.position_m)?),
+                };
+                let offset = [x - pose.position_m[0], y - pose.position_m[1]];
+                let met = point.height_m - plane.height_m(offset) > clearance_m;
                 now[0] |= met;
                 now[1] |= met && left == 0.0;
             }
@@ -44,21 +56,6 @@ impl Contacts {
         self.now = now;
         Ok(())
     }
-}
-
-/// Whether a rock stands higher than the clearance above the sand around it.
-fn stands_above(ground: &impl Ground, at: [f64; 2], clearance_m: f64) -> Result<bool, NoGround> {
-    let [x, y] = at;
-    let here = ground.at(x, y)?;
-    if here.class != GroundClass::Rock {
-        return Ok(false);
-    }
-    Ok(here.height_m - sand_height_m(ground, at)? > clearance_m)
-}
-
-/// Height of the sand at a point, m.
-fn sand_height_m(ground: &impl Ground, at: [f64; 2]) -> Result<f64, NoGround> {
-    sand_plane(ground, at).map(|plane| plane.level_m)
 }
 
 /// The plane of the sand around a point, from there; level at the lowest height where there is too little sand.
