@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-const ROOMS: [(&str, &str); 13] = [
+const ROOMS: [(&str, &str); 14] = [
     ("SCHEMAS", "../../schemas/src"),
     ("NUMERIC", "../numeric/src"),
     ("ROUGHNESS", "../roughness/src"),
@@ -11,6 +11,7 @@ const ROOMS: [(&str, &str); 13] = [
     ("TEXTURE", "../texture/src"),
     ("MOBILITY", "../mobility/src"),
     ("NAVIGATION", "../navigation/src"),
+    ("IMAGING", "../imaging/src"),
     ("STORE", "../store/src"),
     ("STATISTICS", "../../analysis/statistics/src"),
     ("JOB", "src/job.rs"),

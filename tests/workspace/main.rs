@@ -7,7 +7,7 @@ use std::process::Command;
 
 /// `docs/ARCHITECTURE.md`, "Who may import whom", as data.
 fn allowed() -> BTreeMap<&'static str, BTreeSet<&'static str>> {
-    let stages = "schemas numeric roughness statistics terrain texture mobility navigation store report";
+    let stages = "schemas numeric roughness statistics terrain texture mobility navigation imaging store report";
     let table = [
         ("schemas", ""),
         ("numeric", ""),
@@ -17,15 +17,16 @@ fn allowed() -> BTreeMap<&'static str, BTreeSet<&'static str>> {
         ("texture", "numeric schemas roughness statistics"),
         ("mobility", "numeric schemas roughness statistics"),
         ("navigation", "numeric schemas roughness statistics"),
+        ("imaging", "numeric schemas"),
         ("store", "numeric schemas"),
-        ("report", "statistics store numeric schemas"),
+        ("report", "statistics store imaging numeric schemas"),
         ("stages", stages),
         ("cli", "stages report store schemas"),
         ("fixtures", "numeric"),
         ("tests", "schemas numeric statistics terrain mobility store fixtures"),
         (
             "benches",
-            "schemas numeric roughness statistics terrain texture mobility navigation store stages report fixtures",
+            "schemas numeric roughness statistics terrain texture mobility navigation imaging store stages report fixtures",
         ),
     ];
     table.into_iter().map(|(room, uses)| (room, uses.split_whitespace().collect())).collect()

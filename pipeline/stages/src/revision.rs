@@ -14,6 +14,8 @@ pub enum Room {
     Mobility,
     /// `pipeline/navigation`.
     Navigation,
+    /// `pipeline/imaging`.
+    Imaging,
     /// `analysis/statistics`.
     Statistics,
 }
@@ -36,6 +38,7 @@ fn revision_of(room: Room) -> &'static str {
         Room::Texture => env!("SASTRUGI_REVISION_TEXTURE"),
         Room::Mobility => env!("SASTRUGI_REVISION_MOBILITY"),
         Room::Navigation => env!("SASTRUGI_REVISION_NAVIGATION"),
+        Room::Imaging => env!("SASTRUGI_REVISION_IMAGING"),
         Room::Statistics => env!("SASTRUGI_REVISION_STATISTICS"),
     }
 }

@@ -1,0 +1,17 @@
+//! Images of surfaces, and surfaces from images: arrays in, arrays out.
+//!
+//! * [`photometry`] tells how bright a facet is under a light and a view, [`direction`] where these are, [`camera`] which pixel a
+//!   point of the ground falls on.
+//!
+//! # Conventions
+//! Vectors are `[east, north, up]`. Slopes are `p = dz/dx` (east) and `q = dz/dy` (north), and the unit normal of a facet is
+//! `n = (-p, -q, 1) / sqrt(1 + p^2 + q^2)`. Pixel `(row, col)` of an image is centred on `(col + 1/2, row + 1/2)`, row 0 at the top.
+//! Brightness is that of a surface over that of a white Lambert surface which faces the light (radiance factor, I/F).
+
+pub mod camera;
+pub mod direction;
+pub mod photometry;
+
+pub use camera::{Camera, ParallelCamera, PinholeCamera, Ray};
+pub use direction::direction;
+pub use photometry::Photometry;
