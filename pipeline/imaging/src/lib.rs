@@ -3,6 +3,7 @@
 //! * [`photometry`] tells how bright a facet is under a light and a view, [`direction`] where these are, [`camera`] which pixel a
 //!   point of the ground falls on.
 //! * [`sun`] and [`pose`] are the light and the camera as a study says them, [`description`] is the file beside an image.
+//! * [`render`] makes images.
 //!
 //! # Conventions
 //! Vectors are `[east, north, up]`. Slopes are `p = dz/dx` (east) and `q = dz/dy` (north), and the unit normal of a facet is
@@ -14,6 +15,7 @@ pub mod description;
 pub mod direction;
 pub mod photometry;
 pub mod pose;
+pub mod render;
 pub mod sun;
 
 pub use camera::{Camera, ParallelCamera, PinholeCamera, Ray};
@@ -21,4 +23,5 @@ pub use description::{ImageDescription, Noise, Rendered};
 pub use direction::direction;
 pub use photometry::Photometry;
 pub use pose::{CameraParameters, CameraPose};
+pub use render::{RenderError, RenderParameters, Rendering, Scene, render};
 pub use sun::Sun;
