@@ -3,7 +3,7 @@
 //! * [`photometry`] tells how bright a facet is under a light and a view, [`direction`] where these are, [`camera`] which pixel a
 //!   point of the ground falls on.
 //! * [`sun`] and [`pose`] are the light and the camera as a study says them, [`description`] is the file beside an image.
-//! * [`render`] makes images; [`hillshade`] shades relief as maps do.
+//! * [`render`] makes images; [`hillshade`] shades relief as maps do, [`display`] turns an image into levels of grey.
 //!
 //! # Conventions
 //! Vectors are `[east, north, up]`. Slopes are `p = dz/dx` (east) and `q = dz/dy` (north), and the unit normal of a facet is
@@ -13,6 +13,7 @@
 pub mod camera;
 pub mod description;
 pub mod direction;
+pub mod display;
 pub mod hillshade;
 pub mod photometry;
 pub mod pose;
