@@ -122,7 +122,7 @@ fn morris_function(x: &[f64]) -> f64 {
         y += w[i] * if i < 10 { 20.0 } else { sign(i + 1) };
         for j in i + 1..20 {
             y += w[i] * w[j] * if j < 6 { -15.0 } else { sign(i + j) };
-            for l in (j + 1..5).filter(|_| j < 5) {
+            for l in j + 1..5 {
                 y += -10.0 * w[i] * w[j] * w[l];
                 (l + 1..4).for_each(|s| y += 5.0 * w[i] * w[j] * w[l] * w[s]);
             }
