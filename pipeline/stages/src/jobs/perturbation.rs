@@ -19,8 +19,15 @@ const ROVERS: u32 = 10;
 /// Key of a trial whose numbers may be perturbed too.
 const NOISE: &str = "noise";
 /// Units by the end of a name.
-const UNITS: [(&str, &str); 7] =
-    [("_m_s", "m/s"), ("_deg_s", "deg/s"), ("_rad_s", "rad/s"), ("_deg", "deg"), ("_rad", "rad"), ("_s", "s"), ("_m", "m")];
+const UNITS: [(&str, &str); 7] = [
+    ("_m_s", "m/s"),
+    ("_deg_s", "deg/s"),
+    ("_rad_s", "rad/s"),
+    ("_deg", "deg"),
+    ("_rad", "rad"),
+    ("_s", "s"),
+    ("_m", "m"),
+];
 
 /// A number that is perturbed.
 #[derive(Clone, Debug, PartialEq)]
@@ -162,8 +169,7 @@ fn collect(name: &str, value: &Value, found: &mut BTreeMap<String, Value>) {
 
 /// A number with its levels, or why it does not move.
 fn moved(name: &str, value: &Value, settings: &Perturb) -> Result<Perturbed, String> {
-    let of_level =
-        |level: u32| 1.0 + settings.share * (2.0 * f64::from(level) / f64::from(settings.levels - 1) - 1.0);
+    let of_level = |level: u32| 1.0 + settings.share * (2.0 * f64::from(level) / f64::from(settings.levels - 1) - 1.0);
     let wanted: Vec<f64> = (0..settings.levels).map(of_level).collect();
     let base = value.as_f64().unwrap_or(f64::NAN);
     let is_zero = value.as_array().map_or(base == 0.0, |list| list.iter().all(|v| v.as_f64() == Some(0.0)));

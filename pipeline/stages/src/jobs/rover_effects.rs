@@ -157,7 +157,8 @@ impl EffectsJob {
             let worlds = sources.iter().map(|s| &s.terrain).collect::<BTreeSet<_>>().len();
             let of = if variant.is_empty() { group.clone() } else { format!("{group} with {variant}") };
             if worlds < 2 {
-                notes.push(format!("effects in {of} have no intervals: they need two worlds or more, and there is one"));
+                notes
+                    .push(format!("effects in {of} have no intervals: they need two worlds or more, and there is one"));
             }
         }
         if perturbation.ways.len() < 2 {
