@@ -5,6 +5,7 @@
 mod image;
 mod machine;
 mod route;
+mod perturb;
 mod rover;
 mod team;
 mod traverse;

@@ -5,7 +5,7 @@
 //! [`permutation`] (do two groups differ?), [`trend`] (do ordered groups rise or fall?), [`effect`] (by how much?),
 //! [`difference`] (all of these at once), [`equivalence`] (by less than a margin?), [`conformal`] (is one more drive like these?),
 //! [`mixed_logistic`] (success, with an intercept of the terrain), [`power`] (how many terrains would be needed?), [`multiple`] (several
-//! tests at once).
+//! tests at once). [`morris`] ranks the parameters of a model by their elementary effects.
 //!
 //! Values that are not finite are not data: callers drop them first (`sastrugi_numeric::sums::finite`). Nothing here
 //! draws a random number except from the stream it is given, and the bits do not depend on the CPU.
@@ -20,6 +20,7 @@ pub mod effect;
 pub mod equivalence;
 pub mod incidence;
 pub mod mixed_logistic;
+pub mod morris;
 pub mod multiple;
 pub mod normal;
 pub mod permutation;

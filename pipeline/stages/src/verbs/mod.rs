@@ -13,6 +13,7 @@ mod reading;
 pub mod releases;
 pub mod render;
 pub mod roughness;
+pub mod rover;
 pub mod terrain;
 pub mod texture;
 pub mod traverse;
