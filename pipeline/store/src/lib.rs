@@ -1,4 +1,4 @@
-//! Files: DEM formats, point clouds, masks, transects, GeoJSON, atomic writes, Parquet tables, MCAP recordings, and the release folder with its
+//! Files: DEM formats, point clouds, masks, transects, altimetry, GeoJSON, atomic writes, Parquet tables, MCAP recordings, and the release folder with its
 //! checksums.
 //!
 //! The only room that names `arrow`, `parquet`, `mcap`, `foxglove`, `prost`, `geotiff-*`, `tiff`, `png`, `las` and `tar`. Nothing
@@ -9,6 +9,7 @@
 //! * A file appears under its name only when it is complete and on disk ([`atomic`]).
 //! * Errors tell data that cannot be used (`unusable_input()`) from a file system that failed.
 
+pub mod altimetry;
 pub mod atomic;
 pub mod csv;
 pub mod dem;

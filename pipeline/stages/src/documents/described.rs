@@ -9,9 +9,10 @@ use sastrugi_terrain::{MAPS, MapKind};
 use serde_json::Value;
 
 /// Folders of a release.
-pub const FOLDERS: [(&str, &str); 11] = [
+pub const FOLDERS: [(&str, &str); 12] = [
     ("dem/", "measured inputs, and the same in metres (`.metric.tif`)"),
     ("mask/", "masks of the fits, obstacles of the routes"),
+    ("input/", "rasters and measured points that terrains are made with"),
     ("terrain/", "generated heightfields, GeoTIFF, float32 metres, no data -9999; maps of the same cells beside them"),
     ("export/", "terrains to import into simulators: `export/<terrain>/<simulator>/README.md` says how"),
     ("texture/", "synthesised textures, GeoTIFF, float32 metres, no data -9999"),
