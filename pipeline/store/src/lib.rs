@@ -1,5 +1,5 @@
-//! Files: DEM formats, point clouds, masks, transects, GeoJSON, pictures, atomic writes, Parquet tables, MCAP recordings, and the release folder with its
-//! checksums.
+//! Files: DEM formats, point clouds, masks, transects, altimetry, GeoJSON, pictures, atomic writes, Parquet tables, MCAP recordings, and the release folder
+//! with its checksums.
 //!
 //! The only room that names `arrow`, `parquet`, `mcap`, `foxglove`, `prost`, `geotiff-*`, `tiff`, `png`, `las` and `tar`. Nothing
 //! here computes: heights, rows and recordings come in and go out as they are. Only point clouds are gridded
@@ -9,6 +9,7 @@
 //! * A file appears under its name only when it is complete and on disk ([`atomic`]).
 //! * Errors tell data that cannot be used (`unusable_input()`) from a file system that failed.
 
+pub mod altimetry;
 pub mod atomic;
 pub mod csv;
 pub mod dem;

@@ -213,7 +213,7 @@ fn spacing(values: &[f64]) -> f64 {
     (values[values.len() - 1] - values[0]) / (values.len() - 1) as f64
 }
 
-fn fields(line: &str) -> Vec<&str> {
+pub(crate) fn fields(line: &str) -> Vec<&str> {
     match [';', ',', '\t'].into_iter().find(|mark| line.contains(*mark)) {
         Some(mark) => line.split(mark).map(str::trim).collect(),
         None => line.split_whitespace().collect(),

@@ -29,23 +29,23 @@ pub trait Generator: Send + Sync {
     /// Sentences that a reader of the result should know, such as a size that was rounded down.
     fn notes(&self) -> Vec<String>;
 
-    /// The surfaces that it takes as input, as its parameters name them.
-    fn inputs(&self) -> Vec<InputSurface> {
+    /// What it takes as input, as its parameters name it.
+    fn inputs(&self) -> Vec<NamedInput> {
         Vec::new()
     }
 
-    /// The heightfield, with what belongs to it. `inputs` are the surfaces of [`Self::inputs`], in that order.
+    /// The heightfield, with what belongs to it. `inputs` are those of [`Self::inputs`], in that order.
     ///
     /// # Errors
     /// A [`TerrainError`] where the parameters are possible one by one but give no usable surface together.
-    fn generate(&self, streams: &Streams, inputs: &[Grid]) -> Result<Terrain, TerrainError>;
+    fn generate(&self, streams: &Streams, inputs: &[Input]) -> Result<Terrain, TerrainError>;
 
     /// As [`Self::generate`], and the heights are finite and not the same everywhere, whatever the parameters: in single precision, in
     /// which files hold them.
     ///
     /// # Errors
     /// As [`Self::generate`]; heights beyond all numbers, or without relief.
-    fn generate_checked(&self, streams: &Streams, inputs: &[Grid]) -> Result<Terrain, TerrainError> {
+    fn generate_checked(&self, streams: &Streams, inputs: &[Input]) -> Result<Terrain, TerrainError> {
         let made = self.generate(streams, inputs)?;
         let part = "the heights";
         if let Some(&value) = made.heights.values.iter().find(|z| !(**z as f32).is_finite()) {
@@ -63,13 +63,63 @@ pub trait Generator: Send + Sync {
     }
 }
 
-/// A surface that a generator takes as input.
+/// What a generator takes as input, by name.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct InputSurface {
+pub struct NamedInput {
     /// Dotted path of the parameter that names it.
     pub key: String,
     /// Its name: an id in a study, a file on the command line.
     pub name: String,
+    /// What it holds.
+    pub holds: Holds,
+}
+
+impl NamedInput {
+    /// Heights that the parameter `key` names.
+    pub fn heights(key: &str, name: &str) -> Self {
+        Self { key: key.to_owned(), name: name.to_owned(), holds: Holds::Heights }
+    }
+
+    /// A raster of other values.
+    pub fn values(key: &str, name: &str) -> Self {
+        Self { holds: Holds::Values, ..Self::heights(key, name) }
+    }
+
+    /// Measured points.
+    pub fn points(key: &str, name: &str) -> Self {
+        Self { holds: Holds::Points, ..Self::heights(key, name) }
+    }
+
+    /// An error about it.
+    pub(crate) fn error(&self, reason: impl Into<String>) -> TerrainError {
+        TerrainError::Input { surface: self.name.clone(), reason: reason.into() }
+    }
+}
+
+/// What an input holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Holds {
+    /// Heights of a surface; in a study those of an item.
+    Heights,
+    /// A raster of other values; in a study also a map of an item, or a file.
+    Values,
+    /// Measured points, in a file.
+    Points,
+}
+
+/// An input.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Input {
+    /// Heights or other values.
+    Grid(Grid),
+    /// Points `[x, y, z, sigma]`, m; sigma is 0 for a point that counts as exact.
+    Points(Vec<[f64; 4]>),
+}
+
+impl From<Grid> for Input {
+    fn from(grid: Grid) -> Self {
+        Self::Grid(grid)
+    }
 }
 
 /// What a map shows.

@@ -16,5 +16,5 @@ pub mod size;
 pub mod spheroids;
 pub mod weierstrass_mandelbrot;
 
-pub use generator::{Generator, InputSurface, Levels, Line, MAPS, Map, MapKind, Terrain, TerrainError};
+pub use generator::{Generator, Holds, Input, Levels, Line, MAPS, Map, MapKind, NamedInput, Terrain, TerrainError};
 pub use registry::{kinds, prepare};

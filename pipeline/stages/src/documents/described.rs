@@ -12,6 +12,7 @@ use serde_json::Value;
 pub const FOLDERS: [(&str, &str); 12] = [
     ("dem/", "measured inputs, and the same in metres (`.metric.tif`)"),
     ("mask/", "masks of the fits, obstacles of the routes"),
+    ("input/", "rasters and measured points that terrains are made with"),
     ("terrain/", "generated heightfields, GeoTIFF, float32 metres, no data -9999; maps of the same cells beside them"),
     ("export/", "terrains to import into simulators: `export/<terrain>/<simulator>/README.md` says how"),
     ("texture/", "synthesised textures, GeoTIFF, float32 metres, no data -9999"),

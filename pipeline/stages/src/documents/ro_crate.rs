@@ -206,7 +206,7 @@ fn entity(artifact: &Artifact) -> String {
     let path = &artifact.path;
     let words: Vec<&str> = path.split('/').collect();
     match words[..] {
-        ["dem" | "mask", ..] => path.clone(),
+        ["dem" | "mask" | "input", ..] => path.clone(),
         ["tables", table, ..] => format!("tables/{table}/"),
         [folder, _, ..] => format!("{folder}/"),
         _ => path.clone(),

@@ -4,6 +4,7 @@ pub mod dem;
 pub mod exports;
 pub mod fit;
 pub mod image;
+pub mod inputs;
 pub mod mask;
 pub mod matched;
 pub mod missions;

@@ -1,7 +1,7 @@
 //! Stage `original`: the bytes of a measured file, taken into the release as they are.
 //!
 //! An item of its own, so that a release whose import failed still holds what it was made from. Masks are copied in the same
-//! way (stage [`MASK_STAGE`]).
+//! way (stage [`MASK_STAGE`]), and rasters and points that generators take (stage [`INPUT_STAGE`]).
 
 use crate::builder::{BuildError, input_file};
 use crate::job::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work};
@@ -15,10 +15,12 @@ use std::path::{Path, PathBuf};
 pub const STAGE: &str = "original";
 /// Name of the stage of masks.
 pub const MASK_STAGE: &str = "mask";
+/// Name of the stage of the files that generators take as input.
+pub const INPUT_STAGE: &str = "input";
 
 /// True for stages that only take files into the release.
 pub fn only_copies(stage: &str) -> bool {
-    [STAGE, MASK_STAGE].contains(&stage)
+    [STAGE, MASK_STAGE, INPUT_STAGE].contains(&stage)
 }
 
 /// A measured file with what lies beside it.

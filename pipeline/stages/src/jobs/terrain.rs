@@ -1,20 +1,20 @@
 //! Stage `terrain`: one generated heightfield.
 
 use super::exports::Exports;
+use super::inputs::{Copies, Sources};
 use super::rasters::{raster_options, raster_packing};
 use crate::builder::{BuildError, Builder, HEIGHTS, Heightfield, common};
 use crate::job::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work};
-use crate::operations::dem::input_error;
 use crate::operations::terrains::{generate, values_of, write_png16};
 use crate::revision::Room;
 use crate::runner::graph::Node;
+use crate::study::Entry;
 use crate::study::entry::Expanded;
-use crate::study::{Entry, StudyError};
 use sastrugi_numeric::{Grid, Streams};
 use sastrugi_schemas::study::{GeoTiff, TerrainItem};
 use sastrugi_store::dem::{self, Crs, WriteOptions};
 use sastrugi_store::{digest, geojson};
-use sastrugi_terrain::{Generator, Line};
+use sastrugi_terrain::{Generator, Line, planetary};
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -28,10 +28,8 @@ const TRAILS: &str = "trails.geojson";
 struct TerrainJob {
     id: String,
     generator: Box<dyn Generator>,
-    /// Items of the input surfaces of the generator.
-    inputs: Vec<ItemRef>,
-    /// Cells of those.
-    input_cells: u64,
+    /// What the generator takes as input.
+    inputs: Sources,
     streams: Streams,
     png16: bool,
     exports: Exports,
@@ -51,10 +49,11 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
         }
         let expanded = entry.expand(&item.id, item.count, &item.sweep, &params)?;
         name_families(builder, &entry, &item.id, &expanded)?;
+        let mut copies = Copies::new();
         for one in expanded {
             builder.claim(&entry, STAGE, &one.id)?;
             let generator = sastrugi_terrain::prepare(&item.kind, &one.params).map_err(|e| entry.refuse(e))?;
-            let (inputs, input_cells) = inputs(builder, &entry, generator.as_ref())?;
+            let inputs = Sources::find(builder, (&entry, &item), generator.as_ref(), &mut copies)?;
             let shared = builder.is_paired().then(|| common(one.replicate));
             let streams = builder.streams(STAGE, shared.as_ref().unwrap_or(&one.id), item.seed, one.replicate);
             let field = Heightfield {
@@ -72,9 +71,9 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
             };
             let geotiff = builder.study.head.geotiff;
             let exports = Exports::new(&item.exports, &generator.geometry()).map_err(|e| entry.error("exports", e))?;
-            let parents = inputs.clone().into_iter().collect::<BTreeSet<_>>().into_iter().collect();
+            let parents = inputs.0.iter().map(|s| s.item.clone()).collect::<BTreeSet<_>>().into_iter().collect();
             let id = one.id.clone();
-            let job = TerrainJob { id, generator, inputs, input_cells, streams, png16: item.png16, exports, geotiff };
+            let job = TerrainJob { id, generator, inputs, streams, png16: item.png16, exports, geotiff };
             let node = Node {
                 item: field.item.clone(),
                 parents,
@@ -87,22 +86,6 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
         }
     }
     Ok(())
-}
-
-/// The items of the input surfaces of a generator, and how many cells they have together.
-fn inputs(
-    builder: &Builder<'_>,
-    entry: &Entry<'_>,
-    generator: &dyn Generator,
-) -> Result<(Vec<ItemRef>, u64), StudyError> {
-    let mut items = Vec::new();
-    let mut cells = 0;
-    for input in generator.inputs() {
-        let field = builder.surface(entry, &input.key, &input.name)?;
-        cells += field.cells;
-        items.push(field.item.clone());
-    }
-    Ok((items, cells))
 }
 
 /// An item's id stands for all that it expands to, and the id of each of its swept parts for the replicates.
@@ -151,7 +134,7 @@ impl Job for TerrainJob {
 
     fn memory_bytes(&self) -> u64 {
         let exports = self.exports.memory_bytes(self.generator.geometry().len() as u64);
-        self.generator.memory_bytes() + 8 * self.input_cells + exports
+        self.generator.memory_bytes() + 8 * self.inputs.cells() + exports
     }
 
     fn estimate(&self) -> Estimate {
@@ -160,7 +143,7 @@ impl Job for TerrainJob {
     }
 
     fn run(&self, work: &Work<'_>) -> Result<Outcome, JobError> {
-        let (inputs, crs) = self.read_inputs(work)?;
+        let (inputs, crs) = self.inputs.read(work)?;
         let made = generate(self.generator.as_ref(), &self.streams, &inputs)?;
         let options = raster_options(self.geotiff);
         let mut products = vec![self.write(work, HEIGHTS, "", &made.heights, &crs, &options)?];
@@ -170,6 +153,10 @@ impl Job for TerrainJob {
             products.push(self.write(work, &file, &ending, &map.values, &crs, &options)?);
         }
         products.extend(self.write_lines(work, &made.lines, &crs)?);
+        if self.generator.kind() == planetary::KIND {
+            // Rovers drive on the world beyond the window, which is made with the same inputs.
+            products.extend(self.inputs.keep(work)?);
+        }
         let mut notes = self.generator.notes();
         notes.extend(made.notes);
         if self.png16 {
@@ -184,18 +171,6 @@ impl Job for TerrainJob {
 }
 
 impl TerrainJob {
-    /// The input surfaces of the generator, and the coordinate system of the first.
-    fn read_inputs(&self, work: &Work<'_>) -> Result<(Vec<Grid>, Crs), JobError> {
-        let mut grids = Vec::new();
-        let mut crs = None;
-        for input in &self.inputs {
-            let read = dem::read(&work.parent(input, HEIGHTS)?).map_err(input_error)?;
-            crs.get_or_insert(read.info.crs);
-            grids.push(read.grid);
-        }
-        Ok((grids, crs.unwrap_or_default()))
-    }
-
     /// Writes the trails, for missions along them and as GeoJSON; nothing where there are none.
     fn write_lines(&self, work: &Work<'_>, lines: &[Line], crs: &Crs) -> Result<Vec<Product>, JobError> {
         if lines.is_empty() {

@@ -5,6 +5,7 @@ pub mod dem;
 pub mod drawn;
 pub mod fits;
 pub mod images;
+pub mod inputs;
 pub mod masks;
 pub mod place;
 pub mod roughness;

@@ -3,13 +3,14 @@
 use crate::builder::Heightfield;
 use crate::job::JobError;
 use crate::operations::dem::input_error;
+use crate::operations::inputs::read_kept;
 use rayon::prelude::*;
 use sastrugi_mobility::rover::obstacles;
 use sastrugi_mobility::rover::{Drive, Ending, RoverParameters, Start, Task};
 use sastrugi_navigation::map::Neighbourhood;
 use sastrugi_navigation::obstacles::block_cells;
 use sastrugi_navigation::{CostModel, Method, RouteError, RouteSettings, SlopeCost, SlopeLimits, TravelMap, line};
-use sastrugi_numeric::{Grid, GroundGrid, Streams};
+use sastrugi_numeric::{Grid, GroundGrid};
 use sastrugi_schemas::ParameterError;
 use sastrugi_store::dem;
 use sastrugi_terrain::planetary::{self, Clearing, GROUND_BYTES_PER_TILE, Planetary, RawPlanetary, WorldGround};
@@ -40,7 +41,7 @@ impl Grounds {
     /// A distance of samples that the world does not have.
     pub fn check(field: &Heightfield, parameters: &RoverParameters) -> Result<(), ParameterError> {
         match planetary(field)? {
-            Some(world) => world.ground(&Streams::for_seed(0, STREAM), parameters.cell_m, &[], 1).map(|_| ()),
+            Some(world) => world.check_samples(parameters.cell_m),
             None => Ok(()),
         }
     }
@@ -61,6 +62,7 @@ impl Grounds {
             let mut clearings: Vec<Clearing> = places.map(clearing).collect();
             // Rovers of a circle have one goal.
             clearings.dedup();
+            let world = world.with_inputs(&read_kept(heights, &world)?).map_err(JobError::new)?;
             let ground = world.ground(streams, parameters.cell_m, &clearings, TILES).map_err(JobError::new)?;
             return Ok(Self::World(Box::new(ground)));
         }
@@ -139,9 +141,6 @@ pub fn oracles(grounds: &Grounds, task: &Task, starts: &[Start]) -> Result<Vec<O
     };
     starts.par_iter().map(one).collect()
 }
-
-/// Any word: whether a world has samples at a distance does not depend on its draws.
-const STREAM: &str = "terrain";
 
 /// The world of a planetary terrain.
 fn planetary(field: &Heightfield) -> Result<Option<Planetary>, ParameterError> {

@@ -4,7 +4,7 @@ use crate::job::JobError;
 use sastrugi_numeric::{Grid, Streams};
 use sastrugi_store::atomic::Target;
 use sastrugi_store::dem::{self, Values};
-use sastrugi_terrain::{Generator, Map, MapKind, Terrain, TerrainError};
+use sastrugi_terrain::{Generator, Input, Map, MapKind, Terrain, TerrainError};
 
 /// How a map is written.
 pub fn values_of(map: &Map) -> Values {
@@ -18,7 +18,7 @@ pub fn values_of(map: &Map) -> Values {
 ///
 /// # Errors
 /// When the generator has no result, or heights that are not finite or the same everywhere.
-pub fn generate(generator: &dyn Generator, streams: &Streams, inputs: &[Grid]) -> Result<Terrain, JobError> {
+pub fn generate(generator: &dyn Generator, streams: &Streams, inputs: &[Input]) -> Result<Terrain, JobError> {
     generator.generate_checked(streams, inputs).map_err(|e| {
         let message = format!("failed to {e}");
         // The input surface is not usable: another part of it, or another file, would.

@@ -138,8 +138,7 @@ impl<'a> Entry<'a> {
 
     /// An error about a key of this table (dotted path), or about the table where the key is not written.
     pub fn error(&self, key: &str, message: impl Into<String>) -> StudyError {
-        let mut path = self.path();
-        path.extend(segments(key).map(str::to_owned));
+        let path = self.path_of_dotted(key);
         let id = self
             .table
             .get("id")
@@ -156,6 +155,11 @@ impl<'a> Entry<'a> {
     /// Path of one of this table's keys in the study.
     pub fn path_of(&self, key: &str) -> Vec<String> {
         self.path().into_iter().chain([key.to_owned()]).collect()
+    }
+
+    /// The same of a dotted key.
+    pub fn path_of_dotted(&self, key: &str) -> Vec<String> {
+        self.path().into_iter().chain(segments(key).map(str::to_owned)).collect()
     }
 
     fn path(&self) -> Vec<String> {

@@ -3,10 +3,11 @@
 use super::parameters;
 use crate::error::Error;
 use crate::jobs::terrain::STAGE;
+use crate::operations::inputs::{self, Loaded};
 use crate::operations::terrains::{generate, values_of, write_png16};
-use sastrugi_numeric::{Grid, Streams};
+use sastrugi_numeric::Streams;
 use sastrugi_store::dem::{self, Crs, Format, WriteOptions};
-use sastrugi_terrain::{Generator, Terrain};
+use sastrugi_terrain::{Generator, Holds, Input, Terrain};
 use serde_json::{Map, Value, json};
 use std::path::Path;
 
@@ -101,17 +102,29 @@ impl Prepared {
     }
 }
 
-/// The files of a generator's input surfaces, in metres, and the coordinate system of the first.
-fn read_inputs(generator: &dyn Generator) -> Result<(Vec<Grid>, Crs), Error> {
-    let mut grids = Vec::new();
+/// The files of a generator's inputs, surfaces in metres, and the coordinate system of the first.
+fn read_inputs(generator: &dyn Generator) -> Result<(Vec<Input>, Crs), Error> {
+    let mut read_inputs = Vec::new();
     let mut crs = None;
-    for input in generator.inputs() {
-        let read = super::read(Path::new(&input.name), &super::Reading::default())?.dem;
-        crs.get_or_insert(read.info.crs);
-        // As an item of a study reads it.
-        grids.push(read.grid.as_stored());
+    for named in generator.inputs() {
+        let path = Path::new(&named.name);
+        let read = match named.holds {
+            Holds::Heights => heights(path)?,
+            Holds::Values | Holds::Points => inputs::read(&named, path)?,
+        };
+        if let Some(own) = read.crs {
+            inputs::check_systems(&named, crs.as_ref(), &own)?;
+            crs.get_or_insert(own);
+        }
+        read_inputs.push(read.input);
     }
-    Ok((grids, crs.unwrap_or_default()))
+    Ok((read_inputs, crs.unwrap_or_default()))
+}
+
+/// Heights as an item of a study reads them.
+fn heights(path: &Path) -> Result<Loaded, Error> {
+    let read = super::read(path, &super::Reading::default())?.dem;
+    Ok(Loaded { input: read.grid.as_stored().into(), crs: Some(read.info.crs) })
 }
 
 /// Kind, parameters and seed of a specification.

@@ -33,7 +33,7 @@ mod tests;
 
 pub use params::{Cascade, RawCascade};
 
-use crate::generator::{Generator, Map, Terrain, TerrainError};
+use crate::generator::{Generator, Input, Map, Terrain, TerrainError};
 use sastrugi_numeric::fft::RealFft2;
 use sastrugi_numeric::{Geometry, Grid, Streams, ops, sums};
 use sastrugi_roughness::multifractality::scaling_exponents;
@@ -164,7 +164,7 @@ impl Generator for Cascade {
         self.size.note().into_iter().collect()
     }
 
-    fn generate(&self, streams: &Streams, _bases: &[Grid]) -> Result<Terrain, TerrainError> {
+    fn generate(&self, streams: &Streams, _inputs: &[Input]) -> Result<Terrain, TerrainError> {
         let transform = RealFft2::new(self.shape[0], self.shape[1]);
         let flux = self.flux(&transform, streams);
         let level = ops::without_mean(&self.cut(&self.integrated(&transform, &flux)));

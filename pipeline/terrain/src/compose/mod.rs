@@ -37,7 +37,7 @@ pub mod trail;
 
 pub use params::{Compose, Operation, RawCompose, RawProcess, RawRegion};
 
-use crate::generator::{Generator, InputSurface, Line, MAPS, Map, Terrain, TerrainError};
+use crate::generator::{Generator, Input, Line, MAPS, Map, NamedInput, Terrain, TerrainError};
 use params::{Operand, Part, Process, Region, Step};
 use sastrugi_numeric::{Geometry, Grid, Streams, Surface, ops, sums};
 use serde_json::Value;
@@ -49,11 +49,11 @@ pub const KIND: &str = "compose";
 const SECONDS_PER_JOIN: f64 = 2e-8;
 
 impl Operand {
-    fn inputs(&self) -> Vec<InputSurface> {
+    fn inputs(&self) -> Vec<NamedInput> {
         match self {
             Self::Surface(base) => vec![base.clone()],
             Self::Generator { generator, key } => {
-                let within = |b: InputSurface| InputSurface { key: format!("{key}.{}", b.key), ..b };
+                let within = |b: NamedInput| NamedInput { key: format!("{key}.{}", b.key), ..b };
                 generator.inputs().into_iter().map(within).collect()
             }
         }
@@ -74,26 +74,24 @@ impl Operand {
     }
 
     /// The values on the cells of `geometry`; takes its inputs off the front of `inputs`.
-    fn values(&self, geometry: &Geometry, streams: &Streams, inputs: &mut &[Grid]) -> Result<Terrain, TerrainError> {
+    fn values(&self, geometry: &Geometry, streams: &Streams, inputs: &mut &[Input]) -> Result<Terrain, TerrainError> {
         let (own, rest) = inputs.split_at(self.inputs().len().min(inputs.len()));
         *inputs = rest;
         match (self, own) {
             (Self::Generator { generator, .. }, own) => generator.generate(streams, own),
-            (Self::Surface(base), [surface]) => sampled(base, surface, geometry).map(Terrain::from),
-            (Self::Surface(base), _) => {
-                Err(TerrainError::Input { surface: base.name.clone(), reason: "is not there".to_owned() })
-            }
+            (Self::Surface(base), [Input::Grid(surface)]) => sampled(base, surface, geometry).map(Terrain::from),
+            (Self::Surface(base), _) => Err(base.error("is not there")),
         }
     }
 }
 
 /// A surface at the centres of other cells.
-fn sampled(base: &InputSurface, surface: &Grid, geometry: &Geometry) -> Result<Grid, TerrainError> {
+fn sampled(base: &NamedInput, surface: &Grid, geometry: &Geometry) -> Result<Grid, TerrainError> {
     let at = |k: usize| {
         let (x, y) = (geometry.x(k % geometry.cols), geometry.y(k / geometry.cols));
         surface.height(x, y).ok_or_else(|| {
             let reason = format!("has no height at x = {x} m, y = {y} m; it must reach all centres of the cells");
-            TerrainError::Input { surface: base.name.clone(), reason }
+            base.error(reason)
         })
     };
     Ok(Grid::new(*geometry, (0..geometry.len()).map(at).collect::<Result<_, _>>()?))
@@ -111,7 +109,7 @@ impl Region {
 struct Running<'a> {
     geometry: Geometry,
     streams: Streams,
-    inputs: &'a [Grid],
+    inputs: &'a [Input],
     maps: Vec<Map>,
     /// Points `[x, y]` of the lines so far, m.
     lines: Vec<Vec<[f64; 2]>>,
@@ -259,11 +257,11 @@ impl Generator for Compose {
         self.notes.clone()
     }
 
-    fn inputs(&self) -> Vec<InputSurface> {
+    fn inputs(&self) -> Vec<NamedInput> {
         self.processes.iter().flat_map(Process::operands).flat_map(Operand::inputs).collect()
     }
 
-    fn generate(&self, streams: &Streams, inputs: &[Grid]) -> Result<Terrain, TerrainError> {
+    fn generate(&self, streams: &Streams, inputs: &[Input]) -> Result<Terrain, TerrainError> {
         let geometry = self.geometry;
         let mut running = Running {
             geometry,

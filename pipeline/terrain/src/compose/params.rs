@@ -1,7 +1,7 @@
 //! Parameters of a composition.
 
 use super::trail::{RawTrail, Trail};
-use crate::generator::{Generator, InputSurface};
+use crate::generator::{Generator, NamedInput};
 use crate::size::Size;
 use sastrugi_numeric::Geometry;
 use sastrugi_schemas::ParameterError;
@@ -158,7 +158,7 @@ pub(super) enum Operand {
     /// A generator on the same cells, and the key of its parameters.
     Generator { generator: Box<dyn Generator>, key: String },
     /// Another surface.
-    Surface(InputSurface),
+    Surface(NamedInput),
 }
 
 /// A checked region.
@@ -325,7 +325,7 @@ impl Whole {
             (None, Some(_)) if !parameters.is_empty() => {
                 Err(ParameterError::new("parameters", "belong to a `kind`; a surface named by `of` has none"))
             }
-            (None, Some(id)) => Ok(Operand::Surface(InputSurface { key: format!("{at}.of"), name: id.to_owned() })),
+            (None, Some(id)) => Ok(Operand::Surface(NamedInput::heights(&format!("{at}.of"), id))),
             (None, None) => Err(ParameterError::new("kind", "is missing; name a generator, or a surface by `of`")),
             (Some(_), Some(_)) => Err(ParameterError::new("of", "stands beside `kind`; give one of them")),
         }

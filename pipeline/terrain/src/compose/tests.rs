@@ -11,7 +11,8 @@ fn streams() -> Streams {
 }
 
 fn made(processes: Value, inputs: &[Grid]) -> Terrain {
-    prepared(processes).generate(&streams(), inputs).unwrap()
+    let inputs: Vec<Input> = inputs.iter().cloned().map(Input::from).collect();
+    prepared(processes).generate(&streams(), &inputs).unwrap()
 }
 
 /// A ramp that rises by 1 a metre to the east.
@@ -39,7 +40,7 @@ fn val_operations_are_those_of_the_table() {
 
 #[test]
 fn val_regions_rise_smoothly_between_their_values() {
-    let operand = || Operand::Surface(InputSurface { key: String::new(), name: String::new() });
+    let operand = || Operand::Surface(NamedInput::heights("", ""));
     let region = |from, to| Region { operand: operand(), from, to };
     let weights = [1.0, 2.0, 2.5, 3.0, 4.0].map(|v| region(2.0, 3.0).weight(v));
     assert_eq!(weights, [0.0, 0.0, 0.5, 1.0, 1.0]);
@@ -86,7 +87,7 @@ fn val_a_refined_dem_lies_on_its_posts() {
     let plain = json!({"dem": "hill", "texture": false});
     let params = json!({"size_px": [30, 20], "cell_m": 0.5, "origin_m": [1.0, 2.0],
         "processes": [{"kind": "elaborate", "parameters": plain}]});
-    let made = crate::prepare(KIND, &params).unwrap().generate(&streams(), &[dem]).unwrap().heights;
+    let made = crate::prepare(KIND, &params).unwrap().generate(&streams(), &[dem.into()]).unwrap().heights;
     for (k, z) in made.values.iter().enumerate() {
         let (x, y) = (made.geometry.x(k % 30), made.geometry.y(k / 30));
         assert!((z - (x - 2.0 * y)).abs() < 1e-9, "{x} {y}: {z}");
@@ -96,12 +97,12 @@ fn val_a_refined_dem_lies_on_its_posts() {
 #[test]
 fn val_surfaces_must_reach_the_cells() {
     let small = Grid::filled(Geometry::square(10, 10, 0.5), 1.0);
-    let error = prepared(json!([{"of": "small"}])).generate(&streams(), &[small]).unwrap_err();
+    let error = prepared(json!([{"of": "small"}])).generate(&streams(), &[small.into()]).unwrap_err();
     assert!(error.to_string().contains("\"small\"") && error.to_string().contains("x = 0.25 m, y = 9.75 m"), "{error}");
     let error = prepared(json!([{"of": "small"}])).generate(&streams(), &[]).unwrap_err();
     assert!(error.to_string().contains("is not there"));
     let flat = Grid::filled(Geometry::square(40, 40, 0.5), 1.0);
-    let error = prepared(json!([{"of": "flat"}])).generate_checked(&streams(), &[flat]).unwrap_err();
+    let error = prepared(json!([{"of": "flat"}])).generate_checked(&streams(), &[flat.into()]).unwrap_err();
     assert!(error.to_string().contains("same everywhere"), "{error}");
 }
 

@@ -8,6 +8,12 @@
 //! so that z is the DEM's height at every post that is a lattice point, and the DEM's to within the slope times half a basic spacing
 //! at the others.
 //!
+//! Craters and rocks that the DEM, or images of the site, would have shown are not added (`bounds`). Sparse altimetry moves the surface
+//! onto measured points (`altimetry`). With a measured albedo A, its background `B_A` and the albedo P of the processes, the map of the
+//! albedo is
+//! $$ a = B_A + P - I\left[\, P(\text{cells of } A) \,\right] $$
+//! kept to 0 to 1: that of the measurement at the centres of its cells, as heights are at posts. Without a process `albedo` it is smooth.
+//!
 //! Texture parameters are fitted to the structure function of the DEM over lags of 1 to 8 posts (`fit`), unless given; its coarsest
 //! points are the lattice spacing nearest to that of the posts.
 //!
@@ -31,7 +37,9 @@
 //! The texture extrapolates a power law over decades of scale. Where the ground has another roughness below the posts (grass, gravel, a
 //! ploughed field) give `hurst` and `roughness_m`, or take `texture = false` and add a measured texture to the background.
 
+mod altimetry;
 mod background;
+mod bounds;
 mod fit;
 mod params;
 #[cfg(test)]
@@ -42,12 +50,15 @@ pub(crate) use fit::seen_through_the_lags;
 pub use fit::{TextureFit, fit};
 pub use params::{Elaborate, RawElaborate};
 
-use crate::generator::{Generator, InputSurface, Terrain, TerrainError};
-use crate::planetary::{self, Assembly, RawProcess, Window, World};
+use crate::generator::{Generator, Input, Map, NamedInput, Terrain, TerrainError};
+use crate::planetary::{self, Assembly, Patch, Potential, RawProcess, Window, World};
+use altimetry::{AltimetryError, Correction, Points, Posts};
 use background::Background;
+use bounds::Bound;
 use rayon::prelude::*;
 use sastrugi_numeric::{Counter, Geometry, Grid, Streams};
 use serde_json::Value;
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -58,14 +69,14 @@ pub const KIND: &str = "elaborate";
 const POSTS_MIN: usize = 4;
 /// A DEM with more of its structure function from its tilt is not one to fit a texture to.
 const TILT_SHARE_MAX: f64 = 0.3;
-/// Largest crater or rock, posts.
-const DIAMETER_POSTS: f64 = 2.0;
 /// How far from a window the ground under its craters may reach, posts: ejecta of the widest, and their retained points.
 const CRATER_POSTS: usize = 8;
 
-/// Why a DEM cannot be refined.
+/// Why a DEM, or what comes with it, cannot be used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 enum DemError {
+    #[error("is not there")]
+    Missing,
     #[error("has {rows} x {cols} posts; at least 4 x 4 are needed")]
     TooSmall { rows: usize, cols: usize },
     #[error("has posts {post_m} m apart; `cell_m` is {cell_m} m and must be finer")]
@@ -85,7 +96,28 @@ enum DemError {
         "has posts {post_m} m apart, and would show {what} wider than two of them; the smallest asked for is {diameter_m} m"
     )]
     Shows { post_m: f64, what: &'static str, diameter_m: f64 },
+    #[error("holds an albedo of {albedo} at x = {x}, y = {y} m; albedo lies in 0 to 1")]
+    NoAlbedo { albedo: f64, x: f64, y: f64 },
+    #[error("{0}")]
+    Potential(String),
+    #[error("cannot pass through its altimetry: {0}")]
+    Altimetry(#[from] AltimetryError),
 }
+
+/// Columns and rows (from the south) of posts.
+type Part = [Range<usize>; 2];
+
+/// What the window's samples are made from.
+struct Inputs<'a> {
+    dem: &'a Grid,
+    albedo: Option<&'a Grid>,
+    /// `[x, y, z, sigma]`, m.
+    points: Vec<[f64; 4]>,
+    potential: Option<&'a Grid>,
+}
+
+/// A failure, and the input that it is about.
+type Failed = (NamedInput, DemError);
 
 impl Elaborate {
     /// Place of a lattice point in the DEM's coordinates, m.
@@ -98,31 +130,37 @@ impl Elaborate {
         [0, 1].map(|a| ((place[a] - self.offset_m[a]) / self.spacing_m).round() as i64)
     }
 
-    /// Columns and rows (from the south) of the posts that a window's samples lie between, two beyond on either side where there are.
-    fn posts(&self, g: &Geometry) -> Result<[Range<usize>; 2], DemError> {
+    /// Least and largest place of the window's samples along x and y, m.
+    fn ends(&self) -> [[f64; 2]; 2] {
         let last = [self.window.cols - 1, self.window.rows - 1].map(|n| n as f64 * self.raw.cell_m);
-        let [x, y] = self.raw.origin_m;
-        let ends = [[x, x + last[0]], [y, y + last[1]]];
+        [0, 1].map(|a| [self.raw.origin_m[a], self.raw.origin_m[a] + last[a]])
+    }
+
+    /// The posts that the window's samples, and the ground up to `beyond_m` around them, lie between, two beyond on either side where there
+    /// are.
+    fn posts(&self, g: &Geometry, beyond_m: f64) -> Result<Part, DemError> {
+        let ends = self.ends();
         let outer = [[g.x(0), g.x(g.cols - 1)], [g.y(g.rows - 1), g.y(0)]];
         if (0..2).any(|a| !(ends[a][0] >= outer[a][0] && ends[a][1] <= outer[a][1])) {
             let four = |p: [[f64; 2]; 2]| [p[0][0], p[0][1], p[1][0], p[1][1]];
             return Err(DemError::Outside { dem: four(outer), window: four(ends) });
         }
         Ok([0, 1].map(|a| {
-            let post = |at: f64| ((at - outer[a][0]) / g.cell[a]) as usize;
+            let post = |at: f64| ((at.clamp(outer[a][0], outer[a][1]) - outer[a][0]) / g.cell[a]) as usize;
             let count = [g.cols, g.rows][a];
-            post(ends[a][0]).saturating_sub(1)..(post(ends[a][1]) + 3).min(count)
+            post(ends[a][0] - beyond_m).saturating_sub(1)..(post(ends[a][1] + beyond_m) + 3).min(count)
         }))
     }
 
-    fn check_dem(&self, dem: &Grid, [cols, rows]: &[Range<usize>; 2]) -> Result<(), DemError> {
-        let g = &dem.geometry;
-        let margin = if self.raw.processes.is_empty() { 0 } else { CRATER_POSTS };
+    /// Whether the posts of a part of a raster, and `margin` posts around it, have data.
+    fn check_raster(&self, raster: &Grid, part: &Part, margin: usize) -> Result<(), DemError> {
+        let [cols, rows] = part;
+        let g = &raster.geometry;
         let wide = |r: &Range<usize>, count: usize| r.start.saturating_sub(margin)..(r.end + margin).min(count);
         for j in wide(rows, g.rows) {
             for i in wide(cols, g.cols) {
                 let row = g.rows - 1 - j;
-                if !dem.at(row, i).is_finite() {
+                if !raster.at(row, i).is_finite() {
                     return Err(DemError::NoData { x: g.x(i), y: g.y(row) });
                 }
             }
@@ -130,23 +168,27 @@ impl Elaborate {
         Ok(())
     }
 
-    /// The processes, with nothing wider than two posts.
-    fn bounded(&self, post_m: f64) -> Result<Vec<RawProcess>, DemError> {
-        let most_m = DIAMETER_POSTS * post_m;
-        let bound = |what: &'static str, low_m: f64, high_m: &mut f64| {
-            *high_m = high_m.min(most_m);
-            if low_m <= most_m { Ok(()) } else { Err(DemError::Shows { post_m, what, diameter_m: low_m }) }
-        };
-        let mut processes = self.raw.processes.clone();
-        for process in &mut processes {
-            match process {
-                RawProcess::PrimaryCraters(p) => bound("craters", p.diameter_min_m, &mut p.diameter_max_m)?,
-                RawProcess::SecondaryCraters(p) => bound("craters", p.diameter_min_m, &mut p.diameter_max_m)?,
-                RawProcess::Rocks(p) => bound("rocks", p.diameter_min_m, &mut p.diameter_max_m)?,
-                _ => {}
-            }
+    /// Whether a raster has enough posts, and farther apart than the samples.
+    fn check_size(&self, g: &Geometry) -> Result<(), DemError> {
+        let post_m = g.cell[0].min(g.cell[1]);
+        if g.rows < POSTS_MIN || g.cols < POSTS_MIN {
+            Err(DemError::TooSmall { rows: g.rows, cols: g.cols })
+        } else if self.raw.cell_m >= post_m {
+            Err(DemError::NotFiner { post_m, cell_m: self.raw.cell_m })
+        } else {
+            Ok(())
         }
-        Ok(processes)
+    }
+
+    /// The processes without what the DEM or images would show, and the sentence on it.
+    fn bounded(&self, post_m: f64) -> Result<(Vec<RawProcess>, Option<String>), DemError> {
+        let bound = Bound::Posts(post_m).and(self.images);
+        let shown = |(n, diameter_m): (usize, f64)| {
+            let is_rocks = matches!(self.raw.processes[n], RawProcess::Rocks(_));
+            DemError::Shows { post_m, what: if is_rocks { "rocks" } else { "craters" }, diameter_m }
+        };
+        let processes = bound.apply(&self.raw.processes).map_err(shown)?;
+        Ok((processes, bound.note(&self.raw.processes)))
     }
 
     /// Texture of the DEM, where it is asked for.
@@ -165,7 +207,7 @@ impl Elaborate {
     fn world(
         &self,
         background: Arc<Background>,
-        processes: &[RawProcess],
+        (processes, potential): (&[RawProcess], Option<Potential>),
         texture: Option<TextureFit>,
         anchor: u32,
         streams: &Streams,
@@ -176,55 +218,113 @@ impl Elaborate {
         if let Some(t) = texture {
             assembly.add_texture(t.roughness_m, t.hurst, Counter::new(&mut streams.stream("texture-1")));
         }
-        assembly.with(processes, streams)
+        assembly.with(processes, streams, potential)
     }
 
-    /// What the world has at the posts (columns, and rows from the south) beyond the background.
-    fn residual(
-        &self,
-        world: &World,
-        background: &Background,
-        g: Geometry,
-        [cols, rows]: [Range<usize>; 2],
-    ) -> Background {
+    /// A quantity of the detail at the posts of a part, interpolated as backgrounds are.
+    fn detail(&self, g: Geometry, [cols, rows]: &Part, of: impl Fn([i64; 2]) -> f64 + Sync) -> Background {
         let posts = Geometry::square(rows.len(), cols.len(), 1.0);
         let at = |k: usize| {
             let (row, col) = (g.rows - rows.end + k / posts.cols, cols.start + k % posts.cols);
-            let [i, j] = self.nearest([g.x(col), g.y(row)]);
-            let point = Window { zoom: 0, west: i, south: j, cols: 1, rows: 1 };
-            world.patch(&point).heights[0] - background.at(self.place([i as f64, j as f64]))
+            of(self.nearest([g.x(col), g.y(row)]))
         };
         let values = (0..posts.len()).into_par_iter().map(at).collect();
         Background::of_part(g, [cols.start, rows.start], Grid::new(posts, values))
     }
 
-    fn refine(&self, streams: &Streams, dem: &Grid) -> Result<Terrain, DemError> {
+    /// Changes the values of a window, each by a function of its lattice point.
+    fn change(&self, values: &mut [f64], by: impl Fn([f64; 2], f64) -> f64 + Sync) {
+        let window = self.window;
+        values.par_chunks_mut(window.cols).enumerate().for_each(|(row, line)| {
+            let change = |(col, v): (usize, &mut f64)| *v = by([window.x(col), window.y(row)], *v);
+            line.iter_mut().enumerate().for_each(change);
+        });
+    }
+
+    /// The altimetry that matters to the window.
+    fn points(&self, dem: &Grid, given: &[[f64; 4]]) -> Result<Points, AltimetryError> {
+        let posts = Posts { geometry: dem.geometry, spacing_m: self.spacing_m, offset_m: self.offset_m };
+        let points = Points::new(posts, given, |col, row| dem.at(dem.rows() - 1 - row, col))?;
+        let [[west, east], [south, north]] = self.ends();
+        Ok(points.within_reach(posts.to_lattice([west, south]), posts.to_lattice([east, north])))
+    }
+
+    /// How far altimetry moves the surface that is `world` less `residual`.
+    fn correction(&self, points: &Points, world: &World, residual: &Background) -> Correction {
+        let corners = points.corners();
+        let height =
+            |&[i, j]: &[i64; 2]| sample(world, [i, j]).heights[0] - residual.at(self.place([i as f64, j as f64]));
+        let heights: Vec<f64> = corners.par_iter().map(height).collect();
+        let known: BTreeMap<[i64; 2], f64> = corners.into_iter().zip(heights).collect();
+        points.correction(|corner| known.get(&corner).copied().unwrap_or(f64::NAN))
+    }
+
+    /// The measured albedo at the window's samples, with the detail of the processes.
+    fn measured_albedo(&self, albedo: &Grid, world: &World, patch: &mut Patch) -> Result<(), DemError> {
+        let g = albedo.geometry;
+        self.check_size(&g)?;
+        let part = self.posts(&g, 0.0)?;
+        self.check_raster(albedo, &part, 0)?;
+        if let Some(k) = albedo.values.iter().position(|a| a.is_finite() && !(0.0..=1.0).contains(a)) {
+            return Err(DemError::NoAlbedo { albedo: albedo.values[k], x: g.x(k % g.cols), y: g.y(k / g.cols) });
+        }
+        let measured = Background::new(without_holes(albedo));
+        let detail = self.detail(g, &part, |point| sample(world, point).albedo[0]);
+        self.change(&mut patch.albedo, |point, own| {
+            let place = self.place(point);
+            (measured.at(place) + (own - detail.at(place))).clamp(0.0, 1.0)
+        });
+        Ok(())
+    }
+
+    fn refine(&self, streams: &Streams, inputs: &Inputs<'_>) -> Result<Terrain, Failed> {
+        let dem = inputs.dem;
+        let of_dem = |e: DemError| (self.dem(), e);
         let g = &dem.geometry;
-        if g.rows < POSTS_MIN || g.cols < POSTS_MIN {
-            return Err(DemError::TooSmall { rows: g.rows, cols: g.cols });
-        }
+        self.check_size(g).map_err(of_dem)?;
         let post_m = g.cell[0].min(g.cell[1]);
-        if self.raw.cell_m >= post_m {
-            return Err(DemError::NotFiner { post_m, cell_m: self.raw.cell_m });
-        }
-        let posts = self.posts(g)?;
-        self.check_dem(dem, &posts)?;
-        let processes = self.bounded(post_m)?;
-        let texture = self.texture(dem)?;
+        let points = self.points(dem, &inputs.points).map_err(|e| of_dem(e.into()))?;
+        let beyond_m = if points.is_empty() { 0.0 } else { g.cell[0].max(g.cell[1]) };
+        let posts = self.posts(g, beyond_m).map_err(of_dem)?;
+        let margin = if self.raw.processes.is_empty() { 0 } else { CRATER_POSTS };
+        self.check_raster(dem, &posts, margin).map_err(of_dem)?;
+        let (processes, bound_note) = self.bounded(post_m).map_err(of_dem)?;
+        let potential = self.potential(inputs)?;
+        let texture = self.texture(dem).map_err(of_dem)?;
         let anchor = planetary::nearest_zoom(g.mean_cell() / self.spacing_m);
         let background = Arc::new(Background::new(without_holes(dem)));
-        let world = self.world(background.clone(), &processes, texture, anchor, streams);
+        let world = self.world(background.clone(), (&processes, potential), texture, anchor, streams);
         let mut patch = world.tiled_patch(&self.window);
-        let residual = self.residual(&world, &background, *g, posts);
-        let window = self.window;
-        patch.heights.par_chunks_mut(window.cols).enumerate().for_each(|(row, line)| {
-            let take = |(col, z): (usize, &mut f64)| *z -= residual.at(self.place([window.x(col), window.y(row)]));
-            line.iter_mut().enumerate().for_each(take);
+        let residual = self.detail(*g, &posts, |[i, j]| {
+            sample(&world, [i, j]).heights[0] - background.at(self.place([i as f64, j as f64]))
         });
-        let maps = planetary::maps(&world, self.geometry(), &patch);
+        self.change(&mut patch.heights, |point, z| z - residual.at(self.place(point)));
+        let correction = (!points.is_empty()).then(|| self.correction(&points, &world, &residual));
+        if let Some(correction) = &correction {
+            self.change(&mut patch.heights, |point, z| z + correction.at(point));
+        }
+        if let (Some(albedo), Some(name)) = (inputs.albedo, self.albedo()) {
+            self.measured_albedo(albedo, &world, &mut patch).map_err(|e| (name, e))?;
+        }
+        let mut maps = planetary::maps(&world, self.geometry(), &patch);
+        if inputs.albedo.is_some() && world.albedo.is_none() {
+            maps.push(Map { name: "albedo", values: planetary::to_grid(self.geometry(), &patch.albedo) });
+        }
         let heights = planetary::to_grid(self.geometry(), &patch.heights);
-        let notes = texture.map_or_else(Vec::new, |t| self.texture_notes(&t, g));
+        let mut notes = texture.map_or_else(Vec::new, |t| self.texture_notes(&t, g));
+        notes.extend(bound_note);
+        notes.extend(correction.map(|c| c.note()));
+        notes.extend(planetary::potential_note(&world, &self.window));
         Ok(Terrain { heights, maps, lines: Vec::new(), notes })
+    }
+
+    /// The raster that the rocks follow.
+    fn potential(&self, inputs: &Inputs<'_>) -> Result<Option<Potential>, Failed> {
+        let (Some(raster), Some(name)) = (inputs.potential, planetary::potential_input(&self.raw.processes)) else {
+            return Ok(None);
+        };
+        let made = Potential::new(raster, self.spacing_m, self.offset_m);
+        made.map(Some).map_err(|reason| (name, DemError::Potential(reason)))
     }
 
     fn texture_notes(&self, texture: &TextureFit, g: &Geometry) -> Vec<String> {
@@ -247,6 +347,46 @@ impl Elaborate {
         }
         notes
     }
+
+    fn dem(&self) -> NamedInput {
+        NamedInput::heights("dem", &self.raw.dem)
+    }
+
+    fn albedo(&self) -> Option<NamedInput> {
+        self.raw.albedo.as_ref().map(|name| NamedInput::values("albedo", name))
+    }
+
+    fn altimetry(&self) -> Option<NamedInput> {
+        self.raw.altimetry.as_ref().map(|name| NamedInput::points("altimetry", name))
+    }
+
+    /// The inputs, each in the place of its name.
+    fn sorted<'a>(&self, inputs: &'a [Input]) -> Result<Inputs<'a>, Failed> {
+        let mut given = inputs.iter();
+        let mut grid = |name: Option<NamedInput>| match (name, &mut given) {
+            (None, _) => Ok(None),
+            (Some(name), given) => match given.next() {
+                Some(Input::Grid(grid)) => Ok(Some(grid)),
+                _ => Err((name, DemError::Missing)),
+            },
+        };
+        let dem = grid(Some(self.dem()))?.ok_or((self.dem(), DemError::Missing))?;
+        let albedo = grid(self.albedo())?;
+        let potential = grid(planetary::potential_input(&self.raw.processes))?;
+        let mut points = match (self.altimetry(), given.next()) {
+            (None, _) => Vec::new(),
+            (Some(_), Some(Input::Points(points))) => points.clone(),
+            (Some(name), _) => return Err((name, DemError::Missing)),
+        };
+        let listed = |p: &Vec<f64>| [0, 1, 2, 3].map(|k| p.get(k).copied().unwrap_or(0.0));
+        points.extend(self.raw.altimetry_points_m.iter().map(listed));
+        Ok(Inputs { dem, albedo, points, potential })
+    }
+}
+
+/// One lattice point of a world.
+fn sample(world: &World, [west, south]: [i64; 2]) -> Patch {
+    world.patch(&Window { zoom: 0, west, south, cols: 1, rows: 1 })
 }
 
 /// The DEM with its mean where it has no data: far from the window, where only planes of distant craters ask.
@@ -281,13 +421,13 @@ impl Generator for Elaborate {
         self.size.note().into_iter().collect()
     }
 
-    fn inputs(&self) -> Vec<InputSurface> {
-        vec![InputSurface { key: "dem".to_owned(), name: self.raw.dem.clone() }]
+    fn inputs(&self) -> Vec<NamedInput> {
+        let rasters = [Some(self.dem()), self.albedo(), planetary::potential_input(&self.raw.processes)];
+        rasters.into_iter().flatten().chain(self.altimetry()).collect()
     }
 
-    fn generate(&self, streams: &Streams, inputs: &[Grid]) -> Result<Terrain, TerrainError> {
-        let failed = |reason: String| TerrainError::Input { surface: self.raw.dem.clone(), reason };
-        let dem = inputs.first().ok_or_else(|| failed("is not there".to_owned()))?;
-        self.refine(streams, dem).map_err(|e| failed(e.to_string()))
+    fn generate(&self, streams: &Streams, inputs: &[Input]) -> Result<Terrain, TerrainError> {
+        let made = self.sorted(inputs).and_then(|inputs| self.refine(streams, &inputs));
+        made.map_err(|(input, e)| input.error(e.to_string()))
     }
 }

@@ -1,5 +1,6 @@
 //! Parameters of the elaboration.
 
+use super::bounds::{Bound, DIAMETER_PIXELS};
 use crate::planetary::{
     Lattice, RawProcess, WHOLE_TOLERANCE, Window, Work, check_processes, check_texture, window_in_reach,
 };
@@ -46,6 +47,23 @@ pub struct RawElaborate {
     /// Craters, rocks, albedo and dust, in order, as of kind `planetary`: tables with a `kind` of `primary_craters`,
     /// `secondary_craters`, `rocks`, `albedo`, `dust`. Nothing wider than two posts of the DEM is added: it would show.
     pub processes: Vec<RawProcess>,
+    /// Size on the ground of a pixel of images that are known of the site, m: craters and rocks that they would have shown are not added. No
+    /// images when absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub image_resolution_m: Option<f64>,
+    /// Pixels across the widest crater or rock that images do not show, 1 or above (2: the sampling theorem; our choice).
+    pub image_pixels: f64,
+    /// Measured points that the surface passes through: a CSV file with columns `x`, `y`, `z` and, where known, `sigma`, m, in the DEM's own
+    /// coordinates.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub altimetry: Option<String>,
+    /// The same as a list, beside the file's or alone: `[x, y, z]` or `[x, y, z, sigma]`, m. A point with a standard error sigma is soft.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub altimetry_points_m: Vec<Vec<f64>>,
+    /// Measured albedo, 0 to 1: an id in a study (`<id>.albedo` for the map of a terrain) or a raster file that covers the window. The map of the
+    /// result keeps it at its cells' centres; process `albedo` adds detail between them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub albedo: Option<String>,
 }
 
 impl Default for RawElaborate {
@@ -61,6 +79,11 @@ impl Default for RawElaborate {
             hurst: None,
             roughness_m: None,
             processes: Vec::new(),
+            image_resolution_m: None,
+            image_pixels: DIAMETER_PIXELS,
+            altimetry: None,
+            altimetry_points_m: Vec::new(),
+            albedo: None,
         }
     }
 }
@@ -75,6 +98,8 @@ pub struct Elaborate {
     /// Where lattice point 0 lies in the DEM's coordinates, m.
     pub(super) offset_m: [f64; 2],
     pub(super) work: Work,
+    /// What the images of the site show, where there are images.
+    pub(super) images: Option<Bound>,
 }
 
 impl TryFrom<RawElaborate> for Elaborate {
@@ -94,6 +119,8 @@ impl TryFrom<RawElaborate> for Elaborate {
             }
         }
         check_processes(&raw.processes, spacing_m)?;
+        let images = raw.check_images()?;
+        raw.check_inputs()?;
         let [west, south] = raw.origin_m.map(|at| column(at, cell_m));
         let window = Window { zoom, west: west?, south: south?, cols: size.cols(), rows: size.rows() };
         let work = window_in_reach(&raw.processes, spacing_m, &window)?;
@@ -103,7 +130,49 @@ impl TryFrom<RawElaborate> for Elaborate {
         });
         let (size_px, basic_spacing_m) = (Some(size.px), Some(spacing_m));
         let raw = RawElaborate { size_m: None, size_px, cell_m, basic_spacing_m, ..raw };
-        Ok(Self { raw, size, spacing_m, window, offset_m, work })
+        Ok(Self { raw, size, spacing_m, window, offset_m, work, images })
+    }
+}
+
+impl RawElaborate {
+    /// What the images of the site show, where there are images.
+    fn check_images(&self) -> Result<Option<Bound>, ParameterError> {
+        if !(self.image_pixels >= 1.0 && self.image_pixels.is_finite()) {
+            let message = format!("is {}; it must be 1 or above", self.image_pixels);
+            return Err(ParameterError::new("image_pixels", message));
+        }
+        let Some(resolution_m) = self.image_resolution_m else { return Ok(None) };
+        ParameterError::positive("image_resolution_m", resolution_m)?;
+        let bound = Bound::Pixels(resolution_m, self.image_pixels);
+        match bound.apply(&self.processes) {
+            Ok(_) => Ok(Some(bound)),
+            Err((n, diameter_m)) => {
+                let message = format!(
+                    "is {diameter_m} m; images of {resolution_m} m a pixel would show what is wider than {} m",
+                    bound.most_m()
+                );
+                Err(ParameterError::new(format!("processes.{n}.diameter_min_m"), message))
+            }
+        }
+    }
+
+    /// Names that are not empty, and points of three or four numbers.
+    fn check_inputs(&self) -> Result<(), ParameterError> {
+        for (key, name) in [("altimetry", &self.altimetry), ("albedo", &self.albedo)] {
+            if name.as_ref().is_some_and(String::is_empty) {
+                return Err(ParameterError::new(key, "is empty; it names a file"));
+            }
+        }
+        match self.altimetry_points_m.iter().position(|p| !(3..=4).contains(&p.len())) {
+            Some(n) => {
+                let message = format!(
+                    "has {} numbers; a point is [x, y, z] or [x, y, z, sigma]",
+                    self.altimetry_points_m[n].len()
+                );
+                Err(ParameterError::new(format!("altimetry_points_m.{n}"), message))
+            }
+            None => Ok(()),
+        }
     }
 }
 

@@ -2,6 +2,11 @@ use super::*;
 use sastrugi_numeric::Surface;
 use serde_json::json;
 
+mod albedo;
+mod altimetry;
+mod bounds;
+mod together;
+
 /// A rough DEM with its south-west post at (100, 200) m.
 fn site(rows: usize, cols: usize, cell: [f64; 2]) -> Grid {
     let params = json!({
@@ -24,7 +29,7 @@ fn elaborate(params: Value) -> Box<dyn Generator> {
 }
 
 fn refined(params: Value, dem: &Grid) -> Terrain {
-    elaborate(params).generate(&streams(), std::slice::from_ref(dem)).unwrap()
+    elaborate(params).generate(&streams(), &[dem.clone().into()]).unwrap()
 }
 
 fn processes() -> Value {
@@ -141,7 +146,7 @@ fn val_the_background_alone_is_smooth() {
 }
 
 fn refusal(params: Value, dem: &Grid) -> String {
-    elaborate(params).generate(&streams(), std::slice::from_ref(dem)).unwrap_err().to_string()
+    elaborate(params).generate(&streams(), &[dem.clone().into()]).unwrap_err().to_string()
 }
 
 #[test]

@@ -7,9 +7,9 @@
 use super::frame::Frame;
 use super::perlin::{self, Layer};
 use super::{DEFAULT_CELL_M, DEFAULT_HI_LEN_M, DEFAULT_SIZE_PX, GAP};
-use crate::generator::{Generator, Terrain, TerrainError};
+use crate::generator::{Generator, Input, Terrain, TerrainError};
 use crate::size::Size;
-use sastrugi_numeric::{Geometry, Grid, Streams};
+use sastrugi_numeric::{Geometry, Streams};
 use sastrugi_schemas::ParameterError;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -145,7 +145,7 @@ impl Generator for Gap {
         self.frame.size.note().into_iter().collect()
     }
 
-    fn generate(&self, streams: &Streams, _bases: &[Grid]) -> Result<Terrain, TerrainError> {
+    fn generate(&self, streams: &Streams, _inputs: &[Input]) -> Result<Terrain, TerrainError> {
         let rough = Layer::draw(streams, "high", 1.25 * PI * self.raw.hi_len_m, self.raw.hi_mag_m);
         let mut heights = perlin::sum(&[rough], &self.frame);
         let profile: Vec<f64> = (0..self.frame.cols()).map(|col| self.height_m(self.frame.x_m(col))).collect();

@@ -30,7 +30,7 @@ use super::frame::Frame;
 use super::measure::{Made, RawRoughness, Roughness, finish, memory_bytes};
 use super::perlin::{self, Layer, Perlin};
 use super::{DEFAULT_CELL_M, DEFAULT_HI_MAG_M, DEFAULT_SIZE_PX, MAVS_VARIABLE, VAN_DEUSEN};
-use crate::generator::{Generator, Terrain, TerrainError};
+use crate::generator::{Generator, Input, Terrain, TerrainError};
 use crate::size::Size;
 use sastrugi_numeric::{Geometry, Grid, Streams};
 use sastrugi_roughness::WaveBand;
@@ -310,7 +310,7 @@ impl Generator for Variable {
         notes
     }
 
-    fn generate(&self, streams: &Streams, _bases: &[Grid]) -> Result<Terrain, TerrainError> {
+    fn generate(&self, streams: &Streams, _inputs: &[Input]) -> Result<Terrain, TerrainError> {
         self.octaves.generate(streams)
     }
 }
@@ -410,7 +410,7 @@ impl Generator for VanDeusen {
         notes
     }
 
-    fn generate(&self, streams: &Streams, _bases: &[Grid]) -> Result<Terrain, TerrainError> {
+    fn generate(&self, streams: &Streams, _inputs: &[Input]) -> Result<Terrain, TerrainError> {
         self.octaves.generate(streams)
     }
 }

@@ -6,7 +6,7 @@
 
 use super::frame::Frame;
 use super::{DEFAULT_CELL_M, DEFAULT_SIZE_PX, POTHOLE};
-use crate::generator::{Generator, Terrain, TerrainError};
+use crate::generator::{Generator, Input, Terrain, TerrainError};
 use crate::size::Size;
 use rayon::prelude::*;
 use sastrugi_numeric::{Geometry, Grid, Streams};
@@ -152,7 +152,7 @@ impl Generator for Pothole {
         self.frame.size.note().into_iter().collect()
     }
 
-    fn generate(&self, streams: &Streams, _bases: &[Grid]) -> Result<Terrain, TerrainError> {
+    fn generate(&self, streams: &Streams, _inputs: &[Input]) -> Result<Terrain, TerrainError> {
         let (geometry, holes) = (self.frame.geometry(), self.holes(streams));
         let columns: Vec<f64> = (0..geometry.cols).map(|col| self.frame.x_m(col)).collect();
         let mut values = vec![0.0; geometry.len()];

@@ -6,7 +6,7 @@
 //! periodic over at least 200 a and the surface, of which the profile is the beginning.
 
 use super::{DEFAULT_CELL_M, DEFAULT_HI_LEN_M, DEFAULT_HI_MAG_M, DEFAULT_SIZE_PX, MAVS_PROFILE};
-use crate::generator::{Generator, Terrain, TerrainError};
+use crate::generator::{Generator, Input, Terrain, TerrainError};
 use crate::size::Size;
 use sastrugi_numeric::fft::{Complex64, Transform, smooth_length};
 use sastrugi_numeric::{Geometry, Grid, Streams};
@@ -123,7 +123,7 @@ impl Generator for Profile {
         self.size.note().into_iter().collect()
     }
 
-    fn generate(&self, streams: &Streams, _bases: &[Grid]) -> Result<Terrain, TerrainError> {
+    fn generate(&self, streams: &Streams, _inputs: &[Input]) -> Result<Terrain, TerrainError> {
         let profile = self.heights(streams);
         let geometry = self.size.geometry();
         Ok(Terrain::from(Grid { geometry, values: profile.repeat(geometry.rows) }))

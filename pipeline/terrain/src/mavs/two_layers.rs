@@ -10,7 +10,7 @@ use super::frame::Frame;
 use super::measure::{Made, RawRoughness, Roughness, finish, memory_bytes};
 use super::perlin::{self, Layer, Perlin};
 use super::{DEFAULT_CELL_M, DEFAULT_HI_LEN_M, DEFAULT_HI_MAG_M, DEFAULT_LO_LEN_M, DEFAULT_SIZE_PX, MAVS_PERLIN};
-use crate::generator::{Generator, Terrain, TerrainError};
+use crate::generator::{Generator, Input, Terrain, TerrainError};
 use crate::size::Size;
 use sastrugi_numeric::{Geometry, Grid, Streams};
 use sastrugi_roughness::WaveBand;
@@ -155,7 +155,7 @@ impl Generator for TwoLayers {
         self.frame.size.note().into_iter().chain(compat).collect()
     }
 
-    fn generate(&self, streams: &Streams, _bases: &[Grid]) -> Result<Terrain, TerrainError> {
+    fn generate(&self, streams: &Streams, _inputs: &[Input]) -> Result<Terrain, TerrainError> {
         let plain = self.heights(streams);
         let expected_m2 = |band: &WaveBand| self.expected_m2(band);
         let mut made = finish(Made { plain, scale: None, expected_m2 }, self.roughness.as_ref())?;

@@ -25,7 +25,7 @@ mod tests;
 
 pub use params::{Multifractal, RawLayer, RawMultifractal, Scaling};
 
-use crate::generator::{Generator, Levels, Terrain, TerrainError};
+use crate::generator::{Generator, Input, Levels, Terrain, TerrainError};
 use params::Layer;
 use sastrugi_numeric::filters::gaussian_low_pass;
 use sastrugi_numeric::{Geometry, Grid, Streams, ops};
@@ -104,7 +104,7 @@ impl Generator for Multifractal {
         self.layers[2].surface.notes()
     }
 
-    fn generate(&self, streams: &Streams, _bases: &[Grid]) -> Result<Terrain, TerrainError> {
+    fn generate(&self, streams: &Streams, _inputs: &[Input]) -> Result<Terrain, TerrainError> {
         self.surface(streams).map(Terrain::from)
     }
 

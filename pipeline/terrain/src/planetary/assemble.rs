@@ -5,13 +5,21 @@ use super::craters::{Bombardment, Floor};
 use super::levels::spacing;
 use super::processes::{RawAlbedo, RawBaseSlope, RawDust, RawProcess, RawSecondaryCraters};
 use super::rocks::Rocks;
+use super::rocks::potential::Potential;
 use super::texture::Amplitudes;
 use super::world::{Albedo, Base, Step, Texture, World};
 use sastrugi_numeric::{Counter, Streams};
 
-/// A world of processes on a lattice with points `spacing_m` apart and anchors of the texture `2^anchor` of them apart.
-pub fn world(processes: &[RawProcess], spacing_m: f64, anchor: u32, streams: &Streams) -> World {
-    Assembly::new(spacing_m, anchor).with(processes, streams)
+/// A world of processes on a lattice with points `spacing_m` apart and anchors of the texture `2^anchor` of them apart; rocks follow a
+/// raster of their potential where there is one.
+pub fn world(
+    processes: &[RawProcess],
+    spacing_m: f64,
+    anchor: u32,
+    streams: &Streams,
+    potential: Option<Potential>,
+) -> World {
+    Assembly::new(spacing_m, anchor).with(processes, streams, potential)
 }
 
 /// A world in the making.
@@ -67,8 +75,9 @@ impl Assembly {
         }
     }
 
-    /// The world with the processes. Draws of a process are named by its kind and its number among that kind.
-    pub fn with(mut self, processes: &[RawProcess], streams: &Streams) -> World {
+    /// The world with the processes; rocks follow a raster of their potential where there is one. Draws of a process are named by its kind
+    /// and its number among that kind.
+    pub fn with(mut self, processes: &[RawProcess], streams: &Streams, potential: Option<Potential>) -> World {
         let (mut rocks, mut albedo) = (None, None);
         let dust = processes.iter().find_map(|p| if let RawProcess::Dust(dust) = p { Some(dust) } else { None });
         for (n, process) in processes.iter().enumerate() {
@@ -86,7 +95,9 @@ impl Assembly {
                 RawProcess::SecondaryCraters(p) => self.add_secondaries(p, n, counter),
                 RawProcess::Rocks(p) => {
                     let parameters = p.parameters(dust.map_or(0.0, |d| d.thickness_m));
-                    rocks = Some((Rocks::new(parameters, self.spacing_m, counter), self.steps.len()));
+                    let mut placed = Rocks::new(parameters, self.spacing_m, counter);
+                    potential.iter().for_each(|raster| placed.follow(raster.clone()));
+                    rocks = Some((placed, self.steps.len()));
                     self.same_time = false;
                 }
                 RawProcess::Albedo(p) => albedo = Some(of_surface(p, dust, counter)),

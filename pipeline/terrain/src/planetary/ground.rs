@@ -55,7 +55,7 @@ impl Planetary {
     /// Ground of the world with samples `cell_m` apart, without the rocks that reach into clearings. At most `tiles` are kept.
     ///
     /// # Errors
-    /// A distance of samples that is no basic spacing times a power of 2.
+    /// A distance of samples that is no basic spacing times a power of 2, or an input that has not been read ([`Self::with_inputs`]).
     pub fn ground(
         &self,
         streams: &Streams,
@@ -63,6 +63,7 @@ impl Planetary {
         clearings: &[Clearing],
         tiles: usize,
     ) -> Result<WorldGround, ParameterError> {
+        self.check_inputs()?;
         let lattice = Lattice::check(Some(self.spacing_m), cell_m)?;
         let mut world = self.world(streams);
         if let Some((rocks, _)) = &mut world.rocks {

@@ -50,11 +50,12 @@ pub use levels::Window;
 pub(crate) use params::{Lattice, WHOLE_TOLERANCE, Work, window_in_reach};
 pub use params::{Planetary, RawPlanetary};
 pub use processes::RawProcess;
-pub(crate) use processes::{check as check_processes, check_texture};
+pub(crate) use processes::{check as check_processes, check_texture, potential as potential_input};
 pub use rocks::law::Law;
+pub(crate) use rocks::potential::Potential;
 pub use world::{Patch, ROCK, SAND, World};
 
-use crate::generator::{Generator, Map, Terrain, TerrainError};
+use crate::generator::{Generator, Input, Map, NamedInput, Terrain, TerrainError};
 use rayon::prelude::*;
 use sastrugi_numeric::{Geometry, Grid, Streams};
 use serde_json::Value;
@@ -160,6 +161,18 @@ pub(crate) fn maps(world: &World, geometry: Geometry, patch: &Patch) -> Vec<Map>
     maps
 }
 
+/// What to know of a window where the raster of the rock potential has no data.
+pub(crate) fn potential_note(world: &World, window: &Window) -> Option<String> {
+    let (rocks, _) = world.rocks.as_ref()?;
+    let (share, coverage) = (rocks.unknown_share(window), rocks.parameters().coverage);
+    (share > 0.0).then(|| {
+        format!(
+            "the raster of the rock potential has no data at {:.1} % of the samples; `coverage`, {coverage}, holds there",
+            100.0 * share
+        )
+    })
+}
+
 impl Generator for Planetary {
     fn kind(&self) -> &'static str {
         KIND
@@ -186,11 +199,16 @@ impl Generator for Planetary {
         self.size.note().into_iter().collect()
     }
 
-    fn generate(&self, streams: &Streams, _bases: &[Grid]) -> Result<Terrain, TerrainError> {
-        let world = self.world(streams);
+    fn inputs(&self) -> Vec<NamedInput> {
+        processes::potential(&self.raw.processes).into_iter().collect()
+    }
+
+    fn generate(&self, streams: &Streams, inputs: &[Input]) -> Result<Terrain, TerrainError> {
+        let world = self.with_inputs(inputs)?.world(streams);
         let patch = world.tiled_patch(&self.window);
         let geometry = self.geometry();
         let maps = maps(&world, geometry, &patch);
-        Ok(Terrain { heights: to_grid(geometry, &patch.heights), maps, lines: Vec::new(), notes: Vec::new() })
+        let notes = potential_note(&world, &self.window).into_iter().collect();
+        Ok(Terrain { heights: to_grid(geometry, &patch.heights), maps, lines: Vec::new(), notes })
     }
 }

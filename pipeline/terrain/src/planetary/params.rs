@@ -3,8 +3,10 @@
 use super::assemble;
 use super::levels::{Window, spacing};
 use super::processes::{self, RawAlbedo, RawPrimaryCraters, RawProcess, RawRocks, RawTexture};
+use super::rocks::potential::Potential;
 use super::world::World;
 use super::{tiles, widest_tile};
+use crate::generator::{Input, TerrainError};
 use crate::size::Size;
 use sastrugi_numeric::Streams;
 use sastrugi_schemas::ParameterError;
@@ -79,6 +81,8 @@ pub struct Planetary {
     pub(super) spacing_m: f64,
     pub(super) window: Window,
     pub(super) work: Work,
+    /// The raster that the rocks follow, once it is read.
+    potential: Option<Potential>,
 }
 
 impl TryFrom<RawPlanetary> for Planetary {
@@ -98,14 +102,45 @@ impl TryFrom<RawPlanetary> for Planetary {
         let origin_m = [window.west, window.south].map(|column| column as f64 * cell_m);
         let (size_px, basic_spacing_m) = (Some(size.px), Some(spacing_m));
         let raw = RawPlanetary { size_m: None, size_px, cell_m, basic_spacing_m, origin_m, ..raw };
-        Ok(Self { raw, size, spacing_m, window, work })
+        Ok(Self { raw, size, spacing_m, window, work, potential: None })
     }
 }
 
 impl Planetary {
+    /// With what its parameters name ([`crate::Generator::inputs`], in that order).
+    ///
+    /// # Errors
+    /// An input that is missing or cannot be used.
+    pub fn with_inputs(&self, inputs: &[Input]) -> Result<Self, TerrainError> {
+        let Some(named) = processes::potential(&self.raw.processes) else { return Ok(self.clone()) };
+        let Some(Input::Grid(raster)) = inputs.first() else { return Err(named.error("is not there")) };
+        let potential = Potential::new(raster, self.spacing_m, [0.0; 2]).map_err(|reason| named.error(reason))?;
+        Ok(Self { potential: Some(potential), ..self.clone() })
+    }
+
+    /// Whether it has all that its parameters name.
+    ///
+    /// # Errors
+    /// The key of what is missing.
+    pub(super) fn check_inputs(&self) -> Result<(), ParameterError> {
+        match processes::potential(&self.raw.processes) {
+            Some(named) if self.potential.is_none() => Err(ParameterError::new(named.key, "has not been read")),
+            _ => Ok(()),
+        }
+    }
+
+    /// Whether its world has samples `cell_m` apart.
+    ///
+    /// # Errors
+    /// A distance that is no basic spacing times a power of 2.
+    pub fn check_samples(&self, cell_m: f64) -> Result<(), ParameterError> {
+        Lattice::check(Some(self.spacing_m), cell_m).map(|_| ())
+    }
+
     /// The world that the patch is part of.
-    pub fn world(&self, streams: &Streams) -> World {
-        assemble::world(&self.raw.processes, self.spacing_m, self.raw.anchor_level, streams)
+    pub(crate) fn world(&self, streams: &Streams) -> World {
+        let potential = self.potential.clone();
+        assemble::world(&self.raw.processes, self.spacing_m, self.raw.anchor_level, streams, potential)
     }
 }
 
@@ -178,7 +213,7 @@ pub fn window_in_reach(processes: &[RawProcess], spacing_m: f64, window: &Window
         return Err(ParameterError::new("origin_m", "leads out of the world, which ends at 2^52 basic spacings"));
     }
     // How many there are does not depend on the seed.
-    let world = assemble::world(processes, spacing_m, 0, &Streams::for_seed(0, "terrain"));
+    let world = assemble::world(processes, spacing_m, 0, &Streams::for_seed(0, "terrain"), None);
     let tile = widest_tile(window);
     let visits = world.expected_work(&tile) * tiles(window) as f64;
     if visits <= OBJECTS_MAX {

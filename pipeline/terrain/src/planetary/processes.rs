@@ -2,6 +2,7 @@
 
 use super::craters::population::{PowerLawParameters, SecondaryParameters, Style};
 use super::rocks::{COVERAGE_MAX, RockParameters};
+use crate::generator::NamedInput;
 use sastrugi_schemas::ParameterError;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -160,6 +161,10 @@ pub enum RockLaw {
 pub struct RawRocks {
     /// Share of the ground that all rocks cover, 0 to 0.6 (Golombek and Rapp, 1997: 0.069 at Viking 1, 0.176 at Viking 2).
     pub coverage: f64,
+    /// A raster of that share from place to place, in the coordinates of the surface: an id in a study (`<id>.rock-potential` for the map of a
+    /// terrain) or a file. Bilinear between its cells; where it has no data, `coverage` holds.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub potential: Option<String>,
     /// Smallest diameter, m; at least a basic spacing (our choice).
     pub diameter_min_m: f64,
     /// Largest diameter, m; at most 50 (our choice).
@@ -184,6 +189,7 @@ impl Default for RawRocks {
     fn default() -> Self {
         Self {
             coverage: 0.069,
+            potential: None,
             diameter_min_m: 0.03,
             diameter_max_m: 5.0,
             law: RockLaw::ExactUnion,
@@ -309,6 +315,17 @@ pub fn check(processes: &[RawProcess], spacing_m: f64) -> Result<(), ParameterEr
         }
     }
     Ok(())
+}
+
+/// The raster that the rocks of a list follow, if they follow one.
+pub fn potential(processes: &[RawProcess]) -> Option<NamedInput> {
+    let of = |(n, process): (usize, &RawProcess)| match process {
+        RawProcess::Rocks(RawRocks { potential: Some(name), .. }) => {
+            Some(NamedInput::values(&format!("processes.{n}.potential"), name))
+        }
+        _ => None,
+    };
+    processes.iter().enumerate().find_map(of)
 }
 
 fn finite(key: &str, values: &[f64]) -> Result<(), ParameterError> {
@@ -481,6 +498,9 @@ impl RawRocks {
 
     fn check(&self, spacing_m: f64) -> Result<(), ParameterError> {
         within("coverage", self.coverage, 0.0, COVERAGE_MAX)?;
+        if self.potential.as_ref().is_some_and(String::is_empty) {
+            return Err(ParameterError::new("potential", "is empty; it names a raster"));
+        }
         diameters([self.diameter_min_m, self.diameter_max_m], [spacing_m, ROCK_MAX_M])?;
         ParameterError::not_negative("height_ratio", self.height_ratio)?;
         finite("height_gain", &[self.height_gain])?;

@@ -1,6 +1,7 @@
 //! Rocks: the potential that says how many there may be, and the rocks themselves.
 //!
-//! The process sets the rock potential, the share of the ground that all rocks cover, at its place in the list. Later craters
+//! The process sets the rock potential, the share of the ground that all rocks cover, at its place in the list: the same everywhere, or
+//! that of a raster ([`potential`]). Later craters
 //! clear it (inside and over most of the ejecta), and wide ones strew rocks of their own around them, by a share that falls
 //! exponentially with the distance. The rocks are set when everything else is done: as in the paper, large ones first, which here
 //! means that of two rocks the higher top is seen.
@@ -14,12 +15,14 @@
 //! stay with the ratio of the two at their place. So rocks stay where they are when craters are added to a world.
 
 pub mod law;
+pub mod potential;
 
 use super::craters::population::{Crater, Near};
 use super::craters::shape::{fall, fringe};
 use super::levels::{RADIUS_SHARE, SizeRange, Window, floor_log2, size_ranges, spacing};
 use super::texture::{Amplitudes, interpolate};
 use law::Law;
+use potential::Potential;
 use sastrugi_numeric::{Counter, Poisson};
 use std::f64::consts::PI;
 
@@ -89,6 +92,8 @@ pub struct Rocks {
     spacing_m: f64,
     bins: Vec<Bin>,
     amplitudes: Amplitudes,
+    /// The coverage from place to place, where it is not the same everywhere.
+    potential: Option<Potential>,
     /// Disks that no rock reaches into: centre and radius, lattice units.
     clearings: Vec<([f64; 2], f64)>,
 }
@@ -148,7 +153,24 @@ impl Rocks {
         let bins = parameters.bins(spacing_m);
         let coarsest = bins.last().map_or(0, |bin| bin.zoom);
         let amplitudes = Amplitudes::new(ROUGHNESS_HURST, spacing_m, coarsest);
-        Self { parameters, counter, spacing_m, bins, amplitudes, clearings: Vec::new() }
+        Self { parameters, counter, spacing_m, bins, amplitudes, potential: None, clearings: Vec::new() }
+    }
+
+    /// Sets the coverage from place to place.
+    pub fn follow(&mut self, potential: Potential) {
+        self.potential = Some(potential);
+    }
+
+    /// The coverage before craters at a place (lattice units).
+    pub fn coverage(&self, place: [f64; 2]) -> f64 {
+        self.potential.as_ref().and_then(|raster| raster.at(place)).unwrap_or(self.parameters.coverage)
+    }
+
+    /// Share of the points of a window where the raster, if there is one, has no data.
+    pub fn unknown_share(&self, window: &Window) -> f64 {
+        let Some(raster) = &self.potential else { return 0.0 };
+        let known = |k: &usize| raster.at([window.x(k % window.cols), window.y(k / window.cols)]).is_some();
+        1.0 - (0..window.len()).filter(known).count() as f64 / window.len() as f64
     }
 
     /// Takes away the rocks that may reach into disks: centres and radii, lattice units.

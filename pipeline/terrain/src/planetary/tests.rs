@@ -3,6 +3,7 @@
 mod agreement;
 mod craters;
 mod ground;
+mod potential;
 mod refusals;
 mod rocks;
 mod texture;
@@ -18,7 +19,7 @@ use serde_json::{Value, json};
 fn world(processes: Value, seed: u64) -> World {
     let processes: Vec<RawProcess> = serde_json::from_value(processes).unwrap();
     processes::check(&processes, 0.01).unwrap();
-    assemble::world(&processes, 0.01, 20, &Streams::for_seed(seed, "terrain"))
+    assemble::world(&processes, 0.01, 20, &Streams::for_seed(seed, "terrain"), None)
 }
 
 fn window(zoom: u32, west: i64, south: i64, cols: usize, rows: usize) -> Window {

@@ -229,11 +229,14 @@ impl Survey<'_> {
     /// Rock potential, and rocks on the ground; `later` are the craters of the steps after the rocks' place in the list.
     fn set_rocks(&self, rocks: &Rocks, later: &[Index], all: &[Index], patch: &mut Patch) {
         let window = patch.window;
-        let alone = rocks.parameters().coverage;
-        patch.rock_potential.fill(alone);
+        for (k, potential) in patch.rock_potential.iter_mut().enumerate() {
+            *potential = rocks.coverage([window.x(k % window.cols), window.y(k / window.cols)]);
+        }
         later.iter().flat_map(|index| &index.craters).for_each(|crater| change_all(rocks, crater, patch));
-        let coverage =
-            |at: [f64; 2]| later.iter().flat_map(|index| index.at(at)).fold(alone, |f, c| change(rocks, f, c, at));
+        let coverage = |at: [f64; 2]| {
+            let alone = rocks.coverage(at);
+            later.iter().flat_map(|index| index.at(at)).fold(alone, |f, c| change(rocks, f, c, at))
+        };
         let ground = patch.heights.clone();
         let mut tops = vec![f64::NEG_INFINITY; ground.len()];
         for rock in rocks.find(&window, coverage) {

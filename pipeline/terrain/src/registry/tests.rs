@@ -1,4 +1,5 @@
 use super::*;
+use crate::Input;
 use sastrugi_numeric::{Geometry, Grid, Streams};
 use serde_json::json;
 
@@ -20,13 +21,13 @@ fn val_part_of_a_layer_leaves_the_rest_at_its_defaults() {
 }
 
 /// Parameters of a small surface of every kind, and what it stands on.
-fn small(kind: &str) -> (Value, Vec<Grid>) {
+fn small(kind: &str) -> (Value, Vec<Input>) {
     let mut params = json!({"size_m": [1.6, 1.2], "cell_m": 0.05});
     let mut inputs = Vec::new();
     if kind == "elaborate" {
         params["dem"] = json!("site");
         params["origin_m"] = json!([3.0, 3.0]);
-        inputs.push(Grid::new(Geometry::square(9, 8, 1.0), (0..72).map(|k| f64::from(k * k % 7)).collect()));
+        inputs.push(Grid::new(Geometry::square(9, 8, 1.0), (0..72).map(|k| f64::from(k * k % 7)).collect()).into());
     }
     (params, inputs)
 }

@@ -24,7 +24,7 @@ mod tests;
 
 pub use params::{Preset, RawSpheroids, Spheroids};
 
-use crate::generator::{Generator, Terrain, TerrainError};
+use crate::generator::{Generator, Input, Terrain, TerrainError};
 use rayon::prelude::*;
 use sastrugi_numeric::{Geometry, Grid, Streams};
 use serde_json::Value;
@@ -120,7 +120,7 @@ impl Generator for Spheroids {
         self.size.note().into_iter().collect()
     }
 
-    fn generate(&self, streams: &Streams, _bases: &[Grid]) -> Result<Terrain, TerrainError> {
+    fn generate(&self, streams: &Streams, _inputs: &[Input]) -> Result<Terrain, TerrainError> {
         let hills = self.hills(streams);
         let mut heights = Grid::filled(self.geometry(), 0.0);
         heights

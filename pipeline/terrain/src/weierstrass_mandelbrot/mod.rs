@@ -33,7 +33,7 @@ pub use params::{
     RawWeierstrassMandelbrot, WeierstrassMandelbrot,
 };
 
-use crate::generator::{Generator, Terrain, TerrainError};
+use crate::generator::{Generator, Input, Terrain, TerrainError};
 use plane_waves::PlaneWave;
 use sastrugi_numeric::fft::Complex64;
 use sastrugi_numeric::{Geometry, Grid, Streams, sums};
@@ -142,7 +142,7 @@ impl Generator for WeierstrassMandelbrot {
         self.size.note().into_iter().chain(dropped).collect()
     }
 
-    fn generate(&self, streams: &Streams, _bases: &[Grid]) -> Result<Terrain, TerrainError> {
+    fn generate(&self, streams: &Streams, _inputs: &[Input]) -> Result<Terrain, TerrainError> {
         self.surface(streams).map(Terrain::from)
     }
 }

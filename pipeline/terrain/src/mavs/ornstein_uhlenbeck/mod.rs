@@ -26,7 +26,7 @@ use super::frame::Frame;
 use super::measure::{Made, Roughness, finish, memory_bytes};
 use super::perlin::{self, Layer, Perlin};
 use super::{MAVS_GAUSSIAN, ORNSTEIN_UHLENBECK};
-use crate::generator::{Generator, Terrain, TerrainError};
+use crate::generator::{Generator, Input, Terrain, TerrainError};
 use sastrugi_numeric::{Geometry, Grid, Streams, ops};
 use sastrugi_roughness::WaveBand;
 use serde_json::Value;
@@ -105,7 +105,7 @@ impl Generator for OrnsteinUhlenbeck {
         self.frame.size.note().into_iter().collect()
     }
 
-    fn generate(&self, streams: &Streams, _bases: &[Grid]) -> Result<Terrain, TerrainError> {
+    fn generate(&self, streams: &Streams, _inputs: &[Input]) -> Result<Terrain, TerrainError> {
         let p = &self.raw;
         let geometry = self.geometry();
         let field = match p.mode {
@@ -159,7 +159,7 @@ impl Generator for Gaussian {
         notes
     }
 
-    fn generate(&self, streams: &Streams, _bases: &[Grid]) -> Result<Terrain, TerrainError> {
+    fn generate(&self, streams: &Streams, _inputs: &[Input]) -> Result<Terrain, TerrainError> {
         let (p, geometry) = (&self.raw, self.geometry());
         let plain = if p.compat {
             let field = listing::field(streams, geometry, p.hi_mag_m, p.hi_len_m);

@@ -30,12 +30,12 @@ fn stat_rocks_cover_what_the_law_says() {
     }
 }
 
-fn rocks_of(world: &World) -> &Rocks {
+pub fn rocks_of(world: &World) -> &Rocks {
     &world.rocks.as_ref().unwrap().0
 }
 
 /// All rocks whose centre lies in a square, lattice units.
-fn found(world: &World, side: usize, coverage: impl Fn([f64; 2]) -> f64) -> Vec<Rock> {
+pub fn found(world: &World, side: usize, coverage: impl Fn([f64; 2]) -> f64) -> Vec<Rock> {
     let area = window(0, 0, 0, side, side);
     let mut rocks = rocks_of(world).find(&area, coverage);
     rocks.retain(|r| !area.misses(r.centre, 0.0));
@@ -69,7 +69,7 @@ fn stat_rock_counts_follow_the_law() {
 }
 
 /// N(>D) up to 5 m by the midpoint rule in log D.
-fn count_above(law: &Law, diameter_m: f64) -> f64 {
+pub fn count_above(law: &Law, diameter_m: f64) -> f64 {
     let n = 4000;
     let step = libm::log(5.0 / diameter_m) / f64::from(n);
     let at = |k: i32| {

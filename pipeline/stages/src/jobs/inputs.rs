@@ -1,0 +1,175 @@
+//! What generators take as input in a study: surfaces of other items, their maps, and files.
+//!
+//! Files are taken into the release as they are (stage [`INPUT_STAGE`]), one copy for all replicates of an item.
+
+use super::original::{self, INPUT_STAGE, Original};
+use super::terrain;
+use crate::builder::{BuildError, Builder, HEIGHTS, InputPlace, unknown_id};
+use crate::job::{ItemRef, JobError, Product, Work};
+use crate::operations::inputs::{check_systems, kept, read};
+use crate::study::Entry;
+use sastrugi_schemas::study::TerrainItem;
+use sastrugi_store::atomic;
+use sastrugi_store::dem::{self, Crs, Format, ReadOptions};
+use sastrugi_terrain::{Generator, Holds, Input, MAPS, NamedInput};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// Where an input comes from.
+#[derive(Clone, Debug)]
+pub struct Source {
+    named: NamedInput,
+    /// The item that makes or copies it.
+    pub item: ItemRef,
+    /// Its file in the item's folder.
+    file: String,
+    /// Path in the release, for messages about a file.
+    release_path: Option<String>,
+    /// Cells, as far as they are known before the run.
+    cells: u64,
+}
+
+/// The inputs of a generator.
+#[derive(Clone, Debug, Default)]
+pub struct Sources(pub Vec<Source>);
+
+/// Copies of an entry's files, by name.
+pub type Copies = BTreeMap<String, (ItemRef, String)>;
+
+impl Sources {
+    /// Finds the inputs of a generator, and adds the items that copy files.
+    ///
+    /// # Errors
+    /// A name that nothing has, or a file that is missing or swept over.
+    pub fn find(
+        builder: &mut Builder<'_>,
+        (entry, item): (&Entry<'_>, &TerrainItem),
+        generator: &dyn Generator,
+        copies: &mut Copies,
+    ) -> Result<Self, BuildError> {
+        let one = |named: NamedInput| match of_item(builder, entry, &named)? {
+            Some(source) => Ok(source),
+            None => of_file(builder, (entry, item), named, copies),
+        };
+        generator.inputs().into_iter().map(one).collect::<Result<_, _>>().map(Self)
+    }
+
+    /// Cells of all.
+    pub fn cells(&self) -> u64 {
+        self.0.iter().map(|s| s.cells).sum()
+    }
+
+    /// The inputs, and the coordinate system of the first.
+    ///
+    /// # Errors
+    /// Files that cannot be read, or rasters in another coordinate system than the heights.
+    pub fn read(&self, work: &Work<'_>) -> Result<(Vec<Input>, Crs), JobError> {
+        let mut inputs = Vec::new();
+        let mut crs = None;
+        for source in &self.0 {
+            let path = work.parent(&source.item, &source.file)?;
+            let read = read(&source.named, &path).map_err(|e| source.name_it(e, &path))?;
+            if let Some(own) = read.crs {
+                check_systems(&source.named, crs.as_ref(), &own)?;
+                crs.get_or_insert(own);
+            }
+            inputs.push(read.input);
+        }
+        Ok((inputs, crs.unwrap_or_default()))
+    }
+
+    /// Copies the files beside the heights, for ground that is made on demand.
+    ///
+    /// # Errors
+    /// The file system refused.
+    pub fn keep(&self, work: &Work<'_>) -> Result<Vec<Product>, JobError> {
+        let one = |(k, source): (usize, &Source)| {
+            let from = work.parent(&source.item, &source.file)?;
+            let name = format!("{}.{}", kept(k), original::extension(&source.file));
+            let bytes = std::fs::read(&from).map_err(|e| JobError::at(&from, e))?;
+            atomic::write(&work.output(&name), &bytes).map_err(|e| JobError::at(&work.folder.0.join(&name), e))?;
+            Ok(Product::internal(&name))
+        };
+        self.0.iter().enumerate().map(one).collect()
+    }
+}
+
+impl Source {
+    /// Messages are part of the release: they name a file as it is called there.
+    fn name_it(&self, error: JobError, path: &Path) -> JobError {
+        match &self.release_path {
+            Some(released) => error.reworded(|words| words.replace(&path.display().to_string(), released)),
+            None => error,
+        }
+    }
+}
+
+/// The heights or a map of an earlier item, where the name is one.
+fn of_item(builder: &Builder<'_>, entry: &Entry<'_>, named: &NamedInput) -> Result<Option<Source>, BuildError> {
+    let source = |item: &ItemRef, file: String, cells: u64| Source {
+        named: named.clone(),
+        item: item.clone(),
+        file,
+        release_path: None,
+        cells,
+    };
+    match named.holds {
+        Holds::Points => return Ok(None),
+        Holds::Heights => {
+            let field = builder.surface(entry, &named.key, &named.name)?;
+            return Ok(Some(source(&field.item, HEIGHTS.to_owned(), field.cells)));
+        }
+        Holds::Values => {}
+    }
+    if let Some(field) = builder.heightfields.get(&named.name) {
+        return Ok(Some(source(&field.item, HEIGHTS.to_owned(), field.cells)));
+    }
+    let map = named.name.rsplit_once('.').filter(|(_, map)| MAPS.iter().any(|known| known.name == *map));
+    let Some((id, map)) = map else { return Ok(None) };
+    let field = builder.surface(entry, &named.key, id)?;
+    if field.item.stage != terrain::STAGE {
+        let message = format!("`{}` names the map `{map}` of \"{id}\", which is not a [[terrain]]", named.key);
+        return Err(entry.error(&named.key, message).into());
+    }
+    Ok(Some(source(&field.item, format!("{map}.tif"), field.cells)))
+}
+
+/// A file beside the study.
+fn of_file(
+    builder: &mut Builder<'_>,
+    (entry, item): (&Entry<'_>, &TerrainItem),
+    named: NamedInput,
+    copies: &mut Copies,
+) -> Result<Source, BuildError> {
+    let path = builder.study.folder.join(&named.name);
+    let is_raster = Format::of_name(&path).is_some() || path.is_file();
+    if named.holds == Holds::Values && !is_raster {
+        return Err(unknown_id(entry, &named.key, &named.name, builder.heightfields.keys()).into());
+    }
+    if item.sweep.contains_key(&named.key) {
+        let message =
+            format!("`{}` sweeps over files; sweep over ids of [[dem]], or write one item for each file", named.key);
+        return Err(entry.error("sweep", message).into());
+    }
+    let cells = dem::claimed(&path, &ReadOptions::default()).map_or(0, |claimed| claimed.cells);
+    let (copy, release_path) = match copies.get(&named.name) {
+        Some(known) => known.clone(),
+        None => {
+            let id = format!("{}-{}", item.id, copies.len() + 1);
+            let copy = Original::of(&format!("input/{id}"), &builder.study.folder, &named.name)?;
+            let release_path = copy.release_path().to_owned();
+            let node = copy.node(INPUT_STAGE, &id);
+            let made = (node.item.clone(), release_path);
+            builder.node(node)?;
+            copies.insert(named.name.clone(), made.clone());
+            made
+        }
+    };
+    let key = entry.path_of_dotted(&named.key);
+    let place = InputPlace { key, release_path: release_path.clone() };
+    if !builder.inputs.contains(&place) {
+        builder.inputs.push(place);
+    }
+    let file = original::name(&release_path).to_owned();
+    Ok(Source { named, item: copy, file, release_path: Some(release_path), cells })
+}
