@@ -471,9 +471,67 @@ pub struct RoverItem {
     /// Explicit seed of starts and noise instead of the study's.
     #[serde(default)]
     pub seed: Option<u64>,
+    /// Which number of the navigator matters most? Trials with changed numbers, beside the plain one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub perturb: Option<Perturb>,
     /// One stage per value of a parameter: `sweep.<parameter> = [...]`.
     #[serde(default)]
     pub sweep: BTreeMap<String, Vec<serde_json::Value>>,
+}
+
+/// `perturb` of `[[rover]]`: elementary effects of the navigator's numbers (M. Morris, Technometrics 33, 1991). Along a trajectory each
+/// parameter moves once, up or down, while worlds, starts and noise stay.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Perturb {
+    /// Largest relative change to either side, above 0 and below 1: 0.1 moves each parameter between 0.9 and 1.1 of its value.
+    pub share: f64,
+    /// Trajectories, 1 to 999; the same ones on every world.
+    pub trajectories: u32,
+    /// Equally spaced values of each parameter, even, 2 to 64. A step is `levels / 2` of them: 4 levels and a share of 0.1 have the factors
+    /// 0.9, 0.967, 1.033 and 1.1, and steps of 0.133.
+    pub levels: u32,
+    /// Rovers of each design on each world; those of the trial, but at most 10, when absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rovers: Option<u32>,
+    /// Parameters to move: names of numbers or of lists of numbers, which are scaled as a whole; `noise.<name>` for those of the noise. All of the
+    /// navigator's when empty. Those of value 0 are left out, and named in a note.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub parameters: Vec<String>,
+}
+
+impl Default for Perturb {
+    fn default() -> Self {
+        Self { share: 0.1, trajectories: 10, levels: 4, rovers: None, parameters: Vec::new() }
+    }
+}
+
+impl Perturb {
+    /// Most trajectories: three digits in the ids of their items.
+    pub const TRAJECTORIES_MAX: u32 = 999;
+    /// Most levels.
+    pub const LEVELS_MAX: u32 = 64;
+
+    /// # Errors
+    /// A value out of range.
+    pub fn check(&self) -> Result<(), ParameterError> {
+        if !(self.share > 0.0 && self.share < 1.0) {
+            let rule = "it must lie above 0 and below 1, as 0.1 for 10 %";
+            return Err(ParameterError::new("share", format!("is {}; {rule}", self.share)));
+        }
+        if !(1..=Self::TRAJECTORIES_MAX).contains(&self.trajectories) {
+            let rule = format!("it must be 1 to {}", Self::TRAJECTORIES_MAX);
+            return Err(ParameterError::new("trajectories", format!("is {}; {rule}", self.trajectories)));
+        }
+        if !(2..=Self::LEVELS_MAX).contains(&self.levels) || self.levels % 2 == 1 {
+            let rule = format!("it must be even, 2 to {}", Self::LEVELS_MAX);
+            return Err(ParameterError::new("levels", format!("is {}; {rule}", self.levels)));
+        }
+        if self.rovers == Some(0) {
+            return Err(ParameterError::new("rovers", "is 0; it must be 1 or more"));
+        }
+        Ok(())
+    }
 }
 
 /// `[[traverse]]` around the parameters of a run.

@@ -4,6 +4,7 @@
 
 mod machine;
 mod route;
+mod perturb;
 mod rover;
 mod team;
 mod traverse;

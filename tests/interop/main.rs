@@ -252,6 +252,50 @@ fn val_routes_cost_what_scipy_and_scikit_image_find() {
 }
 
 /// Every measured DEM reads as rasterio (or numpy) reads it.
+/// Which number of a rover matters most: mu, mu* and sigma of a release as SALib takes them from its designs.
+#[test]
+fn val_effects_of_rovers_are_those_of_salib() {
+    let Some(python) = python() else { return };
+    let folder = area();
+    write(folder.path(), "study.toml", PERTURBED);
+    let call = sastrugi_in(folder.path(), &["rover", "study.toml", "--perturb", "20%", "-o", "release", "--quiet"]);
+    assert_eq!(call.code, 0, "{}", call.stderr);
+    let call = check(&python, "check_effects.py", &[&folder.path().join("release")]);
+    assert_eq!(call.code, 0, "{}{}", call.stdout, call.stderr);
+}
+
+/// Rovers on two worlds of rocks, perturbed.
+const PERTURBED: &str = r#"
+[study]
+name = "perturbed"
+seed = 5
+date = "2026-01-01"
+
+[[terrain]]
+id = "dense"
+kind = "planetary"
+group = "dense"
+count = 2
+size_m = [16.0, 16.0]
+cell_m = 0.16
+basic_spacing_m = 0.02
+origin_m = [-7.92, -7.92]
+processes = [{ kind = "rocks", coverage = 0.176, diameter_min_m = 0.04, diameter_max_m = 4.0 }]
+
+[[rover]]
+id = "rays"
+kind = "sojourner_like"
+terrains = ["dense"]
+rovers = 3
+radius_m = 4.0
+distance_limit_m = 30.0
+
+[rover.perturb]
+trajectories = 4
+levels = 6
+parameters = ["hazard_step_m", "turn_deg", "rows_m", "clearance_m"]
+"#;
+
 #[test]
 fn val_measured_dems_read_as_rasterio_reads_them() {
     let Some(python) = python() else { return };

@@ -7,6 +7,7 @@
 //! [`mixed_logistic`] (success, with an intercept of the terrain), [`power`] (how many terrains would be needed?), [`multiple`] (several
 //! tests at once). Clusters of many values have [`ratio`] (means and ratios), [`proportion`] and [`incidence`] (shares, and shares by
 //! distance), [`intraclass`] (how alike are they?) and [`prediction`] (where does one more cluster fall?).
+//! [`morris`] ranks the parameters of a model by their elementary effects.
 //!
 //! Values that are not finite are not data: callers drop them first (`sastrugi_numeric::sums::finite`). Nothing here
 //! draws a random number except from the stream it is given, and the bits do not depend on the CPU.
@@ -22,6 +23,7 @@ pub mod equivalence;
 pub mod incidence;
 pub mod intraclass;
 pub mod mixed_logistic;
+pub mod morris;
 pub mod multiple;
 pub mod normal;
 pub mod permutation;

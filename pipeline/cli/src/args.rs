@@ -111,6 +111,15 @@ pub enum Verb {
         sastrugi navigate site.tif --start 12,30 --goal 240,180 --formation wedge --team members=6 --team spacing_m=5 -o team"
     )]
     Navigate(Navigate),
+    /// Drive the rovers of a study, and find out which of their numbers matter most.
+    #[command(
+        after_help = "Runs the [[rover]] tables of a study with the terrains that they need, and nothing else; the release holds that study,\n\
+        and `run` makes the same release of it. With --perturb the numbers of every navigator move along trajectories (elementary\n\
+        effects: Morris, 1991), over worlds, starts and noise that stay. `sastrugi plan` on the released study says what it costs.\n\n\
+        Examples:\n  sastrugi rover fixtures/studies/rover_design.toml -o design\n  \
+        sastrugi rover fixtures/studies/rover_design.toml --perturb 10% --trajectories 4 -o perturbed"
+    )]
+    Rover(Rover),
     /// Take the traversal metrics from MCAP logs of any vehicle: ours, ROS 2 or Foxglove.
     #[command(
         after_help = "Reads Odometry, PoseStamped, TFMessage, Imu (ROS 2, CDR), PoseInFrame, Odometry, FrameTransforms \
@@ -650,6 +659,28 @@ pub struct Navigate {
     /// Where.
     #[command(flatten)]
     pub place: Place,
+}
+
+/// `rover`.
+#[derive(Debug, Args)]
+pub struct Rover {
+    /// Study file.
+    pub study: PathBuf,
+    /// Move every number of the navigators by up to this share of its value, up and down: 10% or 0.1.
+    #[arg(long, value_name = "P", allow_hyphen_values = true)]
+    pub perturb: Option<String>,
+    /// Trajectories of the perturbation; each moves every number once. 10, or what the study says, when absent.
+    #[arg(long, value_name = "N")]
+    pub trajectories: Option<u32>,
+    /// Where.
+    #[command(flatten)]
+    pub place: Place,
+    /// Replace an existing release of these rovers even if it has fewer failed items than the new one.
+    #[arg(long)]
+    pub replace: bool,
+    /// Working memory of the items at once, GiB.
+    #[arg(long, value_name = "GIB", default_value_t = 4.0, allow_negative_numbers = true)]
+    pub memory: f64,
 }
 
 /// `report`.

@@ -80,8 +80,11 @@ pub struct Builder<'a> {
     pub inputs: Vec<InputPlace>,
     /// The items so far.
     pub graph: Graph,
-    ids: BTreeMap<String, &'static str>,
+    ids: BTreeMap<String, Origin>,
 }
+
+/// The table of a study that an id comes from: its section, and its place in it.
+pub type Origin = (&'static str, usize);
 
 /// An input file and its place in the release.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -119,13 +122,18 @@ impl<'a> Builder<'a> {
                 entry.error("id", format!("the id \"{id}\" ends in .{ending}, which names files of the release"))
             );
         }
-        match self.ids.insert(id.to_owned(), section) {
+        match self.ids.insert(id.to_owned(), (section, entry.index())) {
             None => Ok(()),
-            Some(other) => {
+            Some((other, _)) => {
                 let message = format!("the id \"{id}\" is taken by an item of [[{other}]]; ids are unique in a study");
                 Err(entry.error("id", message))
             }
         }
+    }
+
+    /// The table that each claimed id comes from.
+    pub fn origins(&self) -> &BTreeMap<String, Origin> {
+        &self.ids
     }
 
     /// Streams of an item: the study's, or those of its explicit seed.

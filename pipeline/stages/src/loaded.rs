@@ -1,11 +1,12 @@
 //! A study read from its file: checked, with the graph of its items.
 
-use crate::builder::{BuildError, Builder, InputPlace};
+use crate::builder::{BuildError, Builder, InputPlace, Origin};
 use crate::error::{Error, of_build};
 use crate::registry::{self, SECTIONS};
 use crate::runner::graph::Graph;
 use crate::splits::{self, Splits};
 use crate::study::Study;
+use std::collections::BTreeMap;
 use std::fs;
 use std::ops::Range;
 use std::path::Path;
@@ -20,6 +21,8 @@ pub struct Loaded {
     pub released: String,
     /// Which terrains are for training, validation and test.
     pub splits: Splits,
+    /// The table that each id comes from.
+    pub origins: BTreeMap<String, Origin>,
 }
 
 /// Reads a study file.
@@ -27,10 +30,17 @@ pub struct Loaded {
 /// # Errors
 /// A missing file, a wrong study, or a missing input file.
 pub fn load(path: &Path) -> Result<Loaded, Error> {
-    let text = fs::read(path).map_err(|e| Error::Input(format!("{}: {}", path.display(), io_reason(&e))))?;
-    let text = String::from_utf8(text)
-        .map_err(|_| Error::Usage(format!("{}: the study is not UTF-8 text", path.display())))?;
+    let text = read(path)?;
     load_text(&text, &path.display().to_string(), path.parent().unwrap_or(Path::new("")))
+}
+
+/// The text of a study file.
+///
+/// # Errors
+/// A missing file, or one that is not text.
+pub fn read(path: &Path) -> Result<String, Error> {
+    let text = fs::read(path).map_err(|e| Error::Input(format!("{}: {}", path.display(), io_reason(&e))))?;
+    String::from_utf8(text).map_err(|_| Error::Usage(format!("{}: the study is not UTF-8 text", path.display())))
 }
 
 fn io_reason(error: &std::io::Error) -> String {
@@ -52,7 +62,7 @@ pub fn load_text(text: &str, name: &str, folder: &Path) -> Result<Loaded, Error>
         return Err(Error::Usage(format!("{name}: the study has no items; add [[terrain]], [[dem]] ...")));
     }
     let released = released_text(text, &study, &plan);
-    Ok(Loaded { study, graph: plan.graph, released, splits: plan.splits })
+    Ok(Loaded { study, graph: plan.graph, released, splits: plan.splits, origins: plan.origins })
 }
 
 /// The study with its input files at their places in the release; every other byte stays.
@@ -79,6 +89,8 @@ struct Plan {
     inputs: Vec<InputPlace>,
     /// Which terrains are for training, validation and test.
     splits: Splits,
+    /// The table that each id comes from.
+    origins: BTreeMap<String, Origin>,
 }
 
 /// Builds the graph of a study. Input files are hashed, nothing else is read.
@@ -91,5 +103,6 @@ fn build(study: &Study) -> Result<Plan, BuildError> {
         (section.add)(&mut builder)?;
     }
     let splits = splits::draw(study, &builder.heightfields, &builder.graph)?;
-    Ok(Plan { graph: builder.graph, inputs: builder.inputs, splits })
+    let origins = builder.origins().clone();
+    Ok(Plan { graph: builder.graph, inputs: builder.inputs, splits, origins })
 }

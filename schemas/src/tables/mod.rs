@@ -20,6 +20,8 @@ pub mod psd;
 pub mod replicates;
 pub mod route_points;
 pub mod routes;
+pub mod rover_designs;
+pub mod rover_effects;
 pub mod rover_samples;
 pub mod rovers;
 pub mod samples;
@@ -46,6 +48,8 @@ pub use psd::PsdRow;
 pub use replicates::ReplicateRow;
 pub use route_points::RoutePointRow;
 pub use routes::RouteRow;
+pub use rover_designs::RoverDesignRow;
+pub use rover_effects::RoverEffectRow;
 pub use rover_samples::RoverSampleRow;
 pub use rovers::RoverRow;
 pub use samples::SampleRow;
@@ -118,7 +122,7 @@ impl Table {
 }
 
 /// All tables, in the order of the report and of `schema`.
-pub const ALL: [&Table; 26] = [
+pub const ALL: [&Table; 28] = [
     &TerrainRow::TABLE,
     &SurfaceRow::TABLE,
     &FitRow::TABLE,
@@ -143,6 +147,8 @@ pub const ALL: [&Table; 26] = [
     &FormationEventRow::TABLE,
     &RoverRow::TABLE,
     &RoverSampleRow::TABLE,
+    &RoverDesignRow::TABLE,
+    &RoverEffectRow::TABLE,
     &LogRow::TABLE,
     &DemFitRow::TABLE,
 ];

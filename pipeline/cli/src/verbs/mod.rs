@@ -8,6 +8,7 @@ mod fits;
 mod generate;
 mod lists;
 mod navigate;
+mod rover;
 mod shown;
 mod study;
 
@@ -33,6 +34,7 @@ pub fn dispatch(arguments: &Arguments) -> Verdict {
         Verb::Pack(args) => study::pack(args, common),
         Verb::Traverse(args) => study::traverse(args, common),
         Verb::Navigate(args) => navigate::navigate(args, common),
+        Verb::Rover(args) => rover::rover(args, common),
         Verb::Terrain(args) => generate::terrain(args, common),
         Verb::Fit(args) => generate::fit(args, common),
         Verb::Coregister(args) => coregister::coregister(args, common),

@@ -64,6 +64,21 @@ pub fn traverse(args: &Traverse, common: &Common) -> Verdict {
 
 /// Runs, says what it came to, and gives the exit code.
 pub(super) fn finish_run(common: &Common, run: impl FnOnce(&Teller) -> Result<RunSummary, Failure>) -> Verdict {
+    let (summary, text) = watch(common, run)?;
+    print(common.json, &serde_json::to_value(&summary).map_err(Failure::failed)?, &text)?;
+    Ok(code(&summary))
+}
+
+/// The exit code of a run.
+pub(super) fn code(summary: &RunSummary) -> Code {
+    if summary.failures.is_empty() { Code::Done } else { Code::Partial }
+}
+
+/// Runs under the eyes of whoever waits, and says what it came to.
+pub(super) fn watch(
+    common: &Common,
+    run: impl FnOnce(&Teller) -> Result<RunSummary, Failure>,
+) -> Result<(RunSummary, String), Failure> {
     let teller = Teller::new(common.quiet);
     let start = Instant::now();
     let summary = run(&teller);
@@ -81,8 +96,7 @@ pub(super) fn finish_run(common: &Common, run: impl FnOnce(&Teller) -> Result<Ru
         text.push_str("\nfailed items are listed with their parameters in manifest.json:");
         summary.failures.iter().for_each(|f| text.push_str(&format!("\n  {}: {}", f.item, f.message)));
     }
-    print(common.json, &serde_json::to_value(&summary).map_err(Failure::failed)?, &text)?;
-    Ok(if failed > 0 { Code::Partial } else { Code::Done })
+    Ok((summary, text))
 }
 
 /// `plan`.

@@ -1,5 +1,6 @@
 //! Stage `rover`: rovers that find their own way on each terrain.
 
+use super::rover_designs;
 use crate::builder::{BuildError, Builder, HEIGHTS, Heightfield, common};
 use crate::job::{Estimate, ItemRef, Job, JobError, Outcome, Work};
 use crate::operations::rovers::{self, Grounds, Oracle};
@@ -105,6 +106,7 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
             entry.check_keys::<RoverItem>(&one.params, &schema)?;
             builder.claim(&entry, STAGE, &one.id)?;
             let (navigator, parameters) = prepare(&envelope.kind, &one.params).map_err(|e| entry.refuse(e))?;
+            rover_designs::add(builder, &entry, &envelope, &one, &terrains)?;
             let trial = Arc::new(Trial { id: one.id, variant: one.sweep, navigator, parameters, sample_m });
             terrains.iter().try_for_each(|terrain| add_one(builder, &entry, &envelope, &trial, terrain))?;
         }
@@ -138,14 +140,26 @@ fn add_one(
 ) -> Result<(), StudyError> {
     let Some(field) = builder.heightfields.get(terrain).cloned() else { return Ok(()) };
     Grounds::check(&field, &trial.parameters).map_err(|e| entry.refuse(e))?;
-    let shared = field.replicate.filter(|_| builder.is_paired() && field.geometry.is_some());
-    let word = shared.map_or_else(|| terrain.to_owned(), common);
-    // Named by the table, not by the swept part, so that every value of a sweep has the same starts and noise.
-    let streams = builder.streams(STAGE, &format!("{}@{word}", envelope.id), envelope.seed, shared.unwrap_or(0));
+    let streams = streams(builder, envelope, terrain, &field);
     let item = ItemRef::new(STAGE, &format!("{}@{terrain}", trial.id));
     let (parents, stream) = (vec![field.item.clone()], Some(streams.label()));
     let job = RoverJob { trial: Arc::clone(trial), terrain: terrain.to_owned(), field, streams };
     builder.node(Node { item, parents, inputs: Vec::new(), stream, job: Box::new(job) })
+}
+
+/// Streams of starts and noise on a terrain. Named by the table, not by the swept part, so that every value of a sweep and every perturbed
+/// design has the same ones.
+pub fn streams(builder: &Builder<'_>, envelope: &RoverItem, terrain: &str, field: &Heightfield) -> Streams {
+    let shared = field.replicate.filter(|_| builder.is_paired() && field.geometry.is_some());
+    let word = shared.map_or_else(|| terrain.to_owned(), common);
+    builder.streams(STAGE, &format!("{}@{word}", envelope.id), envelope.seed, shared.unwrap_or(0))
+}
+
+/// Rough cost of the rovers of a trial on one terrain.
+pub fn estimate(parameters: &RoverParameters) -> Estimate {
+    // A way twice as long as the straight one, 10 cycles a metre.
+    let cycles = 20.0 * parameters.straight_m() * f64::from(parameters.rovers);
+    Estimate { seconds: SECONDS_PER_CYCLE * cycles, bytes: 40.0 * cycles / 10.0 }
 }
 
 /// One rover: its row and its samples.
@@ -253,10 +267,7 @@ impl Job for RoverJob {
     }
 
     fn estimate(&self) -> Estimate {
-        let parameters = &self.trial.parameters;
-        // A way twice as long as the straight one, 10 cycles a metre.
-        let cycles = 20.0 * parameters.straight_m() * f64::from(parameters.rovers);
-        Estimate { seconds: SECONDS_PER_CYCLE * cycles, bytes: 40.0 * cycles / 10.0 }
+        estimate(&self.trial.parameters)
     }
 
     fn run(&self, work: &Work<'_>) -> Result<Outcome, JobError> {

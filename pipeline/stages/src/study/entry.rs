@@ -43,6 +43,11 @@ impl<'a> Entry<'a> {
         Self { section, index, table, text }
     }
 
+    /// Its place among the tables of its section, from 0.
+    pub fn index(&self) -> usize {
+        self.index
+    }
+
     /// Takes the envelope and the kernel's parameters apart.
     ///
     /// # Errors

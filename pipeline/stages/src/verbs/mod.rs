@@ -12,6 +12,7 @@ pub mod parameters;
 mod reading;
 pub mod releases;
 pub mod roughness;
+pub mod rover;
 pub mod terrain;
 pub mod texture;
 pub mod traverse;

@@ -1,0 +1,131 @@
+//! `rover`.
+
+use super::study::{code, limits, watch};
+use crate::Verdict;
+use crate::args::{Common, Place, Rover};
+use crate::failure::Failure;
+use crate::output::{columns, print, significant};
+use sastrugi_schemas::tables::RoverEffectRow;
+use sastrugi_stages::studies::{self, RunRequest};
+use sastrugi_stages::verbs::rover::{Estimated, PURPOSE, Request, Summary, load, share, summary};
+use std::collections::BTreeMap;
+
+/// Most parameters of a ranking for people.
+const RANKED: usize = 10;
+
+/// Drives the rovers of a study.
+pub fn rover(args: &Rover, common: &Common) -> Verdict {
+    let share = args.perturb.as_deref().map(share).transpose()?;
+    let limits = limits(args.memory)?;
+    let loaded = load(&args.study, &Request { share, trajectories: args.trajectories })?;
+    let Place { output, work } = &args.place;
+    let (work, replace) = (work.as_deref(), args.replace);
+    let request = RunRequest { output, work, part: None, purpose: Some(PURPOSE), replace, limits };
+    let (run, mut text) = watch(common, |teller| Ok(studies::run(&loaded, &request, teller)?))?;
+    let summary = summary(&run.output)?;
+    text.push_str("\n\n");
+    text.push_str(&trials(&summary));
+    for ranking in rankings(&summary.ranking) {
+        text.push_str("\n\n");
+        text.push_str(&ranking);
+    }
+    let mut json = serde_json::to_value(&run).map_err(Failure::failed)?;
+    json["trials"] = serde_json::to_value(&summary.trials).map_err(Failure::failed)?;
+    json["effects"] = summary.effects.into();
+    print(common.json, &json, &text)?;
+    Ok(code(&run))
+}
+
+/// One line for each trial.
+fn trials(summary: &Summary) -> String {
+    let heads = [
+        "stage",
+        "terrains",
+        "variant",
+        "rovers",
+        "worlds",
+        "arrived",
+        "(95 %)",
+        "mean e",
+        "(95 %)",
+        "d0/mean d",
+        "at limit",
+    ];
+    let mut rows = vec![heads.map(str::to_owned).to_vec()];
+    for trial in &summary.trials {
+        let or_dash = |text: &Option<String>| text.clone().unwrap_or_else(|| "-".to_owned());
+        rows.push(vec![
+            trial.stage_id.clone(),
+            or_dash(&trial.group),
+            or_dash(&trial.variant),
+            trial.rovers.to_string(),
+            trial.worlds.to_string(),
+            format!("{:.3}", trial.arrival.estimate),
+            range(&trial.arrival),
+            format!("{:.3}", trial.efficiency.estimate),
+            range(&trial.efficiency),
+            format!("{:.3}", trial.straight_over_mean_distance),
+            trial.at_limit.to_string(),
+        ]);
+    }
+    let note = "Intervals count worlds, not rovers. Distances of rovers at a limit are censored: d0/mean d depends on the limit.";
+    format!("{}\n{note}", columns(&rows))
+}
+
+fn range(of: &Estimated) -> String {
+    if of.low.is_nan() { "-".to_owned() } else { format!("{:.3} to {:.3}", of.low, of.high) }
+}
+
+/// One table for each stage and group: effects on efficiency and arrival of one share of each parameter.
+fn rankings(rows: &[RoverEffectRow]) -> Vec<String> {
+    let mut groups: BTreeMap<_, Vec<&RoverEffectRow>> = BTreeMap::new();
+    rows.iter().for_each(|row| groups.entry((&row.stage_id, &row.group, &row.variant)).or_default().push(row));
+    groups.values().map(|rows| ranking(rows)).collect()
+}
+
+fn ranking(rows: &[&RoverEffectRow]) -> String {
+    let of = |measure: &str| rows.iter().filter(|row| row.measure == measure).copied().collect::<Vec<_>>();
+    let (efficiency, arrival) = (of("efficiency"), of("arrival"));
+    let heads = ["  parameter", "value", "e: mu*", "(95 %)", "mu", "sigma", "noise", "arrival: mu*", "(95 %)", "mu"];
+    let mut lines = vec![heads.map(str::to_owned).to_vec()];
+    for row in efficiency.iter().take(RANKED) {
+        let Some(arrives) = arrival.iter().find(|other| other.parameter == row.parameter) else { continue };
+        let per = |value: f64| if value.is_nan() { "-".to_owned() } else { format!("{:.4}", value * row.share) };
+        let star = |row: &RoverEffectRow| match row.mu_star_low.is_nan() {
+            true => "-".to_owned(),
+            false => format!("{} to {}", per(row.mu_star_low), per(row.mu_star_high)),
+        };
+        lines.push(vec![
+            format!("  {}", row.parameter),
+            base(row),
+            per(row.mu_star),
+            star(row),
+            per(row.mu),
+            per(row.sigma),
+            per(row.mu_star_noise),
+            per(arrives.mu_star),
+            star(arrives),
+            per(arrives.mu),
+        ]);
+    }
+    let Some(first) = efficiency.first() else { return String::new() };
+    let more = efficiency.len().saturating_sub(RANKED);
+    let rest = if more > 0 { format!("\n  and {more} with smaller effects (all with --json)") } else { String::new() };
+    format!(
+        "{}: change for {} % of each parameter, {} trajectories, {} worlds, {} rovers each\n{}{rest}",
+        [&first.stage_id, &first.group, &first.variant].map(String::as_str).join(" ").trim_end(),
+        significant(100.0 * first.share).trim_end_matches('0').trim_end_matches('.'),
+        first.trajectories,
+        first.worlds,
+        first.rovers,
+        columns(&lines)
+    )
+}
+
+fn base(row: &RoverEffectRow) -> String {
+    match (row.base.is_nan(), row.unit.as_str()) {
+        (true, _) => "list".to_owned(),
+        (false, "1") => row.base.to_string(),
+        (false, unit) => format!("{} {unit}", row.base),
+    }
+}
