@@ -12,7 +12,9 @@
 //!
 //! so that `S + sum F_k = 1`. One minus the Kaplan-Meier curve of a single way would count what ended otherwise as still able
 //! to end so, and is too high. At equal distances endings come before censorings. Endings at an unknown distance are left
-//! out. Cost: one sort.
+//! out. Cost: one sort. Subjects that come in clusters: [`clustered`].
+
+pub mod clustered;
 
 /// How one subject ended.
 #[derive(Clone, Copy, Debug, PartialEq)]

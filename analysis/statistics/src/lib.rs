@@ -5,7 +5,9 @@
 //! [`permutation`] (do two groups differ?), [`trend`] (do ordered groups rise or fall?), [`effect`] (by how much?),
 //! [`difference`] (all of these at once), [`equivalence`] (by less than a margin?), [`conformal`] (is one more drive like these?),
 //! [`mixed_logistic`] (success, with an intercept of the terrain), [`power`] (how many terrains would be needed?), [`multiple`] (several
-//! tests at once). [`morris`] ranks the parameters of a model by their elementary effects.
+//! tests at once). Clusters of many values have [`ratio`] (means and ratios), [`proportion`] and [`incidence`] (shares, and shares by
+//! distance), [`intraclass`] (how alike are they?) and [`prediction`] (where does one more cluster fall?).
+//! [`morris`] ranks the parameters of a model by their elementary effects.
 //!
 //! Values that are not finite are not data: callers drop them first (`sastrugi_numeric::sums::finite`). Nothing here
 //! draws a random number except from the stream it is given, and the bits do not depend on the CPU.
@@ -19,14 +21,17 @@ pub mod difference;
 pub mod effect;
 pub mod equivalence;
 pub mod incidence;
+pub mod intraclass;
 pub mod mixed_logistic;
 pub mod morris;
 pub mod multiple;
 pub mod normal;
 pub mod permutation;
 pub mod power;
+pub mod prediction;
 pub mod proportion;
 mod rank_distribution;
+pub mod ratio;
 pub mod student;
 pub mod summary;
 pub mod trend;
@@ -38,6 +43,7 @@ pub use difference::Difference;
 pub use effect::Effect;
 pub use equivalence::MeanDifference;
 pub use incidence::{Ending, Incidence};
+pub use intraclass::Intraclass;
 pub use multiple::holm;
 pub use permutation::{Arrangements, Permutation};
 pub use summary::BoxPlot;
