@@ -2,6 +2,7 @@
 //!
 //! * [`photometry`] tells how bright a facet is under a light and a view, [`direction`] where these are, [`camera`] which pixel a
 //!   point of the ground falls on.
+//! * [`photoclinometry`] finds heights and albedo from three or more images.
 //!
 //! # Conventions
 //! Vectors are `[east, north, up]`. Slopes are `p = dz/dx` (east) and `q = dz/dy` (north), and the unit normal of a facet is
@@ -10,6 +11,7 @@
 
 pub mod camera;
 pub mod direction;
+pub mod photoclinometry;
 pub mod photometry;
 
 pub use camera::{Camera, ParallelCamera, PinholeCamera, Ray};
