@@ -3,6 +3,7 @@
 //! * [`photometry`] tells how bright a facet is under a light and a view, [`direction`] where these are, [`camera`] which pixel a
 //!   point of the ground falls on.
 //! * [`photoclinometry`] finds heights and albedo from three or more images.
+//! * [`sun`] and [`pose`] are the light and the camera as a study says them, [`description`] is the file beside an image.
 //!
 //! # Conventions
 //! Vectors are `[east, north, up]`. Slopes are `p = dz/dx` (east) and `q = dz/dy` (north), and the unit normal of a facet is
@@ -10,10 +11,16 @@
 //! Brightness is that of a surface over that of a white Lambert surface which faces the light (radiance factor, I/F).
 
 pub mod camera;
+pub mod description;
 pub mod direction;
 pub mod photoclinometry;
 pub mod photometry;
+pub mod pose;
+pub mod sun;
 
 pub use camera::{Camera, ParallelCamera, PinholeCamera, Ray};
+pub use description::{ImageDescription, Noise, Rendered};
 pub use direction::direction;
 pub use photometry::Photometry;
+pub use pose::{CameraParameters, CameraPose};
+pub use sun::Sun;

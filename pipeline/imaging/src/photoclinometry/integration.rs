@@ -195,6 +195,23 @@ impl System {
         out
     }
 
+    /// The same with every slope taken as it is at the edges of its cell (second order).
+    #[cfg(test)]
+    pub(super) fn uncorrected(&self, slopes: &[[f64; 2]], heights_m: &[f64]) -> Vec<f64> {
+        let mut out = self.divergence(|r, c| {
+            let [p, q] = slopes[r * self.geometry.cols + c];
+            [p, p, q, q]
+        });
+        self.constraints.iter().zip(heights_m).for_each(|(c, h)| c.spread(*h, &mut out));
+        out
+    }
+
+    /// Information of every cell with its floor.
+    #[cfg(test)]
+    pub(super) fn weights(&self) -> &[[f64; 3]] {
+        &self.information
+    }
+
     /// Heights that the constraints ask for.
     pub fn constraint_heights(&self) -> Vec<f64> {
         self.constraints.iter().map(|c| c.height_m).collect()

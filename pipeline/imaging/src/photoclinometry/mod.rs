@@ -36,6 +36,9 @@ mod recover;
 pub mod stereo;
 pub mod uncertainty;
 
+#[cfg(test)]
+mod tests;
+
 
 pub use cosine::CosinePoisson;
 pub use integration::{Constraint, HeightPoint};

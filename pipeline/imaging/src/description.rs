@@ -1,0 +1,151 @@
+//! What stands in the JSON file beside an image: everything that is needed to take heights from it.
+
+use crate::photometry::Photometry;
+use crate::pose::CameraPose;
+use crate::sun::Sun;
+use sastrugi_schemas::{ParameterError, shown};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Noise of a camera: a pixel of brightness `I` gets the standard deviation `sqrt(absolute^2 + (relative I)^2)`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Noise {
+    /// Part that goes with the brightness.
+    pub relative: f64,
+    /// Part that does not, in units of the image (I/F).
+    pub absolute: f64,
+}
+
+impl Noise {
+    /// # Errors
+    /// A part below 0.
+    pub fn check(&self) -> Result<(), ParameterError> {
+        ParameterError::not_negative("relative", self.relative)?;
+        ParameterError::not_negative("absolute", self.absolute).map(|_| ())
+    }
+
+    /// Standard deviation at a brightness.
+    #[inline]
+    pub fn deviation(&self, brightness: f64) -> f64 {
+        let relative = self.relative * brightness;
+        (self.absolute * self.absolute + relative * relative).sqrt()
+    }
+
+    /// True for a camera without noise.
+    pub fn is_none(&self) -> bool {
+        self.relative == 0.0 && self.absolute == 0.0
+    }
+}
+
+/// The file beside an image, `<image>.json`. Pixels hold `exposure * I + haze` and noise, with `I` the brightness of the ground
+/// ([`Photometry`]).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ImageDescription {
+    /// File of the image, in the folder of this one.
+    pub image: String,
+    /// Sun.
+    #[serde(default)]
+    pub sun: Sun,
+    /// Camera, in the coordinates of the surface.
+    pub camera: CameraPose,
+    /// How a facet reflects.
+    #[serde(default)]
+    pub photometry: Photometry,
+    /// Factor on the brightness.
+    #[serde(default = "one")]
+    pub exposure: f64,
+    /// Brightness that is added everywhere (I/F).
+    #[serde(default)]
+    pub haze: f64,
+    /// Noise that was added.
+    #[serde(default)]
+    pub noise: Noise,
+    /// Of an image that was rendered: from what.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rendered: Option<Rendered>,
+}
+
+/// What an image was rendered from.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Rendered {
+    /// Id or file of the surface.
+    pub surface: String,
+    /// Rows and columns of the surface.
+    pub surface_shape: [usize; 2],
+    /// Its cell size east-west and north-south, m.
+    pub surface_cell_m: [f64; 2],
+    /// Id or file of the albedo map; absent where the ground has one albedo.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub albedo_map: Option<String>,
+    /// Albedo where no map has one.
+    pub albedo: f64,
+    /// Rays along a side of a pixel.
+    pub samples: u32,
+    /// True with cast shadows.
+    pub shadows: bool,
+    /// Words of the random stream of the noise; absent without noise.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub noise_stream: Option<String>,
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+impl ImageDescription {
+    /// Refuses what no image can have.
+    ///
+    /// # Errors
+    /// The first number that is out of range.
+    pub fn check(&self) -> Result<(), ParameterError> {
+        self.sun.check().map_err(|e| e.within("sun"))?;
+        self.camera.check().map_err(|e| e.within("camera"))?;
+        self.photometry.check().map_err(|e| e.within("photometry"))?;
+        self.noise.check().map_err(|e| e.within("noise"))?;
+        check_radiometry(self.exposure, self.haze)
+    }
+}
+
+/// Refuses exposures and haze that are out of range.
+pub(crate) fn check_radiometry(exposure: f64, haze: f64) -> Result<(), ParameterError> {
+    ParameterError::positive("exposure", exposure)?;
+    if haze.is_finite() {
+        Ok(())
+    } else {
+        Err(ParameterError::new("haze", format!("is {}; it must be finite", shown(haze))))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    /// A file of someone else's image needs the image, its sun and its camera.
+    #[test]
+    fn val_a_short_description_is_enough() {
+        let camera = json!({ "kind": "parallel", "azimuth_deg": 0.0, "elevation_deg": 90.0, "centre_m": [5.0, 5.0, 0.0],
+            "pixel_m": 1.0, "rows": 10, "cols": 10 });
+        let text =
+            json!({ "image": "a.tif", "sun": { "azimuth_deg": 120.0, "elevation_deg": 45.0 }, "camera": camera });
+        let description: ImageDescription = serde_json::from_value(text).unwrap();
+        assert_eq!((description.exposure, description.haze, description.noise.is_none()), (1.0, 0.0, true));
+        assert_eq!(description.check(), Ok(()));
+        let key = |d: ImageDescription| d.check().err().map(|e| e.key).unwrap_or_default();
+        let night = Sun { azimuth_deg: 0.0, elevation_deg: -3.0 };
+        assert_eq!(key(ImageDescription { sun: night, ..description.clone() }), "sun.elevation_deg");
+        assert_eq!(key(ImageDescription { exposure: 0.0, ..description.clone() }), "exposure");
+        assert_eq!(key(ImageDescription { haze: f64::NAN, ..description.clone() }), "haze");
+        let noise = Noise { relative: -0.1, absolute: 0.0 };
+        assert_eq!(key(ImageDescription { noise, ..description }), "noise.relative");
+    }
+
+    #[test]
+    fn val_noise_has_two_parts() {
+        let noise = Noise { relative: 0.03, absolute: 0.04 };
+        assert!((noise.deviation(1.0) - 0.05).abs() < 1e-15 && (noise.deviation(0.0) - 0.04).abs() < 1e-15);
+    }
+}

@@ -1,0 +1,71 @@
+//! Where the sun stands.
+
+use crate::direction::{Vector, direction};
+use sastrugi_schemas::{ParameterError, shown};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Azimuths of a light may be written as -360 to 720 degrees.
+const AZIMUTHS_DEG: [f64; 2] = [-360.0, 720.0];
+
+/// A sun so far away that its rays are parallel.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Sun {
+    /// Azimuth that the light comes from, clockwise from north, deg.
+    pub azimuth_deg: f64,
+    /// Elevation above the horizon, above 0 to 90 deg.
+    pub elevation_deg: f64,
+}
+
+impl Default for Sun {
+    /// In the north-west, as relief on maps is lit.
+    fn default() -> Self {
+        Self { azimuth_deg: 315.0, elevation_deg: 45.0 }
+    }
+}
+
+impl Sun {
+    /// # Errors
+    /// An azimuth that is not an angle, or a sun that is not above the horizon.
+    pub fn check(&self) -> Result<(), ParameterError> {
+        check_direction(self.azimuth_deg, self.elevation_deg)
+    }
+
+    /// Unit vector towards it.
+    pub fn direction(&self) -> Vector {
+        direction(self.azimuth_deg, self.elevation_deg)
+    }
+}
+
+/// Refuses directions that are not above the horizon.
+pub(crate) fn check_direction(azimuth_deg: f64, elevation_deg: f64) -> Result<(), ParameterError> {
+    let [low, high] = AZIMUTHS_DEG;
+    if !(low..=high).contains(&azimuth_deg) {
+        let message = format!("is {}; it must lie between {low} and {high} deg", shown(azimuth_deg));
+        return Err(ParameterError::new("azimuth_deg", message));
+    }
+    if !(elevation_deg > 0.0 && elevation_deg <= 90.0) {
+        let message = format!("is {}; it must be above 0 and at most 90 deg", shown(elevation_deg));
+        return Err(ParameterError::new("elevation_deg", message));
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn val_a_sun_that_is_not_above_the_horizon_is_refused() {
+        let key = |azimuth_deg, elevation_deg| Sun { azimuth_deg, elevation_deg }.check().err().map(|e| e.key);
+        assert_eq!(Sun::default().check(), Ok(()));
+        assert_eq!((key(0.0, 90.0), key(-90.0, 0.1)), (None, None));
+        for elevation_deg in [0.0, -5.0, 90.1, f64::NAN] {
+            assert_eq!(key(0.0, elevation_deg).as_deref(), Some("elevation_deg"));
+        }
+        for azimuth_deg in [f64::NAN, f64::INFINITY, 1e3] {
+            assert_eq!(key(azimuth_deg, 10.0).as_deref(), Some("azimuth_deg"));
+        }
+    }
+}
