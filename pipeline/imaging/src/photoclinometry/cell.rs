@@ -140,8 +140,7 @@ impl Problem<'_> {
         self.samples
             .iter()
             .map(|s| {
-                let residual =
-                    (s.brightness - albedo * self.photometry.of_slopes([p, q], s.light, s.view)) / s.sigma;
+                let residual = (s.brightness - albedo * self.photometry.of_slopes([p, q], s.light, s.view)) / s.sigma;
                 residual * residual
             })
             .sum()

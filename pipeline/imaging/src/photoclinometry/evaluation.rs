@@ -66,7 +66,8 @@ pub fn shaded(heights: &Grid, photometry: &Photometry, light: Vector, view: Vect
     let relief = Relief { geometry: &heights.geometry, heights_m: &heights.values };
     let one = |k: usize| {
         let [west, east, south, north] = relief.edges(k);
-        let pairs = [west, east].into_iter().flatten().flat_map(|p| [south, north].into_iter().flatten().map(move |q| [p, q]));
+        let pairs =
+            [west, east].into_iter().flatten().flat_map(|p| [south, north].into_iter().flatten().map(move |q| [p, q]));
         let (sum, count) = pairs.fold((0.0, 0), |(sum, count), slopes: [f64; 2]| {
             let known = slopes[0].is_finite() && slopes[1].is_finite();
             (sum + if known { photometry.of_slopes(slopes, light, view) } else { f64::NAN }, count + 1)
@@ -88,7 +89,9 @@ pub fn aligned(truth: &Grid, map: &Geometry) -> (Grid, usize) {
         origin: map.origin,
     };
     let at = |k: usize| {
-        let nudge = |v: f64, low: f64, high: f64| if (v - v.clamp(low, high)).abs() < 1e-9 * (high - low) { v.clamp(low, high) } else { v };
+        let nudge = |v: f64, low: f64, high: f64| {
+            if (v - v.clamp(low, high)).abs() < 1e-9 * (high - low) { v.clamp(low, high) } else { v }
+        };
         let t = &truth.geometry;
         let x = nudge(g.x(k % g.cols), t.x(0), t.x(t.cols - 1));
         let y = nudge(g.y(k / g.cols), t.y(t.rows - 1), t.y(0));
@@ -114,7 +117,11 @@ pub fn evaluate(
     let true_slopes = fine_slopes.map(|values| block_means(&Grid::new(fine.geometry, values), finer).values);
     let [result_slopes, ceiling_slopes] = [recovered, &coarse].map(slopes);
     let cells: Vec<usize> = (0..recovered.values.len())
-        .filter(|&k| shaded_result.values[k].is_finite() && reference.values[k].is_finite() && shaded_ceiling.values[k].is_finite())
+        .filter(|&k| {
+            shaded_result.values[k].is_finite()
+                && reference.values[k].is_finite()
+                && shaded_ceiling.values[k].is_finite()
+        })
         .filter(|&k| (0..2).all(|a| true_slopes[a][k].is_finite()))
         .collect();
     if cells.len() < 16 {
@@ -125,9 +132,8 @@ pub fn evaluate(
         correlation_of(&pairs)
     };
     let rms = |f: &dyn Fn(usize) -> f64| sums::mean(&cells.iter().map(|&k| f(k)).collect::<Vec<_>>()).sqrt();
-    let slope_error = |of: &[Vec<f64>; 2]| {
-        rms(&|k| (0..2).map(|a| of[a][k] - true_slopes[a][k]).map(|e| e * e).sum::<f64>())
-    };
+    let slope_error =
+        |of: &[Vec<f64>; 2]| rms(&|k| (0..2).map(|a| of[a][k] - true_slopes[a][k]).map(|e| e * e).sum::<f64>());
     let errors: Vec<f64> = cells.iter().map(|&k| recovered.values[k] - coarse.values[k]).collect();
     let truths: Vec<f64> = cells.iter().map(|&k| coarse.values[k]).collect();
     Some(Evaluation {

@@ -15,8 +15,8 @@
 //! a checkerboard differ over every edge, so the sum sees it; central differences would not. With independent slopes the matrix is the
 //! five-point one; their covariance adds the corners. At borders the missing edge of a quadrant is marginalised.
 //!
-//! Moving slopes to an edge adds `-1/24` of their second differences along it where four good cells lie in line: the mean slope over the edge is
-//! then right to fourth order for slopes of heights that are area means.
+//! Moving slopes to an edge adds `-1/24` of their second differences on both sides along it, or `-1/12` of the one that there is at borders and
+//! holes: the mean slope over the edge is then right to fourth (third) order for slopes of heights that are area means.
 //!
 //! # Solution
 //! Conjugate gradients; the preconditioner is the equation with constant weights, solved by cosine transforms, scaled by the root of the ratio of
@@ -184,7 +184,9 @@ impl System {
         let g = &self.geometry;
         let mut out = self.divergence(|r, c| {
             let [p, q] = slopes[r * g.cols + c];
-            let along_x = |west: Option<usize>| p + west.map_or(0.0, |w| self.correction(slopes, 0, r * g.cols + w, w, g.cols, 1));
+            let along_x = |west: Option<usize>| {
+                p + west.map_or(0.0, |w| self.correction(slopes, 0, r * g.cols + w, w, g.cols, 1))
+            };
             // Rows run south, y north: the correction is symmetric.
             let along_y = |north: Option<usize>| {
                 q + north.map_or(0.0, |n| self.correction(slopes, 1, n * g.cols + c, n, g.rows, g.cols))
@@ -322,15 +324,19 @@ impl System {
     /// What is added to the mean of two slopes for the mean slope between them: the cell at index `first` is number `at` of `len` along the
     /// axis, its neighbours `pitch` apart.
     fn correction(&self, slopes: &[[f64; 2]], axis: usize, first: usize, at: usize, len: usize, pitch: usize) -> f64 {
-        if at < 1 || at + 2 >= len {
+        if at + 1 >= len || !self.good[first] || !self.good[first + pitch] {
             return 0.0;
         }
-        let line = [first - pitch, first, first + pitch, first + 2 * pitch];
-        if !line.iter().all(|&k| self.good[k]) {
-            return 0.0;
+        let slope = |k: usize| slopes[k][axis];
+        let (b, c) = (slope(first), slope(first + pitch));
+        let before = (at >= 1 && self.good[first - pitch]).then(|| slope(first - pitch));
+        let after = (at + 2 < len && self.good[first + 2 * pitch]).then(|| slope(first + 2 * pitch));
+        match (before, after) {
+            (Some(a), Some(d)) => -(a - b - c + d) / 24.0,
+            (Some(a), None) => -(a - 2.0 * b + c) / 12.0,
+            (None, Some(d)) => -(b - 2.0 * c + d) / 12.0,
+            (None, None) => 0.0,
         }
-        let [a, b, c, d] = line.map(|k| slopes[k][axis]);
-        -(a - b - c + d) / 24.0
     }
 }
 
@@ -387,11 +393,8 @@ fn scales(g: &Geometry, information: &[[f64; 3]], [weight_x, weight_y]: [f64; 2]
 
 /// Scalar product in blocks, whatever the number of threads.
 pub(super) fn ordered_dot(a: &[f64], b: &[f64]) -> f64 {
-    let parts: Vec<f64> = a
-        .par_chunks(BLOCK)
-        .zip(b.par_chunks(BLOCK))
-        .map(|(a, b)| a.iter().zip(b).map(|(x, y)| x * y).sum())
-        .collect();
+    let parts: Vec<f64> =
+        a.par_chunks(BLOCK).zip(b.par_chunks(BLOCK)).map(|(a, b)| a.iter().zip(b).map(|(x, y)| x * y).sum()).collect();
     sums::sum(&parts)
 }
 

@@ -39,9 +39,8 @@ pub mod uncertainty;
 #[cfg(test)]
 mod tests;
 
-
 pub use cosine::CosinePoisson;
 pub use integration::{Constraint, HeightPoint};
 pub use observation::{Calibration, Image, Observed, Relief};
-pub use params::{Integration, Noise, Settings, Stereo};
+pub use params::{Integration, Settings, Stereo};
 pub use recover::{Coarse, Known, RecoverError, Recovered, Round, recover};

@@ -29,17 +29,20 @@ impl Symmetric3 {
     /// `D M D` for a diagonal matrix `D`.
     pub fn scaled(self, d: Vector) -> Self {
         let [xx, xy, xz, yy, yz, zz] = self.0;
-        Self([xx * d[0] * d[0], xy * d[0] * d[1], xz * d[0] * d[2], yy * d[1] * d[1], yz * d[1] * d[2], zz * d[2] * d[2]])
+        Self([
+            xx * d[0] * d[0],
+            xy * d[0] * d[1],
+            xz * d[0] * d[2],
+            yy * d[1] * d[1],
+            yz * d[1] * d[2],
+            zz * d[2] * d[2],
+        ])
     }
 
     /// Product with a vector.
     pub fn times(&self, v: Vector) -> Vector {
         let [xx, xy, xz, yy, yz, zz] = self.0;
-        [
-            xx * v[0] + xy * v[1] + xz * v[2],
-            xy * v[0] + yy * v[1] + yz * v[2],
-            xz * v[0] + yz * v[1] + zz * v[2],
-        ]
+        [xx * v[0] + xy * v[1] + xz * v[2], xy * v[0] + yy * v[1] + yz * v[2], xz * v[0] + yz * v[1] + zz * v[2]]
     }
 
     /// Inverse by cofactors; `None` where the matrix is not positive definite.

@@ -1,8 +1,8 @@
 //! Images, and the brightness of each map cell in them at the heights known so far.
 
 use super::cell::Sample;
-use super::params::Noise;
 use crate::camera::Camera;
+use crate::description::Noise;
 use crate::direction::Vector;
 use rayon::prelude::*;
 use sastrugi_numeric::{Geometry, sums};
@@ -132,7 +132,8 @@ fn one_cell(image: &Image, relief: Relief, k: usize) -> (f64, f32) {
     };
     let across = [east[0] - west[0], east[1] - west[1]];
     let up = [north[0] - south[0], north[1] - south[1]];
-    let count = |v: [f64; 2]| ((v[0] * v[0] + v[1] * v[1]).sqrt() - 1e-6).ceil().clamp(1.0, SAMPLES_MAX as f64) as usize;
+    let count =
+        |v: [f64; 2]| ((v[0] * v[0] + v[1] * v[1]).sqrt() - 1e-6).ceil().clamp(1.0, SAMPLES_MAX as f64) as usize;
     let (columns, rows) = (count(across), count(up));
     let mut sum = 0.0;
     for row in 0..rows {
@@ -182,7 +183,7 @@ impl Stack<'_> {
         if !raw.is_finite() || raw <= self.shadows[image] {
             return None;
         }
-        let sigma = self.noise.sigma(raw) / f64::from(observed.pixels[k]).sqrt();
+        let sigma = self.noise.deviation(raw) / f64::from(observed.pixels[k]).sqrt();
         Some(Sample {
             brightness: (raw - haze) / exposure,
             sigma: sigma / exposure,

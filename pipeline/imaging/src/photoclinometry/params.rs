@@ -1,5 +1,6 @@
 //! How images become heights: settings as a study writes them, with their checks.
 
+use crate::description::Noise;
 use crate::photometry::Photometry;
 use sastrugi_schemas::ParameterError;
 use schemars::JsonSchema;
@@ -11,30 +12,6 @@ pub const ROUNDS_MAX: usize = 20;
 pub const PATHS_MAX: usize = 450;
 /// Most perturbed solutions behind the uncertainty of heights.
 pub const SAMPLES_MAX: usize = 512;
-
-/// Standard deviation of a pixel's brightness: `sqrt(floor^2 + (relative I)^2)`.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct Noise {
-    /// Part that does not depend on brightness, I/F.
-    pub floor: f64,
-    /// Part that grows with brightness, as a share of it.
-    pub relative: f64,
-}
-
-impl Default for Noise {
-    fn default() -> Self {
-        Self { floor: 1e-4, relative: 0.01 }
-    }
-}
-
-impl Noise {
-    /// Standard deviation of a pixel of this brightness.
-    pub fn sigma(&self, brightness: f64) -> f64 {
-        let relative = self.relative * brightness;
-        (self.floor * self.floor + relative * relative).sqrt()
-    }
-}
 
 /// How slopes become heights.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -107,7 +84,7 @@ impl Default for Settings {
     fn default() -> Self {
         Self {
             photometry: Photometry::default(),
-            noise: Noise::default(),
+            noise: Noise { relative: 0.01, absolute: 1e-4 },
             estimate_noise: false,
             shadow: 0.1,
             rounds: 10,
@@ -130,9 +107,8 @@ impl Settings {
     /// The first setting out of bounds.
     pub fn check(&self) -> Result<(), ParameterError> {
         self.photometry.check().map_err(|e| e.within("photometry"))?;
-        ParameterError::not_negative("noise.floor", self.noise.floor)?;
-        ParameterError::not_negative("noise.relative", self.noise.relative)?;
-        ParameterError::positive("noise", self.noise.floor + self.noise.relative)?;
+        self.noise.check().map_err(|e| e.within("noise"))?;
+        ParameterError::positive("noise", self.noise.absolute + self.noise.relative)?;
         ParameterError::not_negative("shadow", self.shadow)?;
         within("rounds", self.rounds, 1, ROUNDS_MAX)?;
         ParameterError::positive("tolerance", self.tolerance)?;

@@ -5,16 +5,17 @@ use super::cell::{Fit, Prior, Problem, Sample};
 use super::integration::{Constraint, HeightPoint, Stop, System};
 use super::normal::Symmetric3;
 use super::observation::{Calibration, Image, Observed, Relief, Stack};
-use super::params::{Integration, Noise, Settings};
+use super::params::{Integration, Settings};
 use super::paths::integrate_along_paths;
 use super::stereo;
 use super::uncertainty;
+use crate::description::Noise;
 use rayon::prelude::*;
 use sastrugi_numeric::{Geometry, Grid, Streams, sums};
 use sastrugi_schemas::ParameterError;
 
 /// Lights nearer to one plane than this are refused: least over greatest singular value of their unit vectors.
-const COPLANAR: f64 = 0.01;
+const COPLANAR: f64 = 0.002;
 /// Condition number on level ground above which a warning is given.
 const CONDITION_WARNING: f64 = 20.0;
 /// Cells around a poorly lit one whose albedo it may take, at most.
@@ -100,7 +101,9 @@ pub enum RecoverError {
     #[error("{0} images do not determine two slopes and an albedo; at least 3 are needed")]
     TooFewImages(usize),
     /// Lights lie in one plane.
-    #[error("the lights lie in one plane (singular values {ratio:.1e} of the greatest): slopes across it cannot be told from albedo")]
+    #[error(
+        "the lights lie in one plane (singular values {ratio:.1e} of the greatest): slopes across it cannot be told from albedo"
+    )]
     CoplanarLights {
         /// Least over greatest singular value of the unit vectors to the lights.
         ratio: f64,
@@ -208,13 +211,7 @@ struct Inversion<'a> {
 }
 
 impl<'a> Inversion<'a> {
-    fn new(
-        images: &'a [Image],
-        start: &'a Grid,
-        known: &Known,
-        settings: &'a Settings,
-        streams: &'a Streams,
-    ) -> Self {
+    fn new(images: &'a [Image], start: &'a Grid, known: &Known, settings: &'a Settings, streams: &'a Streams) -> Self {
         let g = start.geometry;
         let mut constraints: Vec<Constraint> = known.points.iter().filter_map(|p| Constraint::point(&g, p)).collect();
         let mut warnings = Vec::new();
@@ -393,12 +390,7 @@ impl<'a> Inversion<'a> {
         stereo::points(self.images, relief, &shade, settings)
     }
 
-    fn integrate(
-        &self,
-        system: &System,
-        slopes: &[[f64; 2]],
-        information: &[Option<[f64; 3]>],
-    ) -> (Vec<f64>, usize) {
+    fn integrate(&self, system: &System, slopes: &[[f64; 2]], information: &[Option<[f64; 3]>]) -> (Vec<f64>, usize) {
         match self.settings.integration {
             Integration::Poisson => {
                 let right = system.right_side(slopes, &system.constraint_heights());
@@ -422,11 +414,8 @@ impl<'a> Inversion<'a> {
             self.cells.iter().map(|c| c.as_ref().map_or(f64::NAN, f)).collect()
         };
         let variance = self.noise_scale * self.noise_scale;
-        let covariances: Vec<[f64; 6]> = self
-            .cells
-            .iter()
-            .map(|c| c.map_or([f64::NAN; 6], |c| c.fit.covariance.0.map(|v| v * variance)))
-            .collect();
+        let covariances: Vec<[f64; 6]> =
+            self.cells.iter().map(|c| c.map_or([f64::NAN; 6], |c| c.fit.covariance.0.map(|v| v * variance))).collect();
         let height_sigma = match &self.system {
             Some(system) if self.settings.samples > 0 && self.settings.integration == Integration::Poisson => {
                 let sigma = uncertainty::height_sigma(system, &covariances, self.settings.samples, self.streams);
@@ -488,7 +477,7 @@ fn information(g: &Geometry, cells: &[Option<Cell>]) -> Vec<Option<[f64; 3]>> {
     let halves = |axis: usize, pitch: usize| -> Vec<f64> {
         let pair = |k: usize| {
             let (a, b) = (cells[k]?.fit.slopes[axis], cells.get(k + pitch).copied().flatten()?.fit.slopes[axis]);
-            (axis == 1 || (k + 1) % g.cols != 0).then_some(0.25 * (a - b) * (a - b))
+            (axis == 1 || !(k + 1).is_multiple_of(g.cols)).then_some(0.25 * (a - b) * (a - b))
         };
         (0..g.len()).filter_map(pair).collect()
     };

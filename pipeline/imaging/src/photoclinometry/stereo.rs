@@ -1,13 +1,13 @@
 //! Stereo points: where windows of predicted and observed images correlate, and the heights that this means.
 //!
 //! Around every point of a lattice a window of map cells is shaded as each image should show it. The same cells are read from the image with all
-//! offsets of whole pixels up to `search`; the offset of the greatest normalised correlation, refined by a parabola along each axis, is how far the
+//! offsets of whole pixels up to `search`; the offset of the greatest normalised correlation, refined by a paraboloid, is how far the
 //! image shows the window from where the surface so far puts it. The offsets of all images together place the window's centre in space by
 //! least squares over the cameras.
 //!
-//! With a correlation `rho` at the peak, curvature `kappa` (per square pixel) and `n` cells, an offset has the variance
-//! `(1 - rho^2) / (n rho kappa)`: that of the least-squares offset between a signal and a copy with white noise of the residual's strength.
-//! It is not put below 0.05 pixels, since resampling alone moves peaks by that much.
+//! With a correlation `rho` at the peak, the matrix of its second derivatives `-K` (per square pixel) and `n` cells, an offset has the covariance
+//! `(1 - rho^2) / (n rho) K^-1`: that of the least-squares offset between a signal and a copy with white noise of the residual's strength. A
+//! window with edges in one direction so counts across them only. Added to it are 0.05 pixels, by which resampling alone moves peaks.
 
 use super::integration::HeightPoint;
 use super::normal::Symmetric3;
@@ -16,8 +16,10 @@ use super::params::Stereo;
 use crate::direction::Vector;
 use rayon::prelude::*;
 
-/// Least standard deviation of an offset, pixels.
+/// Standard deviation of an offset without noise, pixels.
 const OFFSET_SIGMA_MIN: f64 = 0.05;
+/// Steps of the paraboloids, pixels, one after the other.
+const PARABOLOIDS: [f64; 2] = [1.0, 0.5];
 /// Share of a window that has to be lit and seen.
 const SHARE_MIN: f64 = 0.8;
 /// Greatest ratio of the axes of a point's error ellipsoid: views nearer to each other give no height.
@@ -32,8 +34,8 @@ const ROUNDS: usize = 3;
 pub struct Offset {
     /// Along columns and rows.
     pub pixels: [f64; 2],
-    /// Standard deviations.
-    pub sigma: [f64; 2],
+    /// Variance along columns, covariance, variance along rows, square pixels.
+    pub covariance: [f64; 3],
     /// Normalised correlation at the peak.
     pub correlation: f64,
 }
@@ -92,18 +94,37 @@ pub fn correlate(image: &Image, cells: &[([f64; 2], f64)], search: usize) -> Opt
     if row == 0 || col == 0 || row + 1 == side || col + 1 == side {
         return None;
     }
-    let [across, down] = [1, side].map(|pitch| parabola([curve[best - pitch], curve[best], curve[best + pitch]]));
-    let ((x, bend_x), (y, bend_y)) = (across?, down?);
-    let peak = curve[best].min(1.0 - 1e-9);
-    let sigma = |bend: f64| ((1.0 - peak * peak) / (cells.len() as f64 * peak * bend)).sqrt().max(OFFSET_SIGMA_MIN);
-    let pixels = [col as f64 - reach + x, row as f64 - reach + y];
-    (peak > 0.0).then(|| Offset { pixels, sigma: [sigma(bend_x), sigma(bend_y)], correlation: curve[best] })
+    let mut pixels = [col as f64 - reach, row as f64 - reach];
+    let mut bend = [f64::NAN; 3];
+    for step in PARABOLOIDS {
+        let (shift, found) =
+            paraboloid(|u, v| correlation(image, cells, [pixels[0] + u * step, pixels[1] + v * step]))?;
+        (0..2).for_each(|k| pixels[k] += step * shift[k]);
+        bend = found.map(|b| b / (step * step));
+    }
+    let correlation = correlation(image, cells, pixels);
+    let peak = correlation.min(1.0 - 1e-9);
+    let factor = (1.0 - peak * peak) / (cells.len() as f64 * peak * (bend[0] * bend[2] - bend[1] * bend[1]));
+    let least = OFFSET_SIGMA_MIN * OFFSET_SIGMA_MIN;
+    let covariance = [bend[2] * factor + least, -bend[1] * factor, bend[0] * factor + least];
+    (peak > 0.0).then_some(Offset { pixels, covariance, correlation })
 }
 
-/// Top of the parabola through three values at -1, 0 and 1, and its curvature.
-fn parabola([before, at, after]: [f64; 3]) -> Option<(f64, f64)> {
-    let bend = 2.0 * at - before - after;
-    (bend > 0.0).then(|| (0.5 * (after - before) / bend, bend))
+/// Top of the paraboloid through values at the nine places `u`, `v` of -1, 0 and 1 (cross term from the corners), within 1 of the middle, and
+/// its bend: minus the second derivatives by `uu`, `uv`, `vv`. `None` where it has no top there.
+fn paraboloid(value: impl Fn(f64, f64) -> f64) -> Option<([f64; 2], [f64; 3])> {
+    let at = value(0.0, 0.0);
+    let [west, east, north, south] = [value(-1.0, 0.0), value(1.0, 0.0), value(0.0, -1.0), value(0.0, 1.0)];
+    let corners = value(1.0, 1.0) - value(1.0, -1.0) - value(-1.0, 1.0) + value(-1.0, -1.0);
+    let bend = [2.0 * at - west - east, -0.25 * corners, 2.0 * at - north - south];
+    let slope = [0.5 * (east - west), 0.5 * (south - north)];
+    let determinant = bend[0] * bend[2] - bend[1] * bend[1];
+    let top = [
+        (bend[2] * slope[0] - bend[1] * slope[1]) / determinant,
+        (bend[0] * slope[1] - bend[1] * slope[0]) / determinant,
+    ];
+    let convex = bend[0] > 0.0 && determinant > 0.0;
+    (convex && top.iter().all(|t| t.abs() <= 1.0)).then_some((top, bend))
 }
 
 /// Normalised correlation of predicted brightness and the image at an offset; NaN where pixels are missing.
@@ -136,17 +157,19 @@ pub fn triangulate(seen: &[(&Image, Offset)], centre: Vector, step_m: f64) -> Op
         let (mut normal, mut right) = (Symmetric3::default(), [0.0; 3]);
         for (image, offset) in seen {
             let (first, here) = (image.camera.project(centre)?, image.camera.project(place)?);
-            for axis in 0..2 {
-                let mut row = [0.0; 3];
-                for (k, slope) in row.iter_mut().enumerate() {
-                    let mut beside = place;
-                    beside[k] += step_m;
-                    *slope = (image.camera.project(beside)?[axis] - here[axis]) / step_m;
-                }
-                let residual = first[axis] + offset.pixels[axis] - here[axis];
-                let weight = 1.0 / (offset.sigma[axis] * offset.sigma[axis]);
+            let mut rows = [[0.0; 3]; 2];
+            for k in 0..3 {
+                let mut beside = place;
+                beside[k] += step_m;
+                let there = image.camera.project(beside)?;
+                (0..2).for_each(|axis| rows[axis][k] = (there[axis] - here[axis]) / step_m);
+            }
+            let residual = [0, 1].map(|axis| first[axis] + offset.pixels[axis] - here[axis]);
+            for ([a, b], weight) in whitening(offset.covariance) {
+                let row: Vector = std::array::from_fn(|k| a * rows[0][k] + b * rows[1][k]);
                 normal.add(row, weight);
-                (0..3).for_each(|k| right[k] += weight * row[k] * residual);
+                let misses = weight * (a * residual[0] + b * residual[1]);
+                (0..3).for_each(|k| right[k] += row[k] * misses);
             }
         }
         if normal.condition() > CONDITION_MAX {
@@ -165,4 +188,10 @@ pub fn triangulate(seen: &[(&Image, Offset)], centre: Vector, step_m: f64) -> Op
     let squares: f64 = misses.sum::<Option<f64>>()?;
     let agrees = (squares / seen.len() as f64).sqrt() <= DISAGREEMENT_MAX;
     (agrees && place.iter().all(|v| v.is_finite())).then_some((place, sigma_m))
+}
+
+/// Two combinations of columns and rows that are independent, and their weights: those of the factors of the covariance.
+fn whitening([uu, uv, vv]: [f64; 3]) -> [([f64; 2], f64); 2] {
+    let across = uv / uu;
+    [([1.0, 0.0], 1.0 / uu), ([-across, 1.0], 1.0 / (vv - across * uv))]
 }

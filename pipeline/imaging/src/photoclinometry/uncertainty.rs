@@ -20,8 +20,7 @@ pub fn height_sigma(system: &System, covariances: &[[f64; 6]], samples: usize, s
         let slopes: Vec<[f64; 2]> =
             factors.par_iter().with_min_len(1024).enumerate().map(|(k, f)| perturbed(f, draws.at(k as i64))).collect();
         let constraints = draws.at(-1);
-        let heights: Vec<f64> =
-            sigmas.iter().enumerate().map(|(k, s)| s * constraints.at(k as i64).normal()).collect();
+        let heights: Vec<f64> = sigmas.iter().enumerate().map(|(k, s)| s * constraints.at(k as i64).normal()).collect();
         let solved = system.solve(&system.right_side(&slopes, &heights), None, Stop::COARSE);
         squares.iter_mut().zip(&solved.heights_m).for_each(|(s, z)| *s += z * z);
     }

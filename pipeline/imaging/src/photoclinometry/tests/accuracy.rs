@@ -1,6 +1,7 @@
 //! What comes back from images of a known world.
 
 use super::scene::{Scene, height_rms, noisy, rms, slope_rms};
+use crate::description::Noise;
 use crate::direction::direction;
 use crate::photoclinometry::uncertainty::coverage;
 use crate::photoclinometry::*;
@@ -57,12 +58,14 @@ fn stat_noise_of_one_percent_by_sun() {
         ("0/15/30 at zenith 45", [0.0, 15.0, 30.0], 45.0, 0.50, 2.0),
         ("0/120/240 at zenith 20", THREE, 70.0, 0.047, 1.25),
     ];
-    println!("suns | slope rms | predicted | specified | albedo rms | condition | R(albedo, slope) | height rms, cells | warnings");
+    println!(
+        "suns | slope rms | predicted | specified | albedo rms | condition | R(albedo, slope) | height rms, cells | warnings"
+    );
     for (name, azimuths, elevation, specified, factor) in cases {
-        let settings = Settings { noise: Noise { floor: 0.0, relative: 0.01 }, condition_max: 1e4, ..quick() };
+        let settings = Settings { noise: Noise { absolute: 0.0, relative: 0.01 }, condition_max: 1e4, ..quick() };
         let found = recovered(&noisy(&scene.nadir_images(&azimuths, elevation), 0.01, 5), &scene, &settings);
         let slopes = slope_rms(&found.slopes, &truth.slopes);
-        let expected = (found.covariances.iter().map(|c| 0.5 * (c[0] + c[3])).sum::<f64>() / 4096.0).sqrt();
+        let expected = (found.covariances.iter().map(|c| c[0] + c[3]).sum::<f64>() / 4096.0).sqrt();
         let albedo = rms(found.albedo.values.iter().zip(&truth.albedo).map(|(a, b)| a - b));
         let middle = |g: &Grid| sastrugi_numeric::sums::median(&g.values);
         println!(
@@ -88,7 +91,7 @@ fn covered(worlds: u64, samples: usize) {
     let scene = Scene::hills(48, 1.0);
     let truth = scene.truth();
     let images = scene.nadir_images(&THREE, 45.0);
-    let settings = Settings { noise: Noise { floor: 0.0, relative: 0.01 }, samples, ..Settings::default() };
+    let settings = Settings { noise: Noise { absolute: 0.0, relative: 0.01 }, samples, ..Settings::default() };
     let inner: Vec<usize> = (0..48 * 48).filter(|k| [k / 48, k % 48].iter().all(|v| (4..44).contains(v))).collect();
     let mut errors: [Vec<f64>; 4] = Default::default();
     let mut sigmas: [Vec<f64>; 4] = Default::default();
@@ -135,7 +138,7 @@ fn stat_uncertainties_cover_the_errors_of_many_worlds() {
 fn stat_noise_is_estimated_from_residuals() {
     let scene = Scene::hills(64, 1.0);
     let images = noisy(&scene.nadir_images(&[0.0, 90.0, 180.0, 270.0], 45.0), 0.02, 8);
-    let assumed = Noise { floor: 0.0, relative: 0.01 };
+    let assumed = Noise { absolute: 0.0, relative: 0.01 };
     let settings = Settings { noise: assumed, estimate_noise: true, ..quick() };
     let found = recovered(&images, &scene, &settings);
     assert!((found.noise_scale - 2.0).abs() < 0.14, "{}", found.noise_scale);
@@ -165,8 +168,9 @@ fn val_reprojection_brings_oblique_images_together() {
     let ((one, _), (all, found)) = (error(1), error(20));
     assert!(found.converged, "{:?}", found.rounds);
     assert!(all < 0.25 * one && all < 0.1, "{one} {all}");
-    let falls = found.rounds.windows(2).take(3).all(|w| w[1].brightness_rms < w[0].brightness_rms);
-    assert!(falls, "{:?}", found.rounds);
+    let rounds = &found.rounds;
+    assert!(rounds[1].brightness_rms < 0.5 * rounds[0].brightness_rms, "{rounds:?}");
+    assert!(rounds.windows(2).all(|w| w[1].change_m < 0.2 * w[0].change_m), "{rounds:?}");
 }
 
 /// Slopes of one surface with known albedo: two unknowns, three images; the noise of slopes falls below that with free albedo.
@@ -174,11 +178,11 @@ fn val_reprojection_brings_oblique_images_together() {
 fn val_known_albedo_steadies_slopes() {
     let scene = Scene { albedo: Box::new(|_, _| 0.25), ..Scene::hills(48, 1.0) };
     let truth = scene.truth();
-    let images = noisy(&scene.nadir_images(&THREE, 70.0), 0.01, 3);
+    let images = noisy(&scene.nadir_images(&[0.0, 45.0, 90.0], 45.0), 0.01, 3);
     let error = |albedo| slope_rms(&recovered(&images, &scene, &Settings { albedo, ..quick() }).slopes, &truth.slopes);
     let (free, known) = (error(None), error(Some(0.25)));
     println!("slopes: {free:.4} with free albedo, {known:.4} with albedo known");
-    assert!(known < 0.95 * free);
+    assert!(known < 0.5 * free);
     let found = recovered(&images, &scene, &Settings { albedo: Some(0.25), ..quick() });
     assert!(found.albedo.values.iter().all(|a| *a == 0.25));
 }
@@ -211,7 +215,8 @@ fn prop_tiles_with_overlap_equal_the_whole() {
     assert!(cells.iter().all(|&(a, b)| tile.slopes[a] == whole.slopes[b]));
     assert!(cells.iter().all(|&(a, b)| tile.albedo.values[a].to_bits() == whole.albedo.values[b].to_bits()));
     let inner: Vec<_> = cells.iter().filter(|(a, _)| a % 40 >= 8).collect();
-    let (a, b): (Vec<f64>, Vec<f64>) = inner.iter().map(|(a, b)| (tile.heights.values[*a], whole.heights.values[*b])).unzip();
+    let (a, b): (Vec<f64>, Vec<f64>) =
+        inner.iter().map(|(a, b)| (tile.heights.values[*a], whole.heights.values[*b])).unzip();
     let difference = height_rms(&a, &b);
     println!("heights of the tile: {difference:.4} cells rms from the whole");
     assert!(difference < 0.02);
@@ -225,8 +230,8 @@ fn val_evaluation_knows_good_from_bad() {
     let (light, view) = (direction(40.0, 35.0), [0.0, 0.0, 1.0]);
     let of = |recovered: &Grid| evaluation::evaluate(&truth, recovered, &Photometry::default(), light, view).unwrap();
     let same = of(&truth);
-    assert!((same.shaded_correlation - 1.0).abs() < 1e-12 && same.slope_error_rms == 0.0);
-    assert_eq!(same.shaded_correlation_ceiling, same.shaded_correlation);
+    assert!((same.shaded_correlation - 1.0).abs() < 1e-12 && same.slope_error_rms < 1e-12);
+    assert!((same.shaded_correlation_ceiling - 1.0).abs() < 1e-12);
     // A tilt and a shift in height: heights are off, slopes by the tilt alone.
     let tilted = Grid::new(truth.geometry, (0..4096).map(|k| truth.values[k] + 5.0 + 0.02 * (k % 64) as f64).collect());
     let tilted = of(&tilted);
@@ -238,7 +243,12 @@ fn val_evaluation_knows_good_from_bad() {
     assert!(moved.shaded_correlation < 0.8, "{moved:?}");
     // A finer truth has a ceiling below 1.
     let fine = Scene::hills(256, 0.25);
-    let rough = Grid::new(fine.map, (0..256 * 256).map(|k| (scene.height)(fine.map.x(k % 256), fine.map.y(k / 256)) + 0.05 * f64::from((k % 3) as u8)).collect());
+    let rough = Grid::new(
+        fine.map,
+        (0..256 * 256)
+            .map(|k| (scene.height)(fine.map.x(k % 256), fine.map.y(k / 256)) + 0.05 * f64::from((k % 3) as u8))
+            .collect(),
+    );
     let coarse = sastrugi_numeric::resample::block_means(&rough, 4);
     let ceiling = evaluation::evaluate(&rough, &coarse, &Photometry::default(), light, view).unwrap();
     assert!(ceiling.shaded_correlation == ceiling.shaded_correlation_ceiling && ceiling.shaded_correlation < 0.9999);
@@ -250,7 +260,8 @@ fn val_evaluation_knows_good_from_bad() {
 fn val_bands_split_the_variance() {
     let scene = Scene::hills(64, 1.0);
     let mut stream = streams().stream("bands");
-    let noise = |stream: &mut sastrugi_numeric::Stream| Grid::new(scene.map, (0..4096).map(|_| stream.normal()).collect());
+    let noise =
+        |stream: &mut sastrugi_numeric::Stream| Grid::new(scene.map, (0..4096).map(|_| stream.normal()).collect());
     let (a, b) = (noise(&mut stream), noise(&mut stream));
     for band in evaluation::bands(&a, &a) {
         assert!((band.coherence - 1.0).abs() < 1e-12 && (band.truth_rms_m - band.recovered_rms_m).abs() < 1e-15);

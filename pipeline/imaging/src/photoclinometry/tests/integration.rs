@@ -80,7 +80,10 @@ fn val_heights_are_those_of_the_dense_equations() {
             (k % 11 != 4).then_some([a, 0.6 * (a * c).sqrt(), c])
         })
         .collect();
-    let points = [HeightPoint { x_m: 4.1, y_m: 1.3, height_m: 2.0, sigma_m: 0.3 }, HeightPoint { x_m: 6.6, y_m: 3.9, height_m: -1.0, sigma_m: 0.1 }];
+    let points = [
+        HeightPoint { x_m: 4.1, y_m: 1.3, height_m: 2.0, sigma_m: 0.3 },
+        HeightPoint { x_m: 6.6, y_m: 3.9, height_m: -1.0, sigma_m: 0.1 },
+    ];
     for constraints in [vec![], points.iter().map(|p| Constraint::point(&g, p).unwrap()).collect()] {
         let system = System::new(g, &information, constraints.clone());
         // With a hole every 11 cells and no line of four good cells left out of the correction, compare without correction.
@@ -99,14 +102,29 @@ fn exact(scene: &Scene) -> (System, Vec<[f64; 2]>, Vec<f64>) {
     (System::new(scene.map, &information, vec![]), truth.slopes, truth.heights.values)
 }
 
-/// Halving the cells of one landscape lowers the error of heights by 2^4 where slopes are moved to edges to fourth order, 2^2 where they are not.
-/// Inner cells: the correction ends two cells from a border, where second order remains.
+/// Mean heights and slopes of the cells of a landscape, by 16 midpoints along each side (error of heights 2^-9 of the second order).
+fn means(scene: &Scene) -> (Vec<[f64; 2]>, Vec<f64>) {
+    let g = &scene.map;
+    let offsets: Vec<f64> = (0..16).map(|k| (f64::from(k) + 0.5) / 16.0 - 0.5).collect();
+    let mean = |f: &dyn Fn(f64) -> f64| offsets.iter().map(|u| f(u * g.cell[0])).sum::<f64>() / 16.0;
+    let half = 0.5 * g.cell[0];
+    let cell = |k: usize| {
+        let (x, y, z) = (g.x(k % g.cols), g.y(k / g.cols), &scene.height);
+        let p = mean(&|v| z(x + half, y + v) - z(x - half, y + v)) / g.cell[0];
+        let q = mean(&|u| z(x + u, y + half) - z(x + u, y - half)) / g.cell[0];
+        ([p, q], mean(&|u| mean(&|v| z(x + u, y + v))))
+    };
+    (0..g.len()).map(cell).unzip()
+}
+
+/// Halving the cells of one landscape lowers the error of heights by 2^3 or more where slopes are moved to edges (fourth order, third at borders), by
+/// 2^2 where they are not.
 #[test]
 fn conv_heights_are_of_high_order() {
     let error = |side: usize, corrected: bool| {
-        let cell = 64.0 / side as f64;
-        let scene = Scene { map: Geometry::square(side, side, cell), ..Scene::hills(64, 1.0) };
-        let (system, slopes, truth) = exact(&scene);
+        let scene = Scene { map: Geometry::square(side, side, 64.0 / side as f64), ..Scene::hills(64, 1.0) };
+        let system = System::new(scene.map, &vec![Some([1.0, 0.0, 1.0]); scene.map.len()], vec![]);
+        let (slopes, truth) = means(&scene);
         let right = if corrected { system.right_side(&slopes, &[]) } else { system.uncorrected(&slopes, &[]) };
         height_rms(&system.solve(&right, None, Stop::FINE).heights_m, &truth)
     };
@@ -114,7 +132,7 @@ fn conv_heights_are_of_high_order() {
     println!("uncorrected {plain:?} m, corrected {corrected:?} m");
     let order = |e: [f64; 2]| libm::log2(e[0] / e[1]);
     assert!((order(plain) - 2.0).abs() < 0.2, "{plain:?}");
-    assert!(order(corrected) > 2.5 && corrected[0] < 0.25 * plain[0], "{corrected:?}");
+    assert!(order(corrected) > 2.7 && corrected[0] < 0.1 * plain[0], "{corrected:?}");
 }
 
 /// A checkerboard of heights has no central differences, but a sum far from 0 here: it is neither kept nor made.
@@ -157,7 +175,8 @@ fn val_least_squares_beats_paths_and_many_paths_few() {
 fn val_paths_go_around_holes() {
     let scene = Scene::hills(33, 1.0);
     let (_, slopes, truth) = exact(&scene);
-    let good: Vec<bool> = (0..33 * 33).map(|k| !((20..24).contains(&(k / 33)) && (10..23).contains(&(k % 33)))).collect();
+    let good: Vec<bool> =
+        (0..33 * 33).map(|k| !((20..24).contains(&(k / 33)) && (10..23).contains(&(k % 33)))).collect();
     let heights = integrate_along_paths(&scene.map, &slopes, &good, 64, &streams());
     assert!((0..33 * 33).all(|k| good[k] || heights[k].is_nan()));
     let reached = heights.iter().filter(|z| z.is_finite()).count();
@@ -192,7 +211,7 @@ fn val_a_coarse_dem_holds_long_wavelengths() {
     let truth = scene.truth();
     let coarse: Grid = sastrugi_numeric::resample::block_means(&truth.heights, 16);
     let slopes: Vec<[f64; 2]> = truth.slopes.iter().map(|s| [s[0] + 0.03, s[1] - 0.02]).collect();
-    let information = vec![Some([1e4, 0.0, 1e4]); 4096];
+    let information = vec![Some([1e2, 0.0, 1e2]); 4096];
     let error = |constraints: Vec<Constraint>| {
         let system = System::new(scene.map, &information, constraints);
         let right = system.right_side(&slopes, &system.constraint_heights());

@@ -2,6 +2,7 @@
 
 use super::accuracy::{THREE, level, quick, recovered, streams};
 use super::scene::{Scene, height_rms, noisy, slope_rms};
+use crate::description::Noise;
 use crate::photoclinometry::*;
 use sastrugi_numeric::Grid;
 
@@ -43,7 +44,7 @@ fn val_refusals_say_what_is_wrong() {
     for (settings, key) in [
         (Settings { rounds: 21, ..quick() }, "`rounds`"),
         (Settings { paths: 451, ..quick() }, "`paths`"),
-        (Settings { noise: Noise { floor: 0.0, relative: 0.0 }, ..quick() }, "`noise`"),
+        (Settings { noise: Noise { absolute: 0.0, relative: 0.0 }, ..quick() }, "`noise`"),
         (Settings { albedo: Some(-0.1), ..quick() }, "`albedo`"),
         (Settings { stereo: Some(Stereo { quality: 1.5, ..Stereo::default() }), ..quick() }, "`stereo.quality`"),
     ] {
@@ -65,7 +66,10 @@ fn val_shadows_leave_a_marked_cell_with_a_stated_prior() {
     let cells: Vec<usize> = (0..48 * 48).filter(|&k| dark(k)).collect();
     let slopes = |of: &[[f64; 2]]| -> Vec<[f64; 2]> { cells.iter().map(|&k| of[k]).collect() };
     let error = slope_rms(&slopes(&found.slopes), &slopes(&truth.slopes));
-    println!("slopes of shadowed cells: {error:.4}; heights {:.4} m", height_rms(&found.heights.values, &truth.heights.values));
+    println!(
+        "slopes of shadowed cells: {error:.4}; heights {:.4} m",
+        height_rms(&found.heights.values, &truth.heights.values)
+    );
     assert!(error < 0.08);
     for k in 0..48 * 48 {
         assert_eq!(found.lit.values[k], if dark(k) { 2 } else { 3 });
@@ -102,7 +106,10 @@ fn val_exposures_are_found() {
     let truth = scene.truth();
     let plane = calibration::plane(&scene.map, &truth.heights.values);
     // The start has the true mean plane: exposures cannot tell it from themselves.
-    let start = Grid::new(scene.map, (0..4096).map(|k| plane[0] * scene.map.x(k % 64) + plane[1] * scene.map.y(k / 64)).collect());
+    let start = Grid::new(
+        scene.map,
+        (0..4096).map(|k| plane[0] * scene.map.x(k % 64) + plane[1] * scene.map.y(k / 64)).collect(),
+    );
     let azimuths = [0.0, 60.0, 120.0, 180.0, 240.0, 300.0];
     let mut images = noisy(&scene.nadir_images(&azimuths, 45.0), 0.005, 6);
     let factors = [1.06, 0.97, 1.02, 0.95, 1.01, 0.992];
@@ -115,9 +122,14 @@ fn val_exposures_are_found() {
     };
     let (held, free) = (run(false), run(true));
     let mean = libm::exp(factors.iter().map(|f| libm::log(*f)).sum::<f64>() / 6.0);
-    let worst = free.calibrations.iter().zip(factors).map(|(c, f)| (c.exposure * mean / f - 1.0).abs()).fold(0.0, f64::max);
+    let worst =
+        free.calibrations.iter().zip(factors).map(|(c, f)| (c.exposure * mean / f - 1.0).abs()).fold(0.0, f64::max);
     let [with, without] = [&free, &held].map(|r| slope_rms(&r.slopes, &truth.slopes));
-    println!("exposures within {:.2} % after {} rounds; slopes {without:.4} held, {with:.4} free", 100.0 * worst, free.rounds.len());
+    println!(
+        "exposures within {:.2} % after {} rounds; slopes {without:.4} held, {with:.4} free",
+        100.0 * worst,
+        free.rounds.len()
+    );
     assert!(worst < 5e-3 && with < 0.7 * without);
 }
 

@@ -50,11 +50,12 @@ impl Scene {
         Self {
             map: Geometry::square(side, side, cell_m),
             height: Box::new(move |x, y| {
-                waves.iter().map(|&(cells, azimuth, phase, slope)| amplitude(cells, slope) * wave(x, y, cells, azimuth, phase)).sum()
+                waves
+                    .iter()
+                    .map(|&(cells, azimuth, phase, slope)| amplitude(cells, slope) * wave(x, y, cells, azimuth, phase))
+                    .sum()
             }),
-            albedo: Box::new(move |x, y| {
-                0.2 + 0.03 * wave(x, y, 31.0, 0.7, 0.4) + 0.02 * wave(x, y, 17.0, 2.2, 2.0)
-            }),
+            albedo: Box::new(move |x, y| 0.2 + 0.03 * wave(x, y, 31.0, 0.7, 0.4) + 0.02 * wave(x, y, 17.0, 2.2, 2.0)),
         }
     }
 
@@ -137,9 +138,11 @@ pub fn rms(values: impl Iterator<Item = f64>) -> f64 {
     sums::mean(&values.map(|v| v * v).collect::<Vec<_>>()).sqrt()
 }
 
-/// Rms of the difference of slopes, per component.
+/// Rms length of the difference of gradients.
 pub fn slope_rms(a: &[[f64; 2]], b: &[[f64; 2]]) -> f64 {
-    rms(a.iter().zip(b).flat_map(|(a, b)| [a[0] - b[0], a[1] - b[1]]).filter(|v| v.is_finite()))
+    let length =
+        |(a, b): (&[f64; 2], &[f64; 2])| ((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1])).sqrt();
+    rms(a.iter().zip(b).map(length).filter(|v| v.is_finite()))
 }
 
 /// Rms of the difference of heights less its mean.

@@ -13,7 +13,7 @@ fn oblique(scene: &Scene) -> Vec<Image> {
     views.iter().zip(suns).map(|(v, s)| scene.image(scene.camera(*v), s)).collect()
 }
 
-/// A window read from an image at an offset correlates best there, to 0.05 pixels (parabolas are not sinc functions).
+/// A window read from an image at an offset correlates best there, to 0.05 pixels (paraboloids are no cosines).
 #[test]
 fn val_offsets_are_found_below_a_pixel() {
     let scene = Scene::hills(48, 1.0);
@@ -25,7 +25,7 @@ fn val_offsets_are_found_below_a_pixel() {
             .collect();
         let offset = correlate(&image, &cells, 4).unwrap();
         let error = [offset.pixels[0] - dx, offset.pixels[1] - dy];
-        println!("{error:.3?} pixels, sigma {:.3?}, correlation {:.4}", offset.sigma, offset.correlation);
+        println!("{error:.3?} pixels, sigma {:.3?}, correlation {:.4}", offset.covariance, offset.correlation);
         assert!(error.iter().all(|e| e.abs() < 0.05) && offset.correlation > 0.97);
     }
 }
@@ -38,7 +38,7 @@ fn val_triangulation_finds_the_point() {
     let (centre, place): (Vector, Vector) = ([20.0, 25.0, 0.0], [20.7, 24.6, 3.2]);
     let offset = |image: &Image, place: Vector| {
         let (a, b) = (image.camera.project(centre).unwrap(), image.camera.project(place).unwrap());
-        Offset { pixels: [b[0] - a[0], b[1] - a[1]], sigma: [0.1; 2], correlation: 0.9 }
+        Offset { pixels: [b[0] - a[0], b[1] - a[1]], covariance: [0.01, 0.0, 0.01], correlation: 0.9 }
     };
     let seen: Vec<(&Image, Offset)> = images.iter().map(|i| (i, offset(i, place))).collect();
     let (found, sigma) = triangulate(&seen, centre, 1.0).unwrap();
@@ -53,14 +53,13 @@ fn val_triangulation_finds_the_point() {
     assert_eq!(triangulate(&wrong, centre, 1.0), None);
 }
 
-/// A surface set 1.5 m too high, and level: points with the true brightness predicted lie on the true surface within a few of their standard
-/// deviations and 0.15 m (rms).
+/// A surface set 1.5 m too high is found at its height within 0.1 m (rms), a seventh of the relief.
 #[test]
 fn val_points_lie_on_the_surface() {
     let scene = Scene::hills(64, 1.0);
     let images = oblique(&scene);
     let truth = scene.truth();
-    let start = vec![0.0; 4096];
+    let start: Vec<f64> = truth.heights.values.iter().map(|z| z + 1.5).collect();
     let shade = |image: usize, k: usize| {
         let i = &images[image];
         Some(truth.albedo[k] * super::scene::brightness(truth.slopes[k], i.light, i.camera.view_from([0.0; 3])))
@@ -68,13 +67,13 @@ fn val_points_lie_on_the_surface() {
     let relief = Relief { geometry: &scene.map, heights_m: &start };
     let found = points(&images, relief, &shade, &Stereo { spacing: 6, search: 5, ..Stereo::default() });
     let errors: Vec<f64> = found.iter().map(|p| p.height_m - (scene.height)(p.x_m, p.y_m)).collect();
-    let (rms, sigma) = (super::scene::rms(errors.iter().copied()), found.iter().map(|p| p.sigma_m).sum::<f64>() / found.len() as f64);
+    let (rms, sigma) =
+        (super::scene::rms(errors.iter().copied()), found.iter().map(|p| p.sigma_m).sum::<f64>() / found.len() as f64);
     println!("{} points, rms error {rms:.3} m, mean sigma {sigma:.3} m", found.len());
-    let relief = super::scene::rms(truth.heights.values.iter().copied());
-    assert!(found.len() >= 30 && rms < 0.35 * relief, "relief {relief}");
+    assert!(found.len() >= 30 && rms < 0.1);
 }
 
-/// Exposures wrong by 3 and -3 % tilt the surface; stereo points hold it.
+/// Exposures wrong by 3 and -3 % tilt the surface; stereo points tell the tilt, and with it the exposures.
 #[test]
 fn val_stereo_points_hold_long_wavelengths() {
     let scene = Scene::hills(64, 1.0);
@@ -84,7 +83,7 @@ fn val_stereo_points_hold_long_wavelengths() {
         image.brightness.iter_mut().for_each(|v| *v *= factor);
     }
     let run = |stereo: Option<Stereo>| {
-        let settings = Settings { stereo, rounds: 12, ..quick() };
+        let settings = Settings { stereo, free_exposure: stereo.is_some(), rounds: 20, ..quick() };
         recover(&images, &level(&scene), &Known::default(), &settings, &streams()).unwrap()
     };
     let inner = |g: &Grid| -> Vec<f64> {
@@ -93,6 +92,7 @@ fn val_stereo_points_hold_long_wavelengths() {
     let error = |r: &Recovered| height_rms(&inner(&r.heights), &inner(&truth.heights));
     let (without, with) = (run(None), run(Some(Stereo { spacing: 6, ..Stereo::default() })));
     println!("heights: {:.3} m without, {:.3} m with {:?}", error(&without), error(&with), with.rounds.last());
+    println!("{:?}", with.calibrations);
     assert!(error(&with) < 0.6 * error(&without));
     assert!(with.rounds.last().unwrap().stereo_points > 20);
 }

@@ -57,12 +57,19 @@ fn conv_errors_grow_in_proportion() {
         let shifted = move |x: f64, y: f64| (x + by, y);
         let moved = Scene {
             map: scene.map,
-            height: Box::new(move |x, y| { let (x, y) = shifted(x, y); (Scene::hills(64, 1.0).height)(x, y) }),
-            albedo: Box::new(move |x, y| { let (x, y) = shifted(x, y); (Scene::hills(64, 1.0).albedo)(x, y) }),
+            height: Box::new(move |x, y| {
+                let (x, y) = shifted(x, y);
+                (Scene::hills(64, 1.0).height)(x, y)
+            }),
+            albedo: Box::new(move |x, y| {
+                let (x, y) = shifted(x, y);
+                (Scene::hills(64, 1.0).albedo)(x, y)
+            }),
         };
         with(&|images| images[0] = moved.image(moved.nadir(), [0.0, 45.0]))
     };
-    let sweeps: [(&str, &dyn Fn(f64) -> Errors, [f64; 3]); 6] = [
+    type Sweep<'a> = (&'a str, &'a dyn Fn(f64) -> Errors, [f64; 3]);
+    let sweeps: [Sweep<'_>; 6] = [
         ("azimuth of one sun, deg", &sun_azimuth, [1.0, 2.0, 4.0]),
         ("elevation of one sun, deg", &sun_elevation, [0.5, 1.0, 2.0]),
         ("exposure of one image, %", &exposure, [1.0, 2.0, 4.0]),
