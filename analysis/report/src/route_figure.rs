@@ -3,10 +3,10 @@
 use crate::ReportError;
 use crate::content::slug;
 use crate::render::chart::{Entry, Mark};
-use crate::render::hillshade::exaggeration;
 use crate::render::map::{Key, Map};
 use crate::render::picture;
 use crate::render::svg::{Anchor, Paint, Stroke, Svg, Symbol, TEXT, fitted};
+use sastrugi_imaging::hillshade::exaggeration;
 use sastrugi_numeric::Grid;
 
 /// Width of the map, px.

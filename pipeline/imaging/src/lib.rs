@@ -4,6 +4,7 @@
 //!   point of the ground falls on.
 //! * [`photoclinometry`] finds heights and albedo from three or more images.
 //! * [`sun`] and [`pose`] are the light and the camera as a study says them, [`description`] is the file beside an image.
+//! * [`render`] makes images; [`hillshade`] shades relief as maps do.
 //!
 //! # Conventions
 //! Vectors are `[east, north, up]`. Slopes are `p = dz/dx` (east) and `q = dz/dy` (north), and the unit normal of a facet is
@@ -13,9 +14,11 @@
 pub mod camera;
 pub mod description;
 pub mod direction;
+pub mod hillshade;
 pub mod photoclinometry;
 pub mod photometry;
 pub mod pose;
+pub mod render;
 pub mod sun;
 
 pub use camera::{Camera, ParallelCamera, PinholeCamera, Ray};
@@ -23,4 +26,5 @@ pub use description::{ImageDescription, Noise, Rendered};
 pub use direction::direction;
 pub use photometry::Photometry;
 pub use pose::{CameraParameters, CameraPose};
+pub use render::{RenderError, RenderParameters, Rendering, Scene, render};
 pub use sun::Sun;

@@ -6,7 +6,7 @@
 use crate::camera::{Camera, ParallelCamera, PinholeCamera};
 use crate::direction::{Vector, cross, direction, dot, minus};
 use crate::sun::check_direction;
-use sastrugi_numeric::{Grid, Surface};
+use sastrugi_numeric::{Geometry, Grid, Surface};
 use sastrugi_schemas::{ParameterError, shown};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -198,6 +198,17 @@ impl CameraPose {
         matches!(self, Self::Parallel { elevation_deg, azimuth_deg, .. } if *elevation_deg == 90.0 && *azimuth_deg == 0.0)
     }
 
+    /// Shape and place of the image: in the coordinates of the surface where it is a map, else in pixels from its lower left corner.
+    pub fn geometry(&self) -> Geometry {
+        match *self {
+            Self::Parallel { centre_m, pixel_m, rows, cols, .. } if self.is_nadir() => {
+                let low = |axis: usize, count: usize| centre_m[axis] - 0.5 * count as f64 * pixel_m;
+                Geometry { rows, cols, cell: [pixel_m; 2], origin: [low(0, cols), low(1, rows)] }
+            }
+            Self::Parallel { rows, cols, .. } | Self::Pinhole { rows, cols, .. } => Geometry::square(rows, cols, 1.0),
+        }
+    }
+
     /// Pixel size of parallel rays, m; a pinhole's pixels have none.
     pub fn pixel_m(&self) -> Option<f64> {
         match self {
@@ -314,7 +325,6 @@ fn check_pinhole(position_m: Vector, target_m: Vector, field_of_view_deg: f64) -
 mod tests {
     use super::*;
     use proptest::prelude::*;
-    use sastrugi_numeric::Geometry;
     use serde_json::json;
 
     fn hill() -> Grid {

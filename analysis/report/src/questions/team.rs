@@ -8,10 +8,10 @@ use crate::questions::routes::maps::{DARK, LIGHT, closed, draw, ground, legend_t
 use crate::questions::sql::quoted;
 use crate::render::axis::Axis;
 use crate::render::chart::{Entry, Mark, Plot, WIDTH};
-use crate::render::hillshade::exaggeration;
 use crate::render::map::{Key, Map};
 use crate::render::svg::{Paint, Stroke, Symbol};
 use crate::render::{number as set, picture, thin};
+use sastrugi_imaging::hillshade::exaggeration;
 use sastrugi_numeric::{Grid, sums};
 use sastrugi_schemas::tables::{FormationRow, FormationSampleRow, RouteRow};
 use std::collections::{BTreeMap, BTreeSet};

@@ -3,7 +3,6 @@
 pub mod axis;
 pub mod chart;
 pub mod colour;
-pub mod hillshade;
 pub mod html;
 pub mod map;
 pub mod number;

@@ -1,9 +1,10 @@
 //! Rasters as PNG data URIs: shaded relief, deviations, shaded classes.
 
 use super::colour::{self, Map, Rgb};
-use super::{hillshade::hillshade, thin};
+use super::thin;
 use crate::ReportError;
 use base64::Engine;
+use sastrugi_imaging::hillshade::hillshade;
 use sastrugi_numeric::Grid;
 use sastrugi_schemas::RoughnessClass;
 

@@ -26,6 +26,7 @@
 pub mod calibration;
 pub mod cell;
 mod cosine;
+pub mod described;
 pub mod evaluation;
 pub mod integration;
 mod normal;

@@ -2,7 +2,7 @@
 
 use super::Read;
 use crate::error::Error;
-use sastrugi_report::render::hillshade::exaggeration;
+use sastrugi_imaging::hillshade::exaggeration;
 use sastrugi_report::render::picture;
 use sastrugi_roughness::rms_slope;
 use sastrugi_schemas::ParameterError;

@@ -8,10 +8,10 @@ use crate::questions::relief::{MAP_WIDTH, exaggeration_words, extent};
 use crate::questions::sql::quoted;
 use crate::render::chart::{Entry, Mark};
 use crate::render::colour::NO_DATA;
-use crate::render::hillshade::exaggeration;
 use crate::render::map::{Key, Map};
 use crate::render::svg::{Paint, SERIES, Stroke, Symbol};
 use crate::render::{number as set, picture, thin};
+use sastrugi_imaging::hillshade::exaggeration;
 use sastrugi_numeric::Grid;
 use sastrugi_schemas::tables::{RoutePointRow, RouteRow};
 

@@ -6,8 +6,8 @@ use crate::ReportError;
 use crate::content::{Figure, slug};
 use crate::data::{Data, Group};
 use crate::questions::relief::{Style, Words, exaggeration_words, middle_range, relief};
-use crate::render::hillshade::exaggeration;
 use crate::render::number as set;
+use sastrugi_imaging::hillshade::exaggeration;
 use sastrugi_schemas::tables::TerrainRow;
 
 /// A terrain to draw and why.

@@ -14,9 +14,9 @@ use crate::ReportError;
 use crate::content::{Block, Figure, Numbers, TableBlock, slug};
 use crate::data::{self, Data};
 use crate::render::chart::Plot;
-use crate::render::hillshade::exaggeration;
 use crate::render::svg::{Paint, Stroke};
 use crate::render::{number as set, thin};
+use sastrugi_imaging::hillshade::exaggeration;
 use sastrugi_numeric::Grid;
 use sastrugi_schemas::tables::TerrainRow;
 
