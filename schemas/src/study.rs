@@ -476,6 +476,23 @@ pub struct RoverItem {
     pub sweep: BTreeMap<String, Vec<serde_json::Value>>,
 }
 
+/// `[[image]]` around the parameters of an image.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ImageItem {
+    /// Id, `[a-z0-9][a-z0-9.-]{0,63}`, unique in the study. With several surfaces images are named `<id>-<surface>`.
+    pub id: String,
+    /// Id of the terrain, texture or DEM to look at; the id of a replicated item stands for all of them. Its albedo is that of the
+    /// terrain's map, where it has one.
+    pub surface: String,
+    /// Explicit seed of the noise instead of the study's.
+    #[serde(default)]
+    pub seed: Option<u64>,
+    /// One image per value of a parameter: `sweep.<parameter> = [...]`, as `sweep."sun.azimuth_deg" = [0, 120, 240]`.
+    #[serde(default)]
+    pub sweep: BTreeMap<String, Vec<serde_json::Value>>,
+}
+
 /// `[[traverse]]` around the parameters of a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]

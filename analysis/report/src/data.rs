@@ -10,8 +10,9 @@ use sastrugi_schemas::manifest::FailedItem;
 use sastrugi_schemas::study::{HypothesisItem, RoughnessSection};
 use sastrugi_schemas::tables::{
     CandidateCurveRow, CandidateRow, CovarianceRow, FitRow, FormationEventRow, FormationRow, FormationSampleRow,
-    HeightDistributionRow, LikelihoodProfileRow, LogRow, MissionRow, ParameterRow, ProfilePsdRow, PsdRow, ReplicateRow,
-    RoutePointRow, RouteRow, SampleRow, ScoreCovarianceRow, ScoreRow, StructureRow, SurfaceRow, TerrainRow,
+    HeightDistributionRow, ImageRow, LikelihoodProfileRow, LogRow, MissionRow, ParameterRow, ProfilePsdRow, PsdRow,
+    ReplicateRow, RoutePointRow, RouteRow, SampleRow, ScoreCovarianceRow, ScoreRow, StructureRow, SurfaceRow,
+    TerrainRow,
 };
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -107,6 +108,8 @@ pub struct Data {
     pub replicates: Vec<ReplicateRow>,
     /// Routes.
     pub routes: Vec<RouteRow>,
+    /// Rendered images.
+    pub images: Vec<ImageRow>,
     /// Runs of teams.
     pub formations: Vec<FormationRow>,
     /// What happened on these runs.

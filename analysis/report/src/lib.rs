@@ -9,8 +9,8 @@
 //! * [`mod@render`]: drawing, which knows nothing of what it draws.
 //! * [`data`]: the only way to the release's rows and files.
 //!
-//! No kernel runs here: spectra, histograms, covariances, backgrounds, residuals and class maps are read as a stage
-//! stored them. Medians and intervals come from `sastrugi-statistics`. The same release gives the same bytes: there is
+//! No kernel runs here: spectra, histograms, covariances, backgrounds, residuals, images and class maps are read as a stage
+//! stored them; shading and rendering of a thinned relief is drawing. Medians and intervals come from `sastrugi-statistics`. The same release gives the same bytes: there is
 //! no clock and no thread in this room.
 
 pub mod content;

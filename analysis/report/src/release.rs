@@ -15,7 +15,7 @@ use std::fs;
 use std::path::{Component, Path, PathBuf};
 
 /// Folders that hold data: what a page counts is the same before and after sealing.
-const DATA_FOLDERS: [&str; 8] = ["classes", "dem", "fit", "mcap", "route", TABLES, "terrain", "texture"];
+const DATA_FOLDERS: [&str; 9] = ["classes", "dem", "fit", "image", "mcap", "route", TABLES, "terrain", "texture"];
 const STUDY: &str = "study.toml";
 
 impl Data {
@@ -58,6 +58,7 @@ impl Data {
             missions: release.rows()?,
             replicates: release.rows()?,
             routes: release.rows()?,
+            images: release.rows()?,
             formations: release.rows()?,
             formation_events: release.rows()?,
             parameters: release.rows()?,

@@ -151,6 +151,18 @@ pub enum Verb {
     #[command(after_help = "Examples:\n  sastrugi hillshade terrain.tif -o terrain.png\n  \
         sastrugi hillshade site.tif --pixels 400 --exaggeration 5 -o site.png")]
     Hillshade(Hillshade),
+    /// Render a DEM or a generated surface under sun and camera: albedo, shading, cast shadows.
+    #[command(
+        after_help = "Cameras: nadir (straight down on all of it), nadir:PIXEL_M, parallel:AZIMUTH,ELEVATION[,PIXEL_M] (parallel rays from\n\
+        there), pinhole:X,Y,Z,TO_X,TO_Y,TO_Z[,FIELD_OF_VIEW_DEG] (z above the ground; `--set camera.above_ground=false`: heights).\n\
+        The albedo is that of DEM.albedo.tif beside the DEM, or of the generator's map, where there is one; else 0.25.\n\
+        A GeoTIFF holds the brightness (I/F), with sun and camera in a .json beside it; a PNG is to look at.\n\n\
+        Examples:\n  sastrugi render site.tif --sun 120,20 -o site-morning.tif\n  \
+        sastrugi render planetary --set-surface size_m='[20, 20]' --seed 3 --sun 90,15 -o mars.png\n  \
+        sastrugi render mars.tif --camera parallel:200,40,0.05 --set noise.relative=0.01 -o oblique.tif\n  \
+        sastrugi render mars.tif --camera pinhole:4,2,0.3,4,12,0 --size 960x540 -o rover.png"
+    )]
+    Render(Render),
     /// Say what a file or a release is.
     #[command(after_help = "Example:\n  sastrugi info terrain.tif")]
     Info(Info),
@@ -177,6 +189,7 @@ impl Verb {
             Self::Texture(args) => Some(&args.output),
             Self::Convert(args) => Some(&args.output),
             Self::Hillshade(args) => Some(&args.output),
+            Self::Render(args) => Some(&args.output),
             Self::Pack(args) => Some(&args.output),
             Self::Roughness(args) => args.classes.as_deref(),
             Self::Analyze(args) => args.output.as_deref(),
@@ -553,6 +566,44 @@ pub struct Hillshade {
     /// How the DEM is read.
     #[command(flatten)]
     pub reading: Reading,
+}
+
+/// `render`.
+#[derive(Debug, Args)]
+pub struct Render {
+    /// DEM, or what `terrain` takes: a generator (see `kinds`) or a TOML file with `kind` and its parameters.
+    #[arg(value_name = "DEM|SPEC.toml|KIND")]
+    pub surface: String,
+    /// Azimuth that the light comes from, clockwise from north, and elevation above the horizon, deg.
+    #[arg(long, value_name = "AZ,EL", default_value = "315,45", allow_hyphen_values = true)]
+    pub sun: String,
+    /// Camera: nadir[:PIXEL_M], parallel:AZ,EL[,PIXEL_M] or pinhole:X,Y,Z,TO_X,TO_Y,TO_Z[,FOV_DEG].
+    #[arg(long, value_name = "CAMERA", default_value = "nadir")]
+    pub camera: String,
+    /// Columns and rows of a parallel or pinhole image.
+    #[arg(long, value_name = "COLSxROWS")]
+    pub size: Option<String>,
+    /// Raster of the albedo with the cells of the surface, or one albedo for all of it, 0 to 1.
+    #[arg(long, value_name = "FILE|VALUE")]
+    pub albedo: Option<String>,
+    /// Any other parameter of the image (see `kinds image`), `name=value`.
+    #[arg(long = "set", value_name = "K=V")]
+    pub set: Vec<String>,
+    /// A parameter of the generator (see `kinds`), `name=value`.
+    #[arg(long = "set-surface", value_name = "K=V")]
+    pub set_surface: Vec<String>,
+    /// Seed of the random streams of a generated surface and of the noise.
+    #[arg(long, value_name = "N")]
+    pub seed: Option<u64>,
+    /// Image to write: .tif or .png.
+    #[arg(short, long, value_name = "TIF|PNG")]
+    pub output: PathBuf,
+    /// How a DEM is read.
+    #[command(flatten)]
+    pub reading: Reading,
+    /// How a GeoTIFF is written.
+    #[command(flatten)]
+    pub writing: Writing,
 }
 
 /// How the local mean is taken off.

@@ -4,7 +4,7 @@
 //!   point of the ground falls on.
 //! * [`photoclinometry`] finds heights and albedo from three or more images.
 //! * [`sun`] and [`pose`] are the light and the camera as a study says them, [`description`] is the file beside an image.
-//! * [`render`] makes images; [`hillshade`] shades relief as maps do.
+//! * [`render`] makes images; [`hillshade`] shades relief as maps do, [`display`] turns an image into levels of grey.
 //!
 //! # Conventions
 //! Vectors are `[east, north, up]`. Slopes are `p = dz/dx` (east) and `q = dz/dy` (north), and the unit normal of a facet is
@@ -14,6 +14,7 @@
 pub mod camera;
 pub mod description;
 pub mod direction;
+pub mod display;
 pub mod hillshade;
 pub mod photoclinometry;
 pub mod photometry;

@@ -138,6 +138,30 @@ impl CameraParameters {
         }
     }
 
+    /// About how many pixels its image of a surface of `size_m`, with cells of `cell_m`, has.
+    pub fn pixels(&self, size_m: [f64; 2], cell_m: f64) -> f64 {
+        let of = |pixel_m: Option<f64>| {
+            let pixel_m = pixel_m.unwrap_or(cell_m);
+            size_m[0] * size_m[1] / (pixel_m * pixel_m)
+        };
+        match *self {
+            Self::Nadir { pixel_m } => of(pixel_m),
+            Self::Parallel { pixel_m, size_px: None, .. } => of(pixel_m),
+            Self::Parallel { size_px: Some([cols, rows]), .. } | Self::Pinhole { size_px: [cols, rows], .. } => {
+                cols as f64 * rows as f64
+            }
+        }
+    }
+
+    /// Name of its kind.
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Self::Nadir { .. } => "nadir",
+            Self::Parallel { .. } => "parallel",
+            Self::Pinhole { .. } => "pinhole",
+        }
+    }
+
     /// The camera over a surface.
     ///
     /// # Errors

@@ -62,6 +62,17 @@ impl Heightfield {
     }
 }
 
+/// An image that other items can refer to.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Image {
+    /// Its id.
+    pub id: String,
+    /// The item that makes it; its files are those of `jobs::image`.
+    pub item: ItemRef,
+    /// Id of the surface that it shows.
+    pub surface: String,
+}
+
 /// A graph under construction, with what later sections refer to.
 pub struct Builder<'a> {
     /// The study.
@@ -76,6 +87,8 @@ pub struct Builder<'a> {
     pub missions: BTreeMap<String, Drawn>,
     /// Routes by id; a swept id stands for several searches.
     pub routes: BTreeMap<String, Vec<Routes>>,
+    /// Images by id; the id of an item or of a swept part stands for several.
+    pub images: BTreeMap<String, Vec<Image>>,
     /// Where each input file goes in the release.
     pub inputs: Vec<InputPlace>,
     /// The items so far.
@@ -102,6 +115,7 @@ impl<'a> Builder<'a> {
             fits: Vec::new(),
             missions: BTreeMap::new(),
             routes: BTreeMap::new(),
+            images: BTreeMap::new(),
             inputs: Vec::new(),
             graph: Graph::default(),
             ids: BTreeMap::new(),

@@ -32,7 +32,7 @@ pub enum Form {
 }
 
 /// Sections in the order in which they may refer to one another.
-pub const SECTIONS: [Section; 11] = [
+pub const SECTIONS: [Section; 12] = [
     Section {
         name: "dem",
         form: Form::Array,
@@ -102,6 +102,13 @@ pub const SECTIONS: [Section; 11] = [
         envelope: schema_of::<envelope::RoverItem>,
         kinds: jobs::rover::kinds,
         add: jobs::rover::add,
+    },
+    Section {
+        name: "image",
+        form: Form::Array,
+        envelope: schema_of::<envelope::ImageItem>,
+        kinds: jobs::image::kinds,
+        add: jobs::image::add,
     },
     Section {
         name: hypotheses::SECTION,

@@ -1,4 +1,4 @@
-//! Files: DEM formats, point clouds, masks, transects, GeoJSON, atomic writes, Parquet tables, MCAP recordings, and the release folder with its
+//! Files: DEM formats, point clouds, masks, transects, GeoJSON, pictures, atomic writes, Parquet tables, MCAP recordings, and the release folder with its
 //! checksums.
 //!
 //! The only room that names `arrow`, `parquet`, `mcap`, `foxglove`, `prost`, `geotiff-*`, `tiff`, `png`, `las` and `tar`. Nothing
@@ -17,6 +17,7 @@ pub mod geojson;
 pub mod mask;
 pub mod mcap;
 pub mod parquet;
+pub mod picture;
 pub mod release;
 pub mod transect;
 

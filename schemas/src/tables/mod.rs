@@ -11,6 +11,7 @@ pub mod formation_events;
 pub mod formation_samples;
 pub mod formations;
 pub mod height_distribution;
+pub mod images;
 pub mod likelihood_profile;
 pub mod logs;
 pub mod missions;
@@ -37,6 +38,7 @@ pub use formation_events::FormationEventRow;
 pub use formation_samples::FormationSampleRow;
 pub use formations::FormationRow;
 pub use height_distribution::HeightDistributionRow;
+pub use images::ImageRow;
 pub use likelihood_profile::LikelihoodProfileRow;
 pub use logs::LogRow;
 pub use missions::MissionRow;
@@ -118,7 +120,7 @@ impl Table {
 }
 
 /// All tables, in the order of the report and of `schema`.
-pub const ALL: [&Table; 26] = [
+pub const ALL: [&Table; 27] = [
     &TerrainRow::TABLE,
     &SurfaceRow::TABLE,
     &FitRow::TABLE,
@@ -143,6 +145,7 @@ pub const ALL: [&Table; 26] = [
     &FormationEventRow::TABLE,
     &RoverRow::TABLE,
     &RoverSampleRow::TABLE,
+    &ImageRow::TABLE,
     &LogRow::TABLE,
     &DemFitRow::TABLE,
 ];

@@ -6,6 +6,7 @@ pub mod covariance;
 mod curves;
 pub mod failures;
 pub mod formations;
+pub mod images;
 pub mod logs;
 pub mod losses;
 pub mod missions;
@@ -41,9 +42,10 @@ pub struct Question {
 }
 
 /// All questions, in the order of the page.
-pub const ALL: [Question; 16] = [
+pub const ALL: [Question; 17] = [
     failures::QUESTION,
     terrain::QUESTION,
+    images::QUESTION,
     covariance::QUESTION,
     texture::QUESTION,
     scoreboard::QUESTION,

@@ -4,7 +4,7 @@ use super::colour::{self, Map, Rgb};
 use super::thin;
 use crate::ReportError;
 use base64::Engine;
-use sastrugi_imaging::hillshade::hillshade;
+use sastrugi_imaging::{display, hillshade::hillshade};
 use sastrugi_numeric::Grid;
 use sastrugi_schemas::RoughnessClass;
 
@@ -57,6 +57,18 @@ pub fn values(grid: &Grid, range: (f64, f64), most: usize) -> Result<Picture, Re
 /// Deviations coloured over `[-limit, limit]`, not shaded.
 pub fn deviations(grid: &Grid, limit: f64, most: usize) -> Result<Picture, ReportError> {
     coloured(grid, &colour::deviations(), (-limit, limit), most)
+}
+
+/// Brightness as a camera shows it, with `white` as the brightness of white; what sees no ground is transparent.
+///
+/// # Errors
+/// When the picture cannot be encoded.
+pub fn brightness(image: &Grid, white: f64, most: usize) -> Result<Picture, ReportError> {
+    let thin = thinned(image, most);
+    let levels = display::grey(&thin, white);
+    let png =
+        encode_as(png::ColorType::GrayscaleAlpha, [thin.cols(), thin.rows()], levels.values.as_flattened(), None)?;
+    Ok(placed(image, data_uri(&png), [thin.cols(), thin.rows()]))
 }
 
 fn coloured(grid: &Grid, map: &Map, range: (f64, f64), most: usize) -> Result<Picture, ReportError> {
@@ -147,11 +159,21 @@ fn placed<T>(full: &Grid<T>, data_uri: String, pixels: [usize; 2]) -> Picture {
 
 /// PNG (RGB, or indexed where a palette is given) as a data URI.
 fn encode(cols: usize, rows: usize, bytes: &[u8], palette: Option<Vec<u8>>) -> Result<Vec<u8>, ReportError> {
+    let colour = if palette.is_some() { png::ColorType::Indexed } else { png::ColorType::Rgb };
+    encode_as(colour, [cols, rows], bytes, palette)
+}
+
+fn encode_as(
+    colour: png::ColorType,
+    [cols, rows]: [usize; 2],
+    bytes: &[u8],
+    palette: Option<Vec<u8>>,
+) -> Result<Vec<u8>, ReportError> {
     let size = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
     let mut file = Vec::new();
     let mut encoder = png::Encoder::new(&mut file, size(cols), size(rows));
     encoder.set_depth(png::BitDepth::Eight);
-    encoder.set_color(if palette.is_some() { png::ColorType::Indexed } else { png::ColorType::Rgb });
+    encoder.set_color(colour);
     encoder.set_compression(png::Compression::High);
     if let Some(palette) = palette {
         encoder.set_palette(palette);

@@ -77,6 +77,7 @@ pub fn empty() -> Data {
         missions: Vec::new(),
         replicates: Vec::new(),
         routes: Vec::new(),
+        images: Vec::new(),
         formations: Vec::new(),
         formation_events: Vec::new(),
         parameters: Vec::new(),

@@ -21,7 +21,7 @@ const DESCRIBED_FILES: usize = 64;
 /// Set of the generated heightfields.
 const HEIGHTS: &str = "terrain-files";
 /// Files beside the tables, which the manifest lists with their hashes: id of the set, folder, ending, media type, what they are.
-const SETS: [(&str, &str, &str, &str, &str); 10] = [
+const SETS: [(&str, &str, &str, &str, &str); 13] = [
     (HEIGHTS, "terrain", ".tif", "image/tiff", "Generated heightfields, GeoTIFF, float32 metres"),
     ("terrain-pictures", "terrain", ".png", "image/png", "Generated heightfields in steps of 16 bit"),
     ("texture-files", "texture", ".tif", "image/tiff", "Synthesised textures, GeoTIFF, float32 metres"),
@@ -48,6 +48,15 @@ const SETS: [(&str, &str, &str, &str, &str); 10] = [
         "application/geo+json",
         "Planned routes, GeoJSON in the terrain's own coordinates",
     ),
+    (
+        "image-files",
+        "image",
+        ".tif",
+        "image/tiff",
+        "Rendered images, GeoTIFF, float32 brightness (I/F); sun and camera in `.json`",
+    ),
+    ("image-descriptions", "image", ".json", "application/json", "Sun, camera and photometry of the rendered images"),
+    ("image-pictures", "image", ".png", "image/png", "Rendered images to look at"),
     ("mcap-files", "mcap", ".mcap", "application/octet-stream", "Recordings of missions and teams, MCAP"),
     ("bag-files", "mcap", "metadata.yaml", "application/yaml", "Descriptions of the recordings for bag readers"),
 ];

@@ -9,7 +9,7 @@ use sastrugi_terrain::{MAPS, MapKind};
 use serde_json::Value;
 
 /// Folders of a release.
-pub const FOLDERS: [(&str, &str); 11] = [
+pub const FOLDERS: [(&str, &str); 12] = [
     ("dem/", "measured inputs, and the same in metres (`.metric.tif`)"),
     ("mask/", "masks of the fits, obstacles of the routes"),
     ("terrain/", "generated heightfields, GeoTIFF, float32 metres, no data -9999; maps of the same cells beside them"),
@@ -20,6 +20,10 @@ pub const FOLDERS: [(&str, &str); 11] = [
     (
         "route/",
         "planned routes, GeoJSON in the terrain's own coordinates (m), not RFC 7946's WGS84; `.blocked.tif`: 1 where obstacles keep routes out",
+    ),
+    (
+        "image/",
+        "rendered images, GeoTIFF, float32 brightness (I/F), no data -9999 where no ground is seen; `.json`: sun, camera and the rest; `.png` to look at",
     ),
     ("mcap/", "one recording per mission, or run of a team"),
     ("tables/", "Parquet, units and descriptions in the column metadata"),

@@ -3,6 +3,7 @@
 pub mod dem;
 pub mod exports;
 pub mod fit;
+pub mod image;
 pub mod mask;
 pub mod matched;
 pub mod missions;

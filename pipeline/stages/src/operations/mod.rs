@@ -4,6 +4,7 @@ pub mod coregistration;
 pub mod dem;
 pub mod drawn;
 pub mod fits;
+pub mod images;
 pub mod masks;
 pub mod place;
 pub mod roughness;

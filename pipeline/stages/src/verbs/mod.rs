@@ -11,6 +11,7 @@ pub mod navigate;
 pub mod parameters;
 mod reading;
 pub mod releases;
+pub mod render;
 pub mod roughness;
 pub mod terrain;
 pub mod texture;

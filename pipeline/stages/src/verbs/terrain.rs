@@ -6,7 +6,7 @@ use crate::jobs::terrain::STAGE;
 use crate::operations::terrains::{generate, values_of, write_png16};
 use sastrugi_numeric::{Grid, Streams};
 use sastrugi_store::dem::{self, Crs, Format, WriteOptions};
-use sastrugi_terrain::Generator;
+use sastrugi_terrain::{Generator, Terrain};
 use serde_json::{Map, Value, json};
 use std::path::Path;
 
@@ -30,18 +30,11 @@ pub struct Request<'a> {
 /// # Errors
 /// Unknown kinds and parameters, parameters out of range, files that cannot be written.
 pub fn terrain(request: &Request<'_>) -> Result<Value, Error> {
-    let (kind, mut params, seed) = read_spec(request.spec)?;
-    parameters::assign(&mut params, request.set)?;
-    if let Some(known) = sastrugi_terrain::kinds().iter().find(|k| k.kind == kind) {
-        parameters::check(&params, known)?;
-    }
-    let generator = sastrugi_terrain::prepare(&kind, &params)?;
-    let seed = request.seed.or(seed).unwrap_or(0);
+    let prepared = prepare(request.spec, request.set, request.seed)?;
     super::check_output(request.output)?;
-    let streams = Streams::for_seed(seed, STAGE);
-    let (inputs, crs) = read_inputs(generator.as_ref())?;
-    let made = generate(generator.as_ref(), &streams, &inputs)?;
-    let mut notes = generator.notes();
+    let (made, crs) = prepared.make()?;
+    let mut notes = prepared.notes();
+    let Prepared { kind, generator, seed, streams } = prepared;
     notes.extend(made.notes);
     if Format::of_name(request.output) == Some(Format::Png) {
         notes.push(write_png16(generator.as_ref(), &made.heights, request.output)?);
@@ -68,6 +61,44 @@ pub fn terrain(request: &Request<'_>) -> Result<Value, Error> {
         "maps": maps,
         "notes": notes,
     }))
+}
+
+/// A generator with its parameters and streams.
+pub(super) struct Prepared {
+    kind: String,
+    generator: Box<dyn Generator>,
+    seed: u64,
+    streams: Streams,
+}
+
+/// The generator of a specification; without a `seed` that of the file, or 0, counts.
+pub(super) fn prepare(spec: &str, set: &[String], seed: Option<u64>) -> Result<Prepared, Error> {
+    let (kind, mut params, own_seed) = read_spec(spec)?;
+    parameters::assign(&mut params, set)?;
+    if let Some(known) = sastrugi_terrain::kinds().iter().find(|k| k.kind == kind) {
+        parameters::check(&params, known)?;
+    }
+    let generator = sastrugi_terrain::prepare(&kind, &params)?;
+    let seed = seed.or(own_seed).unwrap_or(0);
+    Ok(Prepared { kind, generator, seed, streams: Streams::for_seed(seed, STAGE) })
+}
+
+impl Prepared {
+    /// What it makes, and the coordinate system of its first input.
+    pub(super) fn make(&self) -> Result<(Terrain, Crs), Error> {
+        let (inputs, crs) = read_inputs(self.generator.as_ref())?;
+        Ok((generate(self.generator.as_ref(), &self.streams, &inputs)?, crs))
+    }
+
+    /// Seed of its streams.
+    pub(super) fn seed(&self) -> u64 {
+        self.seed
+    }
+
+    /// Sentences on its parameters.
+    pub(super) fn notes(&self) -> Vec<String> {
+        self.generator.notes()
+    }
 }
 
 /// The files of a generator's input surfaces, in metres, and the coordinate system of the first.

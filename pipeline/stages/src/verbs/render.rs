@@ -1,0 +1,154 @@
+//! `render`: one image of a DEM or of a generated surface.
+
+use super::{Reading, parameters, read, terrain};
+use crate::error::Error;
+use crate::jobs::image::STAGE;
+use crate::operations::images::{self, Files, Ground, Made};
+use sastrugi_imaging::{RenderError, RenderParameters};
+use sastrugi_numeric::Streams;
+use sastrugi_schemas::kind::read_parameters;
+use sastrugi_store::dem::{Crs, WriteOptions};
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+
+/// Ending of the albedo map beside a DEM.
+const ALBEDO_ENDING: &str = "albedo.tif";
+
+/// What to render.
+pub struct Request<'a> {
+    /// A DEM, a generator's name, or a TOML file with `kind` and its parameters.
+    pub surface: &'a str,
+    /// How a DEM is read.
+    pub reading: Reading,
+    /// `name=value` pairs of a generator.
+    pub set_surface: &'a [String],
+    /// Raster of the albedo, in place of the map beside the DEM.
+    pub albedo: Option<&'a Path>,
+    /// True where the map beside the surface does not count.
+    pub one_albedo: bool,
+    /// Parameters of the image.
+    pub parameters: Value,
+    /// Seed of the random streams of surface and noise; the specification's, or 0, when absent.
+    pub seed: Option<u64>,
+    /// Where to write: a GeoTIFF, with its description beside it, or a PNG.
+    pub output: &'a Path,
+    /// How to write.
+    pub options: WriteOptions,
+}
+
+/// What an output name asks for.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Output {
+    Tiff,
+    Png,
+}
+
+/// Renders an image and writes it. A study's item with the same surface, parameters and explicit `seed` has the same bytes. Returns what was made.
+///
+/// # Errors
+/// A surface or albedo that cannot be read, parameters out of range, a camera that sees no ground, a file that cannot be written.
+pub fn render(request: &Request<'_>) -> Result<Value, Error> {
+    let kind = images::kind();
+    parameters::check(&request.parameters, &kind)?;
+    let parameters: RenderParameters = read_parameters(&request.parameters)?;
+    parameters.check()?;
+    let output = output_of(request.output)?;
+    let description = request.output.with_extension("json");
+    let (ground, seed, notes) = ground(request, [request.output, &description])?;
+    let streams = Streams::for_seed(seed, STAGE);
+    let file = request.output.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let made = images::make(&ground, &parameters, &streams, &file).map_err(|e| refused(request.surface, e))?;
+    let files = match output {
+        Output::Tiff => Files { tif: Some(request.output.into()), json: Some(description.as_path().into()), png: None },
+        Output::Png => Files { tif: None, json: None, png: Some(request.output.into()) },
+    };
+    made.write(files, &ground.crs, &request.options)?;
+    let description = (output == Output::Tiff).then_some(description);
+    let mut said = described(request, &made, description.as_deref());
+    said["seed"] = json!(seed);
+    said["notes"] = json!(notes);
+    Ok(said)
+}
+
+fn output_of(path: &Path) -> Result<Output, Error> {
+    let ending = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
+    match ending.as_str() {
+        "tif" | "tiff" => Ok(Output::Tiff),
+        "png" => Ok(Output::Png),
+        _ => Err(Error::Usage(format!("{}: an image is a GeoTIFF or a PNG; name it .tif or .png", path.display()))),
+    }
+}
+
+/// The surface with its albedo, the seed, and sentences on how it was read.
+fn ground(request: &Request<'_>, outputs: [&Path; 2]) -> Result<(Ground, u64, Vec<String>), Error> {
+    let (mut ground, seed, notes) =
+        if is_generator(request.surface) { generated(request)? } else { measured(request, outputs)? };
+    if request.one_albedo {
+        (ground.albedo, ground.albedo_name) = (None, None);
+    }
+    if let Some(path) = request.albedo {
+        super::check_distinct(&outputs, &[path])?;
+        ground.albedo = Some(read(path, &Reading::default())?.dem.grid);
+        ground.albedo_name = Some(path.display().to_string());
+    }
+    Ok((ground, seed, notes))
+}
+
+/// Whether a surface is generated: every name that is no file is looked up among the generators.
+fn is_generator(surface: &str) -> bool {
+    let is_spec = surface.to_ascii_lowercase().ends_with(".toml");
+    is_spec || sastrugi_terrain::kinds().iter().any(|k| k.kind == surface) && !Path::new(surface).exists()
+}
+
+fn generated(request: &Request<'_>) -> Result<(Ground, u64, Vec<String>), Error> {
+    let prepared = terrain::prepare(request.surface, request.set_surface, request.seed)?;
+    let (made, crs) = prepared.make()?;
+    // As an item of a study reads it.
+    let albedo = made.maps.iter().find(|map| map.name == "albedo").map(|map| map.values.as_stored());
+    let albedo_name = albedo.as_ref().map(|_| "albedo".to_owned());
+    let name = request.surface.to_owned();
+    Ok((
+        Ground { heights: made.heights.as_stored(), albedo, crs, name, albedo_name },
+        prepared.seed(),
+        prepared.notes(),
+    ))
+}
+
+fn measured(request: &Request<'_>, outputs: [&Path; 2]) -> Result<(Ground, u64, Vec<String>), Error> {
+    let path = Path::new(request.surface);
+    super::check_distinct(&outputs, &[path])?;
+    if !request.set_surface.is_empty() {
+        return Err(Error::Usage(format!("`--set-surface` is for generators; {} is a DEM", request.surface)));
+    }
+    let read = read(path, &request.reading)?;
+    let beside: PathBuf = path.with_extension(ALBEDO_ENDING);
+    let wanted = request.albedo.is_none() && !request.one_albedo;
+    let albedo = if wanted { images::map(&beside)? } else { None };
+    let albedo_name = albedo.as_ref().map(|_| beside.display().to_string());
+    let crs: Crs = read.dem.info.crs;
+    let name = request.surface.to_owned();
+    Ok((Ground { heights: read.dem.grid, albedo, crs, name, albedo_name }, request.seed.unwrap_or(0), read.notes))
+}
+
+/// A camera that does not fit is the caller's; surfaces and maps are input.
+fn refused(surface: &str, error: RenderError) -> Error {
+    match error {
+        RenderError::Parameter(e) => e.into(),
+        RenderError::NothingSeen => Error::Usage(format!("{surface}: {error}")),
+        _ => Error::Input(format!("{surface}: {error}")),
+    }
+}
+
+fn described(request: &Request<'_>, made: &Made, description: Option<&Path>) -> Value {
+    let rendering = &made.rendering;
+    json!({
+        "file": request.output.display().to_string(),
+        "description_file": description.map(|path| path.display().to_string()),
+        "pixels": [made.shape()[1], made.shape()[0]],
+        "mean_brightness": rendering.mean_brightness(),
+        "share_in_shadow": rendering.share_in_shadow(),
+        "share_without_ground": rendering.share_without_ground(),
+        "png_white": made.png_white,
+        "description": made.description,
+    })
+}
