@@ -2,6 +2,7 @@
 //!
 //! * [`photometry`] tells how bright a facet is under a light and a view, [`direction`] where these are, [`camera`] which pixel a
 //!   point of the ground falls on.
+//! * [`photoclinometry`] finds heights and albedo from three or more images.
 //! * [`sun`] and [`pose`] are the light and the camera as a study says them, [`description`] is the file beside an image.
 //! * [`render`] makes images; [`hillshade`] shades relief as maps do, [`display`] turns an image into levels of grey.
 //!
@@ -15,6 +16,7 @@ pub mod description;
 pub mod direction;
 pub mod display;
 pub mod hillshade;
+pub mod photoclinometry;
 pub mod photometry;
 pub mod pose;
 pub mod render;

@@ -1,0 +1,112 @@
+//! Exposure and haze of every image, between the rounds.
+//!
+//! What an image should show of the integrated surface, `m`, and what it shows, `I`, are joined by `I = E m + H`: a weighted regression over lit
+//! cells. Slopes of single cells would fit any exposure; those of one surface do not, for most of their errors are no gradient.
+//! What is left undetermined is held: the common factor of all exposures (it is the albedo's), and the mean plane of the surface, which exposures
+//! of differently lit images imitate, unless constraints on heights tell it.
+
+use super::observation::{Calibration, Relief, Stack};
+use crate::photometry::Photometry;
+use rayon::prelude::*;
+use sastrugi_numeric::{Geometry, sums};
+
+/// Slopes of the least-squares plane through heights on the whole map.
+pub fn plane(g: &Geometry, heights_m: &[f64]) -> [f64; 2] {
+    let slope = |axis: usize| {
+        let n = [g.cols, g.rows][axis];
+        let centred = |k: usize| {
+            let at = if axis == 0 { k % g.cols } else { g.rows - 1 - k / g.cols };
+            (at as f64 - 0.5 * (n - 1) as f64) * g.cell[axis]
+        };
+        let products: Vec<f64> = heights_m.iter().enumerate().map(|(k, z)| centred(k) * z).collect();
+        let squares: Vec<f64> = (0..g.len()).map(|k| centred(k) * centred(k)).collect();
+        sums::sum(&products) / sums::sum(&squares)
+    };
+    [slope(0), slope(1)]
+}
+
+/// Brightness that an image with exposure 1 and no haze would show of a cell.
+fn predicted(stack: &Stack, image: usize, photometry: &Photometry, relief: Relief, k: usize, tilt: [f64; 2]) -> f64 {
+    let source = &stack.images[image];
+    let [p, q] = relief.slopes(k);
+    photometry.of_slopes([p + tilt[0], q + tilt[1]], source.light, source.camera.view_from(relief.point(k)))
+}
+
+/// Rms difference of observed brightness and that of a surface, over the mean brightness; over the lit cells of all images.
+pub fn brightness_rms(stack: &Stack, photometry: &Photometry, relief: Relief, albedo: &[f64]) -> f64 {
+    let of_image = |image: usize| -> Vec<[f64; 2]> {
+        let one = |k: usize| {
+            let sample = stack.sample(image, k, relief)?;
+            let residual = sample.brightness - albedo[k] * predicted(stack, image, photometry, relief, k, [0.0; 2]);
+            residual.is_finite().then_some([residual * residual, sample.brightness])
+        };
+        (0..albedo.len()).into_par_iter().with_min_len(1024).filter_map(one).collect()
+    };
+    let all: Vec<[f64; 2]> = (0..stack.images.len()).flat_map(of_image).collect();
+    let mean = |k: usize| sums::mean(&all.iter().map(|v| v[k]).collect::<Vec<_>>());
+    mean(0).sqrt() / mean(1)
+}
+
+/// Exposures and hazes that fit the surface best; with `plane`, the surface is first tilted to that mean plane. `free`: exposure, haze.
+pub fn update(
+    stack: &Stack,
+    photometry: &Photometry,
+    relief: Relief,
+    albedo: &[f64],
+    to_plane: Option<[f64; 2]>,
+    free: [bool; 2],
+) -> Vec<Calibration> {
+    let tilt = to_plane.map_or([0.0; 2], |wanted| {
+        let found = plane(relief.geometry, relief.heights_m);
+        [wanted[0] - found[0], wanted[1] - found[1]]
+    });
+    let mut next: Vec<Calibration> = (0..stack.images.len())
+        .map(|image| {
+            let now = stack.calibrations[image];
+            let one = |k: usize| {
+                let sample = stack.sample(image, k, relief)?;
+                let raw = sample.brightness * now.exposure + now.haze;
+                let expected = albedo[k] * predicted(stack, image, photometry, relief, k, tilt);
+                let weight = 1.0 / (sample.sigma * sample.sigma);
+                (expected.is_finite() && expected > 0.0).then_some([weight, expected, raw])
+            };
+            let rows: Vec<[f64; 3]> = (0..albedo.len()).into_par_iter().with_min_len(1024).filter_map(one).collect();
+            regression(&rows, now, free)
+        })
+        .collect();
+    if free[0] {
+        // The common factor stays.
+        let logs = |all: &[Calibration]| sums::mean(&all.iter().map(|c| libm::log(c.exposure)).collect::<Vec<_>>());
+        let factor = libm::exp(logs(stack.calibrations) - logs(&next));
+        next.iter_mut().for_each(|c| c.exposure *= factor);
+    }
+    next
+}
+
+/// `raw = E expected + H` with what is free; rows are weight, expected, raw.
+fn regression(rows: &[[f64; 3]], now: Calibration, free: [bool; 2]) -> Calibration {
+    let total = |f: &dyn Fn(&[f64; 3]) -> f64| sums::sum(&rows.iter().map(f).collect::<Vec<_>>());
+    let weight = total(&|r| r[0]);
+    let (x, y) = (total(&|r| r[0] * r[1]) / weight, total(&|r| r[0] * r[2]) / weight);
+    let next = match free {
+        [true, true] => {
+            let exposure = total(&|r| r[0] * (r[1] - x) * (r[2] - y)) / total(&|r| r[0] * (r[1] - x) * (r[1] - x));
+            Calibration { exposure, haze: y - exposure * x }
+        }
+        [true, false] => {
+            let exposure = total(&|r| r[0] * r[1] * (r[2] - now.haze)) / total(&|r| r[0] * r[1] * r[1]);
+            Calibration { exposure, ..now }
+        }
+        [false, true] => Calibration { haze: y - now.exposure * x, ..now },
+        [false, false] => now,
+    };
+    if next.exposure.is_finite() && next.exposure > 0.0 && next.haze.is_finite() { next } else { now }
+}
+
+/// Largest change of an exposure, as a share, or of a haze over its exposure.
+pub fn drift(before: &[Calibration], after: &[Calibration]) -> f64 {
+    let of = |(a, b): (&Calibration, &Calibration)| {
+        (b.exposure / a.exposure - 1.0).abs().max((b.haze - a.haze).abs() / a.exposure)
+    };
+    before.iter().zip(after).map(of).fold(0.0, f64::max)
+}

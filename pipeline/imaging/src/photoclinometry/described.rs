@@ -1,0 +1,196 @@
+//! Images by the files beside them, and the map that they have in common.
+
+use super::observation::Image;
+use crate::camera::Camera;
+use crate::description::ImageDescription;
+use crate::direction::direction;
+use crate::pose::CameraPose;
+use sastrugi_numeric::Geometry;
+use sastrugi_schemas::{ParameterError, shown};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Rows and columns beyond which a map is refused.
+const SIDE_MAX: usize = 1 << 15;
+/// Part of a cell by which a map may fall short of a whole one.
+const ROUNDING: f64 = 1e-6;
+
+/// Errors put on what is known of the first image, to see what they do to the surface; all 0 by default.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct FirstImageErrors {
+    /// Added to the azimuth of its sun, deg.
+    pub sun_azimuth_deg: f64,
+    /// Added to the elevation of its sun, deg.
+    pub sun_elevation_deg: f64,
+    /// Its exposure is taken as this share too high.
+    pub exposure: f64,
+    /// Added to its haze, I/F.
+    pub haze: f64,
+    /// Its camera is taken to stand this far east and north of where it stands, m.
+    pub shift_m: [f64; 2],
+}
+
+impl FirstImageErrors {
+    /// # Errors
+    /// A number that is not finite, or an exposure of 0 or less.
+    pub fn check(&self) -> Result<(), ParameterError> {
+        let numbers = [
+            ("sun_azimuth_deg", self.sun_azimuth_deg),
+            ("sun_elevation_deg", self.sun_elevation_deg),
+            ("haze", self.haze),
+            ("shift_m", self.shift_m[0] + self.shift_m[1]),
+        ];
+        if let Some((key, value)) = numbers.into_iter().find(|(_, v)| !v.is_finite()) {
+            return Err(ParameterError::new(key, format!("is {}; it must be finite", shown(value))));
+        }
+        ParameterError::positive("exposure", 1.0 + self.exposure).map(|_| ())
+    }
+}
+
+/// Images as their descriptions have them; `pixels` of each from the top row.
+pub fn images(described: Vec<(ImageDescription, Vec<f64>)>, errors: &FirstImageErrors) -> Vec<Image> {
+    let of = |(k, (description, brightness)): (usize, (ImageDescription, Vec<f64>))| {
+        let (mut sun, mut pose) = (description.sun, description.camera);
+        let (mut exposure, mut haze) = (description.exposure, description.haze);
+        if k == 0 {
+            sun.azimuth_deg += errors.sun_azimuth_deg;
+            sun.elevation_deg += errors.sun_elevation_deg;
+            exposure *= 1.0 + errors.exposure;
+            haze += errors.haze;
+            pose = shifted(pose, errors.shift_m);
+        }
+        let light = direction(sun.azimuth_deg, sun.elevation_deg);
+        Image { camera: pose.camera(), light, exposure, haze, brightness }
+    };
+    described.into_iter().enumerate().map(of).collect()
+}
+
+fn shifted(pose: CameraPose, [east, north]: [f64; 2]) -> CameraPose {
+    let moved = |[x, y, z]: [f64; 3]| [x + east, y + north, z];
+    match pose {
+        CameraPose::Parallel { azimuth_deg, elevation_deg, centre_m, pixel_m, rows, cols } => {
+            CameraPose::Parallel { azimuth_deg, elevation_deg, centre_m: moved(centre_m), pixel_m, rows, cols }
+        }
+        CameraPose::Pinhole { position_m, target_m, field_of_view_deg, rows, cols } => CameraPose::Pinhole {
+            position_m: moved(position_m),
+            target_m: moved(target_m),
+            field_of_view_deg,
+            rows,
+            cols,
+        },
+    }
+}
+
+/// Height that the middle of an image shows, m.
+pub fn level_m(pose: &CameraPose) -> f64 {
+    match pose {
+        CameraPose::Parallel { centre_m, .. } => centre_m[2],
+        CameraPose::Pinhole { target_m, .. } => target_m[2],
+    }
+}
+
+/// Where a map lies.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct MapRequest {
+    /// Cell size, m; the finest pixel of parallel cameras when absent.
+    pub cell_m: Option<f64>,
+    /// `[x0, y0, x1, y1]`, m; what all images show when absent.
+    pub window_m: Option<[f64; 4]>,
+}
+
+/// The map of some images: a window, or the rectangle that all of them show of level ground at `level_m`.
+///
+/// # Errors
+/// Cameras without a pixel size and no `cell_m`; a window, or images with nothing in common, smaller than 4 x 4 cells; maps too large.
+pub fn map(poses: &[CameraPose], level_m: f64, request: &MapRequest) -> Result<Geometry, ParameterError> {
+    let finest = poses.iter().filter_map(CameraPose::pixel_m).reduce(f64::min);
+    let Some(cell) = request.cell_m.or(finest) else {
+        return Err(ParameterError::new("cell_m", "is missing; pinhole cameras do not state a pixel size"));
+    };
+    ParameterError::positive("cell_m", cell)?;
+    let shown_by = |pose: &CameraPose| footprint(&pose.camera(), level_m);
+    let common = || poses.iter().map(shown_by).reduce(common).unwrap_or([f64::NAN; 4]);
+    let [x0, y0, x1, y1] = request.window_m.unwrap_or_else(common);
+    let count = |low: f64, high: f64| ((high - low) / cell + ROUNDING).floor();
+    let (cols, rows) = (count(x0, x1), count(y0, y1));
+    if !(cols >= 4.0 && rows >= 4.0) {
+        let what = if request.window_m.is_some() { "the window" } else { "what all images show" };
+        return Err(ParameterError::new("window_m", format!("{what} is smaller than 4 x 4 cells of {cell} m")));
+    }
+    if cols > SIDE_MAX as f64 || rows > SIDE_MAX as f64 {
+        return Err(ParameterError::new("cell_m", format!("is {cell}; the map would have {cols} x {rows} cells")));
+    }
+    Ok(Geometry { rows: rows as usize, cols: cols as usize, cell: [cell; 2], origin: [x0, y0] })
+}
+
+/// Rectangle around what an image shows of level ground; without bounds where a corner looks above the horizon.
+fn footprint(camera: &Camera, level_m: f64) -> [f64; 4] {
+    let [rows, cols] = camera.shape().map(|n| n as f64);
+    let mut bounds = [f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY];
+    for corner in [[0.0, 0.0], [cols, 0.0], [0.0, rows], [cols, rows]] {
+        let ray = camera.ray(corner);
+        if ray.direction[2] >= 0.0 {
+            return [f64::NEG_INFINITY, f64::NEG_INFINITY, f64::INFINITY, f64::INFINITY];
+        }
+        let t = (level_m - ray.origin_m[2]) / ray.direction[2];
+        for axis in 0..2 {
+            let at = ray.origin_m[axis] + t * ray.direction[axis];
+            bounds[axis] = bounds[axis].min(at);
+            bounds[axis + 2] = bounds[axis + 2].max(at);
+        }
+    }
+    bounds
+}
+
+fn common(a: [f64; 4], b: [f64; 4]) -> [f64; 4] {
+    [a[0].max(b[0]), a[1].max(b[1]), a[2].min(b[2]), a[3].min(b[3])]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parallel(elevation_deg: f64, x: f64) -> CameraPose {
+        let centre_m = [x, 20.0, 3.0];
+        CameraPose::Parallel { azimuth_deg: 90.0, elevation_deg, centre_m, pixel_m: 0.5, rows: 40, cols: 60 }
+    }
+
+    /// From above the map is the image; an oblique one shows more ground along its tilt; what two have in common is the overlap.
+    #[test]
+    fn val_the_map_is_what_all_images_show() {
+        let above = CameraPose::Parallel {
+            azimuth_deg: 0.0,
+            elevation_deg: 90.0,
+            centre_m: [50.0, 20.0, 3.0],
+            pixel_m: 0.5,
+            rows: 40,
+            cols: 60,
+        };
+        let g = map(&[above], 3.0, &MapRequest::default()).unwrap();
+        assert_eq!((g.rows, g.cols, g.cell), (40, 60, [0.5; 2]));
+        assert!((g.origin[0] - 35.0).abs() < 1e-9 && (g.origin[1] - 10.0).abs() < 1e-9, "{:?}", g.origin);
+        // 30 m across, seen from the east at 30 deg elevation: 60 m of ground.
+        let wide = footprint(&parallel(30.0, 50.0).camera(), 3.0);
+        assert!((wide[2] - wide[0] - 60.0).abs() < 1e-9 || (wide[3] - wide[1] - 60.0).abs() < 1e-9, "{wide:?}");
+        let moved = shifted(above, [10.0, -4.0]);
+        let g = map(&[above, moved], 3.0, &MapRequest { cell_m: Some(1.0), window_m: None }).unwrap();
+        assert_eq!((g.rows, g.cols), (16, 20));
+    }
+
+    #[test]
+    fn val_maps_without_cells_or_ground_are_refused() {
+        let pinhole = CameraPose::Pinhole {
+            position_m: [0.0, 0.0, 2.0],
+            target_m: [10.0, 0.0, 2.0],
+            field_of_view_deg: 60.0,
+            rows: 10,
+            cols: 10,
+        };
+        assert_eq!(map(&[pinhole], 0.0, &MapRequest::default()).unwrap_err().key, "cell_m");
+        let apart = [parallel(90.0, 0.0), parallel(90.0, 500.0)];
+        assert_eq!(map(&apart, 3.0, &MapRequest::default()).unwrap_err().key, "window_m");
+        let huge = MapRequest { cell_m: Some(1e-6), window_m: None };
+        assert_eq!(map(&apart[..1], 3.0, &huge).unwrap_err().key, "cell_m");
+    }
+}

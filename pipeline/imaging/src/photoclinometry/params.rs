@@ -1,0 +1,140 @@
+//! How images become heights: settings as a study writes them, with their checks.
+
+use crate::description::Noise;
+use crate::photometry::Photometry;
+use sastrugi_schemas::ParameterError;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Most rounds of re-projection.
+pub const ROUNDS_MAX: usize = 20;
+/// Most paths of the published integration.
+pub const PATHS_MAX: usize = 450;
+/// Most perturbed solutions behind the uncertainty of heights.
+pub const SAMPLES_MAX: usize = 512;
+
+/// How slopes become heights.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Integration {
+    /// Weighted least squares over the whole map.
+    #[default]
+    Poisson,
+    /// Outward from the centre, averaged over random paths, as published.
+    Paths,
+}
+
+/// Stereo points by correlation of predicted and observed windows.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Stereo {
+    /// Cells between points.
+    pub spacing: usize,
+    /// Cells from the centre of a window to its edge: a window has `2 reach + 1` cells a side.
+    pub reach: usize,
+    /// Largest offset that is looked for, pixels.
+    pub search: usize,
+    /// Least normalised correlation of a point that is kept.
+    pub quality: f64,
+}
+
+impl Default for Stereo {
+    fn default() -> Self {
+        Self { spacing: 16, reach: 7, search: 4, quality: 0.7 }
+    }
+}
+
+/// Settings of one inversion.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Settings {
+    /// Law of brightness.
+    pub photometry: Photometry,
+    /// Noise of a pixel, for weights and uncertainties.
+    pub noise: Noise,
+    /// Scale `noise` to the residuals of cells lit in four or more images.
+    pub estimate_noise: bool,
+    /// A pixel darker than this share of its image's median (less haze) is in shadow and left out.
+    pub shadow: f64,
+    /// Most rounds of re-projection, up to 20.
+    pub rounds: usize,
+    /// Rounds end when heights change by less than this (rms, cells).
+    pub tolerance: f64,
+    /// Albedo of the whole surface, where it is known; otherwise it is found in every cell.
+    pub albedo: Option<f64>,
+    /// Find the exposure of every image but their common factor.
+    pub free_exposure: bool,
+    /// Find the haze of every image.
+    pub free_haze: bool,
+    /// How slopes become heights.
+    pub integration: Integration,
+    /// Paths of the published integration, up to 450.
+    pub paths: usize,
+    /// Correlate windows for stereo points.
+    pub stereo: Option<Stereo>,
+    /// Cells whose slopes and albedo are worse conditioned than this get the prior of poorly lit cells.
+    pub condition_max: f64,
+    /// Standard deviation of the slopes of poorly lit cells about those of the surface so far.
+    pub slope_prior: f64,
+    /// Perturbed solutions behind the uncertainty of heights; 0 leaves it out.
+    pub samples: usize,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            photometry: Photometry::default(),
+            noise: Noise { relative: 0.01, absolute: 1e-4 },
+            estimate_noise: false,
+            shadow: 0.1,
+            rounds: 10,
+            tolerance: 1e-3,
+            albedo: None,
+            free_exposure: false,
+            free_haze: false,
+            integration: Integration::Poisson,
+            paths: 64,
+            stereo: None,
+            condition_max: 300.0,
+            slope_prior: 0.3,
+            samples: 32,
+        }
+    }
+}
+
+impl Settings {
+    /// # Errors
+    /// The first setting out of bounds.
+    pub fn check(&self) -> Result<(), ParameterError> {
+        self.photometry.check().map_err(|e| e.within("photometry"))?;
+        self.noise.check().map_err(|e| e.within("noise"))?;
+        ParameterError::positive("noise", self.noise.absolute + self.noise.relative)?;
+        ParameterError::not_negative("shadow", self.shadow)?;
+        within("rounds", self.rounds, 1, ROUNDS_MAX)?;
+        ParameterError::positive("tolerance", self.tolerance)?;
+        if let Some(albedo) = self.albedo {
+            ParameterError::positive("albedo", albedo)?;
+        }
+        within("paths", self.paths, 1, PATHS_MAX)?;
+        ParameterError::positive("condition_max", self.condition_max)?;
+        ParameterError::positive("slope_prior", self.slope_prior)?;
+        within("samples", self.samples, 0, SAMPLES_MAX)?;
+        self.stereo.map_or(Ok(()), |s| s.check().map_err(|e| e.within("stereo")))
+    }
+}
+
+impl Stereo {
+    fn check(&self) -> Result<(), ParameterError> {
+        within("spacing", self.spacing, 1, 4096)?;
+        within("reach", self.reach, 2, 64)?;
+        within("search", self.search, 1, 64)?;
+        ParameterError::between("quality", self.quality, 0.0, 1.0).map(|_| ())
+    }
+}
+
+fn within(key: &str, value: usize, low: usize, high: usize) -> Result<(), ParameterError> {
+    match (low..=high).contains(&value) {
+        true => Ok(()),
+        false => Err(ParameterError::new(key, format!("is {value}; it must be {low} to {high}"))),
+    }
+}

@@ -1,0 +1,174 @@
+//! What is refused, left out, marked, or found on the way.
+
+use super::accuracy::{THREE, level, quick, recovered, streams};
+use super::scene::{Scene, height_rms, noisy, slope_rms};
+use crate::description::Noise;
+use crate::photoclinometry::*;
+use sastrugi_numeric::Grid;
+
+fn refusal(images: &[Image], start: &Grid, known: &Known, settings: &Settings) -> String {
+    recover(images, start, known, settings, &streams()).unwrap_err().to_string()
+}
+
+/// Section 8 of the specification: fewer than three images, coplanar lights, sizes that differ, numbers that are not finite.
+#[test]
+fn val_refusals_say_what_is_wrong() {
+    let scene = Scene::hills(16, 1.0);
+    let images = scene.nadir_images(&THREE, 45.0);
+    let (start, known, settings) = (level(&scene), Known::default(), quick());
+    let of = |images: &[Image]| refusal(images, &start, &known, &settings);
+    assert!(of(&images[..2]).starts_with("2 images do not determine"));
+    // North, south and straight above: one plane.
+    let suns = [[0.0, 45.0], [180.0, 45.0], [0.0, 90.0]];
+    let coplanar: Vec<Image> = suns.iter().map(|s| scene.image(scene.nadir(), *s)).collect();
+    assert!(of(&coplanar).starts_with("the lights lie in one plane"));
+    let mut short = images.clone();
+    short[1].brightness.pop();
+    assert_eq!(of(&short), "image 2 has 255 pixels, its camera 256");
+    let mut infinite = images.clone();
+    infinite[2].brightness[7] = f64::INFINITY;
+    assert_eq!(of(&infinite), "brightness of image 3 is not finite");
+    let mut unlit = images.clone();
+    unlit[0].exposure = f64::NAN;
+    assert_eq!(of(&unlit), "light, exposure or haze of image 1 is not finite");
+    let mut black = images.clone();
+    black[0].brightness.fill(0.0);
+    assert_eq!(of(&black), "no cell is lit in three images");
+    let hole = Grid::new(scene.map, vec![f64::NAN; 256]);
+    assert_eq!(refusal(&images, &hole, &known, &settings), "a height of the start is not finite");
+    let small = level(&scene).window(0, 0, 3, 16);
+    assert!(refusal(&images, &small, &known, &settings).contains("3 x 16 cells is too small"));
+    let point = HeightPoint { x_m: 1.0, y_m: 1.0, height_m: f64::NAN, sigma_m: 1.0 };
+    let points = Known { points: vec![point], coarse: None };
+    assert!(refusal(&images, &start, &points, &settings).starts_with("a known height"));
+    for (settings, key) in [
+        (Settings { rounds: 21, ..quick() }, "`rounds`"),
+        (Settings { paths: 451, ..quick() }, "`paths`"),
+        (Settings { noise: Noise { absolute: 0.0, relative: 0.0 }, ..quick() }, "`noise`"),
+        (Settings { albedo: Some(-0.1), ..quick() }, "`albedo`"),
+        (Settings { stereo: Some(Stereo { quality: 1.5, ..Stereo::default() }), ..quick() }, "`stereo.quality`"),
+    ] {
+        assert!(refusal(&images, &start, &known, &settings).starts_with(key), "{key}");
+    }
+}
+
+/// Pixels in shadow (cast here by hand) leave two images: the cells are marked, have the albedo of their neighbours within its spread, larger
+/// uncertainty, and a slope that two images tell; all other cells are as before, bit for bit.
+#[test]
+fn val_shadows_leave_a_marked_cell_with_a_stated_prior() {
+    let scene = Scene::hills(48, 1.0);
+    let truth = scene.truth();
+    let mut images = scene.nadir_images(&THREE, 45.0);
+    let plain = recovered(&images, &scene, &quick());
+    let dark = |k: usize| (10..14).contains(&(k / 48)) && (20..26).contains(&(k % 48));
+    (0..48 * 48).filter(|&k| dark(k)).for_each(|k| images[1].brightness[k] = 0.0);
+    let found = recovered(&images, &scene, &quick());
+    let cells: Vec<usize> = (0..48 * 48).filter(|&k| dark(k)).collect();
+    let slopes = |of: &[[f64; 2]]| -> Vec<[f64; 2]> { cells.iter().map(|&k| of[k]).collect() };
+    let error = slope_rms(&slopes(&found.slopes), &slopes(&truth.slopes));
+    println!(
+        "slopes of shadowed cells: {error:.4}; heights {:.4} m",
+        height_rms(&found.heights.values, &truth.heights.values)
+    );
+    assert!(error < 0.08);
+    for k in 0..48 * 48 {
+        assert_eq!(found.lit.values[k], if dark(k) { 2 } else { 3 });
+        assert_eq!(found.leaning.values[k], dark(k));
+        if dark(k) {
+            assert!(found.covariances[k][0] > 2.0 * plain.covariances[k][0]);
+            assert!((found.albedo.values[k] - truth.albedo[k]).abs() < 0.03);
+        } else {
+            assert!(found.slopes[k] == plain.slopes[k]);
+        }
+    }
+    assert!(found.warnings.iter().any(|w| w.starts_with("1.0 % of the cells lean")), "{:?}", found.warnings);
+    assert!(height_rms(&found.heights.values, &truth.heights.values) < 0.1);
+}
+
+/// Missing pixels are no data, one image that sees nothing of a cell leaves it out, and a cell that no image shows has no height.
+#[test]
+fn val_cells_that_no_image_shows_have_no_height() {
+    let scene = Scene::hills(32, 1.0);
+    let mut images = scene.nadir_images(&THREE, 45.0);
+    images.iter_mut().for_each(|i| i.brightness[5 * 32 + 7] = f64::NAN);
+    images[0].brightness[20 * 32 + 9] = f64::NAN;
+    let found = recovered(&images, &scene, &quick());
+    let bare: Vec<usize> = (0..1024).filter(|&k| found.heights.values[k].is_nan()).collect();
+    assert_eq!(bare, [5 * 32 + 7]);
+    assert!(found.albedo.values[bare[0]].is_nan() && found.lit.values[bare[0]] == 0 && found.leaning.values[bare[0]]);
+    assert_eq!(found.lit.values[20 * 32 + 9], 2);
+}
+
+/// Six images with exposures wrong by up to 6 %, level on the whole: found within 0.5 %, and slopes are better than with exposures held.
+#[test]
+fn val_exposures_are_found() {
+    let scene = Scene { map: sastrugi_numeric::Geometry::square(64, 64, 1.0), ..Scene::hills(64, 1.0) };
+    let truth = scene.truth();
+    let plane = calibration::plane(&scene.map, &truth.heights.values);
+    // The start has the true mean plane: exposures cannot tell it from themselves.
+    let start = Grid::new(
+        scene.map,
+        (0..4096).map(|k| plane[0] * scene.map.x(k % 64) + plane[1] * scene.map.y(k / 64)).collect(),
+    );
+    let azimuths = [0.0, 60.0, 120.0, 180.0, 240.0, 300.0];
+    let mut images = noisy(&scene.nadir_images(&azimuths, 45.0), 0.005, 6);
+    let factors = [1.06, 0.97, 1.02, 0.95, 1.01, 0.992];
+    for (image, factor) in images.iter_mut().zip(factors) {
+        image.brightness.iter_mut().for_each(|v| *v *= factor);
+    }
+    let run = |free_exposure| {
+        let settings = Settings { free_exposure, rounds: 20, ..quick() };
+        recover(&images, &start, &Known::default(), &settings, &streams()).unwrap()
+    };
+    let (held, free) = (run(false), run(true));
+    let mean = libm::exp(factors.iter().map(|f| libm::log(*f)).sum::<f64>() / 6.0);
+    let worst =
+        free.calibrations.iter().zip(factors).map(|(c, f)| (c.exposure * mean / f - 1.0).abs()).fold(0.0, f64::max);
+    let [with, without] = [&free, &held].map(|r| slope_rms(&r.slopes, &truth.slopes));
+    println!(
+        "exposures within {:.2} % after {} rounds; slopes {without:.4} held, {with:.4} free",
+        100.0 * worst,
+        free.rounds.len()
+    );
+    assert!(worst < 5e-3 && with < 0.7 * without);
+}
+
+/// Haze of 2, 6 and 10 % of the brightness in three of six images, found beside a coarse DEM, which tells relief from haze.
+#[test]
+fn val_haze_is_found_where_heights_are_known_coarsely() {
+    let scene = Scene::hills(64, 1.0);
+    let truth = scene.truth();
+    let azimuths = [0.0, 60.0, 120.0, 180.0, 240.0, 300.0];
+    let mut images = noisy(&scene.nadir_images(&azimuths, 45.0), 0.002, 6);
+    let hazes = [0.0, 0.016, 0.0, 0.010, 0.0, 0.003];
+    for (image, haze) in images.iter_mut().zip(hazes) {
+        image.brightness.iter_mut().for_each(|v| *v += haze);
+    }
+    let coarse = Coarse { dem: sastrugi_numeric::resample::block_means(&truth.heights, 4), sigma_m: 0.02 };
+    let known = Known { points: vec![], coarse: Some(coarse) };
+    let run = |free_haze| {
+        let settings = Settings { free_haze, rounds: 20, ..quick() };
+        recover(&images, &level(&scene), &known, &settings, &streams()).unwrap()
+    };
+    let (held, free) = (run(false), run(true));
+    let worst = free.calibrations.iter().zip(hazes).map(|(c, h)| (c.haze - h).abs()).fold(0.0, f64::max);
+    let [with, without] = [&free, &held].map(|r| slope_rms(&r.slopes, &truth.slopes));
+    println!("hazes within {worst:.4} after {} rounds; slopes {without:.4} held, {with:.4} free", free.rounds.len());
+    assert!(worst < 0.005 && with < 0.7 * without);
+}
+
+/// Twice and half the pixels of a cell: fine pixels are averaged, with less noise; the surface comes back.
+#[test]
+fn val_cells_take_the_mean_of_their_pixels() {
+    let fine = Scene::hills(64, 1.0);
+    let images = fine.nadir_images(&THREE, 45.0);
+    let coarse = Scene { map: sastrugi_numeric::Geometry::square(32, 32, 2.0), ..Scene::hills(64, 1.0) };
+    let found = recovered(&images, &coarse, &quick());
+    let truth = coarse.truth();
+    let error = slope_rms(&found.slopes, &truth.slopes);
+    println!("slopes {error:.5}");
+    assert!(error < 3e-3);
+    let same = recovered(&coarse.nadir_images(&THREE, 45.0), &coarse, &quick());
+    let ratio = same.covariances[500][0] / found.covariances[500][0];
+    assert!((ratio - 4.0).abs() < 0.1, "four pixels have a quarter of the variance: {ratio}");
+}
