@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may end where it stands")]
 
 mod image;
+mod inputs;
 mod machine;
 mod route;
 mod perturb;

@@ -98,8 +98,6 @@ enum DemError {
     Shows { post_m: f64, what: &'static str, diameter_m: f64 },
     #[error("holds an albedo of {albedo} at x = {x}, y = {y} m; albedo lies in 0 to 1")]
     NoAlbedo { albedo: f64, x: f64, y: f64 },
-    #[error("{0}")]
-    Potential(String),
     #[error("cannot pass through its altimetry: {0}")]
     Altimetry(#[from] AltimetryError),
 }
@@ -116,8 +114,12 @@ struct Inputs<'a> {
     potential: Option<&'a Grid>,
 }
 
-/// A failure, and the input that it is about.
-type Failed = (NamedInput, DemError);
+impl NamedInput {
+    /// A failure of it.
+    fn failed(&self, error: &DemError) -> TerrainError {
+        self.error(error.to_string())
+    }
+}
 
 impl Elaborate {
     /// Place of a lattice point in the DEM's coordinates, m.
@@ -277,14 +279,15 @@ impl Elaborate {
         Ok(())
     }
 
-    fn refine(&self, streams: &Streams, inputs: &Inputs<'_>) -> Result<Terrain, Failed> {
+    fn refine(&self, streams: &Streams, inputs: &Inputs<'_>) -> Result<Terrain, TerrainError> {
         let dem = inputs.dem;
-        let of_dem = |e: DemError| (self.dem(), e);
+        let of_dem = |e: DemError| self.dem().failed(&e);
         let g = &dem.geometry;
         self.check_size(g).map_err(of_dem)?;
         let post_m = g.cell[0].min(g.cell[1]);
         let points = self.points(dem, &inputs.points).map_err(|e| of_dem(e.into()))?;
-        let beyond_m = if points.is_empty() { 0.0 } else { g.cell[0].max(g.cell[1]) };
+        // The lattice points around a point may lie one spacing beyond its reach.
+        let beyond_m = if points.is_empty() { 0.0 } else { g.cell[0].max(g.cell[1]) + 2.0 * self.spacing_m };
         let posts = self.posts(g, beyond_m).map_err(of_dem)?;
         let margin = if self.raw.processes.is_empty() { 0 } else { CRATER_POSTS };
         self.check_raster(dem, &posts, margin).map_err(of_dem)?;
@@ -304,7 +307,7 @@ impl Elaborate {
             self.change(&mut patch.heights, |point, z| z + correction.at(point));
         }
         if let (Some(albedo), Some(name)) = (inputs.albedo, self.albedo()) {
-            self.measured_albedo(albedo, &world, &mut patch).map_err(|e| (name, e))?;
+            self.measured_albedo(albedo, &world, &mut patch).map_err(|e| name.failed(&e))?;
         }
         let mut maps = planetary::maps(&world, self.geometry(), &patch);
         if inputs.albedo.is_some() && world.albedo.is_none() {
@@ -319,12 +322,12 @@ impl Elaborate {
     }
 
     /// The raster that the rocks follow.
-    fn potential(&self, inputs: &Inputs<'_>) -> Result<Option<Potential>, Failed> {
+    fn potential(&self, inputs: &Inputs<'_>) -> Result<Option<Potential>, TerrainError> {
         let (Some(raster), Some(name)) = (inputs.potential, planetary::potential_input(&self.raw.processes)) else {
             return Ok(None);
         };
         let made = Potential::new(raster, self.spacing_m, self.offset_m);
-        made.map(Some).map_err(|reason| (name, DemError::Potential(reason)))
+        made.map(Some).map_err(|reason| name.error(reason))
     }
 
     fn texture_notes(&self, texture: &TextureFit, g: &Geometry) -> Vec<String> {
@@ -361,22 +364,22 @@ impl Elaborate {
     }
 
     /// The inputs, each in the place of its name.
-    fn sorted<'a>(&self, inputs: &'a [Input]) -> Result<Inputs<'a>, Failed> {
+    fn sorted<'a>(&self, inputs: &'a [Input]) -> Result<Inputs<'a>, TerrainError> {
         let mut given = inputs.iter();
         let mut grid = |name: Option<NamedInput>| match (name, &mut given) {
             (None, _) => Ok(None),
             (Some(name), given) => match given.next() {
                 Some(Input::Grid(grid)) => Ok(Some(grid)),
-                _ => Err((name, DemError::Missing)),
+                _ => Err(name.failed(&DemError::Missing)),
             },
         };
-        let dem = grid(Some(self.dem()))?.ok_or((self.dem(), DemError::Missing))?;
+        let dem = grid(Some(self.dem()))?.ok_or_else(|| self.dem().failed(&DemError::Missing))?;
         let albedo = grid(self.albedo())?;
         let potential = grid(planetary::potential_input(&self.raw.processes))?;
         let mut points = match (self.altimetry(), given.next()) {
             (None, _) => Vec::new(),
             (Some(_), Some(Input::Points(points))) => points.clone(),
-            (Some(name), _) => return Err((name, DemError::Missing)),
+            (Some(name), _) => return Err(name.failed(&DemError::Missing)),
         };
         let listed = |p: &Vec<f64>| [0, 1, 2, 3].map(|k| p.get(k).copied().unwrap_or(0.0));
         points.extend(self.raw.altimetry_points_m.iter().map(listed));
@@ -427,7 +430,6 @@ impl Generator for Elaborate {
     }
 
     fn generate(&self, streams: &Streams, inputs: &[Input]) -> Result<Terrain, TerrainError> {
-        let made = self.sorted(inputs).and_then(|inputs| self.refine(streams, &inputs));
-        made.map_err(|(input, e)| input.error(e.to_string()))
+        self.refine(streams, &self.sorted(inputs)?)
     }
 }

@@ -141,6 +141,27 @@ fn prop_order_and_far_points_change_nothing() {
     }
 }
 
+/// Windows of every offset agree along a dense track that runs out of each of them, over lines of posts.
+#[test]
+fn prop_windows_along_a_track_agree() {
+    let dem = site(24, 24, [1.28, 1.28]);
+    let track: Vec<[f64; 3]> = (0..90).map(|k| [101.0 + 0.26 * f64::from(k), 208.3, f64::from(k % 4)]).collect();
+    let of = |west: u32, cols: u32| {
+        let params = json!({
+            "cell_m": 0.08, "basic_spacing_m": 0.08, "origin_m": [101.6 + 0.08 * f64::from(west), 207.04], "size_px": [cols, 30],
+            "altimetry_points_m": track
+        });
+        refined(params, &dem).heights
+    };
+    let whole = of(0, 260);
+    for west in 0..80 {
+        let part = of(3 * west, 10);
+        for (row, col) in (0..30).flat_map(|row| (0..10).map(move |col| (row, col))) {
+            assert_eq!(part.at(row, col), whole.at(row, col + 3 * west as usize), "{west}");
+        }
+    }
+}
+
 /// A soft point is missed by less than its sigma, moves nothing where it agrees to within sigma, and is nearly met from afar.
 #[test]
 fn val_soft_points_are_met_within_sigma() {
