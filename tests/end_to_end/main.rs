@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may end where it stands")]
 
 mod machine;
+mod photoclinometry;
 mod route;
 mod rover;
 mod team;

@@ -16,6 +16,7 @@ pub mod likelihood_profile;
 pub mod logs;
 pub mod missions;
 pub mod parameters;
+pub mod photoclinometry;
 pub mod profile_psd;
 pub mod psd;
 pub mod replicates;
@@ -43,6 +44,7 @@ pub use likelihood_profile::LikelihoodProfileRow;
 pub use logs::LogRow;
 pub use missions::MissionRow;
 pub use parameters::ParameterRow;
+pub use photoclinometry::{PhotoclinometryBandRow, PhotoclinometryRow};
 pub use profile_psd::ProfilePsdRow;
 pub use psd::PsdRow;
 pub use replicates::ReplicateRow;
@@ -120,7 +122,7 @@ impl Table {
 }
 
 /// All tables, in the order of the report and of `schema`.
-pub const ALL: [&Table; 27] = [
+pub const ALL: [&Table; 29] = [
     &TerrainRow::TABLE,
     &SurfaceRow::TABLE,
     &FitRow::TABLE,
@@ -146,6 +148,8 @@ pub const ALL: [&Table; 27] = [
     &RoverRow::TABLE,
     &RoverSampleRow::TABLE,
     &ImageRow::TABLE,
+    &PhotoclinometryRow::TABLE,
+    &PhotoclinometryBandRow::TABLE,
     &LogRow::TABLE,
     &DemFitRow::TABLE,
 ];

@@ -9,6 +9,7 @@ pub mod matched;
 pub mod missions;
 pub mod navigate;
 pub mod original;
+pub mod photoclinometry;
 pub mod rasters;
 pub mod roughness;
 pub mod route;

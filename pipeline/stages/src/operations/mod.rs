@@ -6,6 +6,7 @@ pub mod drawn;
 pub mod fits;
 pub mod images;
 pub mod masks;
+pub mod photoclinometry;
 pub mod place;
 pub mod roughness;
 pub mod routes;

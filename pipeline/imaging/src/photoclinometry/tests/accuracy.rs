@@ -62,7 +62,7 @@ fn stat_noise_of_one_percent_by_sun() {
         "suns | slope rms | predicted | specified | albedo rms | condition | R(albedo, slope) | height rms, cells | warnings"
     );
     for (name, azimuths, elevation, specified, factor) in cases {
-        let settings = Settings { noise: Noise { absolute: 0.0, relative: 0.01 }, condition_max: 1e4, ..quick() };
+        let settings = Settings { noise: Some(Noise { absolute: 0.0, relative: 0.01 }), condition_max: 1e4, ..quick() };
         let found = recovered(&noisy(&scene.nadir_images(&azimuths, elevation), 0.01, 5), &scene, &settings);
         let slopes = slope_rms(&found.slopes, &truth.slopes);
         let expected = (found.covariances.iter().map(|c| c[0] + c[3]).sum::<f64>() / 4096.0).sqrt();
@@ -91,7 +91,7 @@ fn covered(worlds: u64, samples: usize) {
     let scene = Scene::hills(48, 1.0);
     let truth = scene.truth();
     let images = scene.nadir_images(&THREE, 45.0);
-    let settings = Settings { noise: Noise { absolute: 0.0, relative: 0.01 }, samples, ..Settings::default() };
+    let settings = Settings { noise: Some(Noise { absolute: 0.0, relative: 0.01 }), samples, ..Settings::default() };
     let inner: Vec<usize> = (0..48 * 48).filter(|k| [k / 48, k % 48].iter().all(|v| (4..44).contains(v))).collect();
     let mut errors: [Vec<f64>; 4] = Default::default();
     let mut sigmas: [Vec<f64>; 4] = Default::default();
@@ -139,10 +139,10 @@ fn stat_noise_is_estimated_from_residuals() {
     let scene = Scene::hills(64, 1.0);
     let images = noisy(&scene.nadir_images(&[0.0, 90.0, 180.0, 270.0], 45.0), 0.02, 8);
     let assumed = Noise { absolute: 0.0, relative: 0.01 };
-    let settings = Settings { noise: assumed, estimate_noise: true, ..quick() };
+    let settings = Settings { noise: Some(assumed), estimate_noise: true, ..quick() };
     let found = recovered(&images, &scene, &settings);
     assert!((found.noise_scale - 2.0).abs() < 0.14, "{}", found.noise_scale);
-    let plain = recovered(&images, &scene, &Settings { noise: assumed, ..quick() });
+    let plain = recovered(&images, &scene, &Settings { noise: Some(assumed), ..quick() });
     let ratio = found.covariances[2000][0] / plain.covariances[2000][0];
     assert!((ratio - found.noise_scale * found.noise_scale).abs() < 1e-9);
 }
