@@ -23,7 +23,7 @@ pub enum Integration {
     /// Weighted least squares over the whole map.
     #[default]
     Poisson,
-    /// Outward from the centre, averaged over random paths, as published.
+    /// Outward from the centre, averaged over random paths, as published; constraints on heights do not count.
     Paths,
 }
 

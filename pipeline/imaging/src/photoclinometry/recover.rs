@@ -298,7 +298,7 @@ impl<'a> Inversion<'a> {
         let tied = !constraints.is_empty();
         let system = System::new(self.geometry, &information, constraints);
         let (mut heights_m, iterations) = self.integrate(&system, &slopes, &information);
-        if !tied {
+        if !tied || self.settings.integration == Integration::Paths {
             let shift = sums::mean(&self.start.values) - sums::mean(&heights_m);
             heights_m.iter_mut().for_each(|z| *z += shift);
         }
@@ -337,7 +337,7 @@ impl<'a> Inversion<'a> {
             let start = if prior.is_some() { None } else { self.cells[k].map(|c| guess(&c.fit)) };
             let problem = Problem { photometry: &self.photometry, samples, prior, fixed_albedo: fixed };
             let fit = problem.solve(start)?;
-            Some(Cell { fit, lit: samples.len() as u8, leaning: prior.is_some() })
+            Some(Cell { fit, lit: samples.len().min(usize::from(u8::MAX)) as u8, leaning: prior.is_some() })
         };
         let cells = (0..self.geometry.len()).into_par_iter().with_min_len(256);
         let firm: Vec<Option<Cell>> = cells
