@@ -551,6 +551,31 @@ impl Perturb {
     }
 }
 
+/// `[[photoclinometry]]` around the settings of an inversion.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PhotoclinometryItem {
+    /// Id, `[a-z0-9][a-z0-9.-]{0,63}`, unique in the study. Where the images show several surfaces, one `<id>-<surface>` for each.
+    pub id: String,
+    /// Ids of images; the id of a swept image stands for all of its images. Three or more of each surface.
+    pub images: Vec<String>,
+    /// Id of a coarse DEM that holds the heights: rounds begin there, and it is a soft constraint.
+    #[serde(default)]
+    pub coarse: Option<String>,
+    /// Standard deviation of the heights of its cells, m.
+    #[serde(default)]
+    pub coarse_sigma_m: Option<f64>,
+    /// Label for statistics.
+    #[serde(default)]
+    pub group: Option<String>,
+    /// Explicit seed instead of the study's.
+    #[serde(default)]
+    pub seed: Option<u64>,
+    /// One inversion per value of a setting: `sweep.<setting> = [...]`, as `sweep."first_image_errors.exposure" = [0.0, 0.02]`.
+    #[serde(default)]
+    pub sweep: BTreeMap<String, Vec<serde_json::Value>>,
+}
+
 /// `[[traverse]]` around the parameters of a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]

@@ -5,6 +5,7 @@
 mod image;
 mod inputs;
 mod machine;
+mod photoclinometry;
 mod route;
 mod perturb;
 mod rover;

@@ -172,6 +172,16 @@ pub enum Verb {
         sastrugi render mars.tif --camera pinhole:4,2,0.3,4,12,0 --size 960x540 -o rover.png"
     )]
     Render(Render),
+    /// Recover heights and albedo from three or more registered images of one surface under different suns.
+    #[command(
+        after_help = "IMAGES.toml lists the JSON files beside the images that `render` writes, `images = [\"a.json\", ...]`, or describes\n\
+        images with the same keys in [[image]]; `coarse` and `coarse_sigma_m` add a coarse DEM, `truth` a surface to compare with,\n\
+        [settings] anything of `sastrugi kinds photoclinometry`. Beside DEM.tif stand DEM.albedo.tif, DEM.uncertainty.tif\n\
+        (standard deviation of heights) and DEM.lit.tif (images that show a cell lit).\n\n\
+        Examples:\n  sastrugi photoclinometry images.toml -o dem.tif\n  \
+        sastrugi photoclinometry images.toml --set cell_m=2 --set free_exposure=true --set stereo='{}' -o dem.tif"
+    )]
+    Photoclinometry(Photoclinometry),
     /// Say what a file or a release is.
     #[command(after_help = "Example:\n  sastrugi info terrain.tif")]
     Info(Info),
@@ -199,6 +209,7 @@ impl Verb {
             Self::Convert(args) => Some(&args.output),
             Self::Hillshade(args) => Some(&args.output),
             Self::Render(args) => Some(&args.output),
+            Self::Photoclinometry(args) => Some(&args.output),
             Self::Pack(args) => Some(&args.output),
             Self::Roughness(args) => args.classes.as_deref(),
             Self::Analyze(args) => args.output.as_deref(),
@@ -611,6 +622,26 @@ pub struct Render {
     #[command(flatten)]
     pub reading: Reading,
     /// How a GeoTIFF is written.
+    #[command(flatten)]
+    pub writing: Writing,
+}
+
+/// `photoclinometry`.
+#[derive(Debug, Args)]
+pub struct Photoclinometry {
+    /// Images and what is known of them.
+    #[arg(value_name = "IMAGES.toml")]
+    pub images: PathBuf,
+    /// A setting (see `kinds photoclinometry`), `name=value`.
+    #[arg(long = "set", value_name = "K=V")]
+    pub set: Vec<String>,
+    /// Seed of the random streams (paths, perturbed solutions).
+    #[arg(long, value_name = "N")]
+    pub seed: Option<u64>,
+    /// Heights to write, .tif; maps stand beside them.
+    #[arg(short, long, value_name = "DEM.tif")]
+    pub output: PathBuf,
+    /// How GeoTIFFs are written.
     #[command(flatten)]
     pub writing: Writing,
 }

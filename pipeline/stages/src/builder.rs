@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 /// Suffixes that files of the release add to an id.
-const RESERVED: [&str; 5] = ["raw", "metric", "background", "residual", "mask"];
+const RESERVED: [&str; 7] = ["raw", "metric", "background", "residual", "mask", "uncertainty", "lit"];
 
 /// Why a study has no graph.
 #[derive(Debug, thiserror::Error)]

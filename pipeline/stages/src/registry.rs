@@ -32,7 +32,7 @@ pub enum Form {
 }
 
 /// Sections in the order in which they may refer to one another.
-pub const SECTIONS: [Section; 12] = [
+pub const SECTIONS: [Section; 13] = [
     Section {
         name: "dem",
         form: Form::Array,
@@ -60,6 +60,20 @@ pub const SECTIONS: [Section; 12] = [
         envelope: schema_of::<envelope::TextureItem>,
         kinds: jobs::texture::kinds,
         add: jobs::texture::add,
+    },
+    Section {
+        name: "image",
+        form: Form::Array,
+        envelope: schema_of::<envelope::ImageItem>,
+        kinds: jobs::image::kinds,
+        add: jobs::image::add,
+    },
+    Section {
+        name: "photoclinometry",
+        form: Form::Array,
+        envelope: schema_of::<envelope::PhotoclinometryItem>,
+        kinds: jobs::photoclinometry::kinds,
+        add: jobs::photoclinometry::add,
     },
     Section {
         name: "roughness",
@@ -102,13 +116,6 @@ pub const SECTIONS: [Section; 12] = [
         envelope: schema_of::<envelope::RoverItem>,
         kinds: jobs::rover::kinds,
         add: jobs::rover::add,
-    },
-    Section {
-        name: "image",
-        form: Form::Array,
-        envelope: schema_of::<envelope::ImageItem>,
-        kinds: jobs::image::kinds,
-        add: jobs::image::add,
     },
     Section {
         name: hypotheses::SECTION,

@@ -16,6 +16,7 @@ pub mod likelihood_profile;
 pub mod logs;
 pub mod missions;
 pub mod parameters;
+pub mod photoclinometry;
 pub mod profile_psd;
 pub mod psd;
 pub mod replicates;
@@ -45,6 +46,7 @@ pub use likelihood_profile::LikelihoodProfileRow;
 pub use logs::LogRow;
 pub use missions::MissionRow;
 pub use parameters::ParameterRow;
+pub use photoclinometry::{PhotoclinometryBandRow, PhotoclinometryRow};
 pub use profile_psd::ProfilePsdRow;
 pub use psd::PsdRow;
 pub use replicates::ReplicateRow;
@@ -124,7 +126,7 @@ impl Table {
 }
 
 /// All tables, in the order of the report and of `schema`.
-pub const ALL: [&Table; 29] = [
+pub const ALL: [&Table; 31] = [
     &TerrainRow::TABLE,
     &SurfaceRow::TABLE,
     &FitRow::TABLE,
@@ -152,6 +154,8 @@ pub const ALL: [&Table; 29] = [
     &ImageRow::TABLE,
     &RoverDesignRow::TABLE,
     &RoverEffectRow::TABLE,
+    &PhotoclinometryRow::TABLE,
+    &PhotoclinometryBandRow::TABLE,
     &LogRow::TABLE,
     &DemFitRow::TABLE,
 ];

@@ -8,6 +8,7 @@ mod fits;
 mod generate;
 mod lists;
 mod navigate;
+mod photoclinometry;
 mod render;
 mod rover;
 mod shown;
@@ -45,6 +46,7 @@ pub fn dispatch(arguments: &Arguments) -> Verdict {
         Verb::Compare(args) => compare::compare(args, common),
         Verb::Convert(args) => files::convert(args, common),
         Verb::Hillshade(args) => files::hillshade(args, common),
+        Verb::Photoclinometry(args) => photoclinometry::photoclinometry(args, common),
         Verb::Render(args) => render::render(args, common),
         Verb::Info(args) => files::info(args, common),
         Verb::Kinds(args) => lists::kinds(args, common),

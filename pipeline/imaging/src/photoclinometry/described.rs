@@ -1,6 +1,7 @@
 //! Images by the files beside them, and the map that they have in common.
 
 use super::observation::Image;
+use super::params::Settings;
 use crate::camera::Camera;
 use crate::description::ImageDescription;
 use crate::direction::direction;
@@ -90,32 +91,23 @@ pub fn level_m(pose: &CameraPose) -> f64 {
     }
 }
 
-/// Where a map lies.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct MapRequest {
-    /// Cell size, m; the finest pixel of parallel cameras when absent.
-    pub cell_m: Option<f64>,
-    /// `[x0, y0, x1, y1]`, m; what all images show when absent.
-    pub window_m: Option<[f64; 4]>,
-}
-
 /// The map of some images: a window, or the rectangle that all of them show of level ground at `level_m`.
 ///
 /// # Errors
 /// Cameras without a pixel size and no `cell_m`; a window, or images with nothing in common, smaller than 4 x 4 cells; maps too large.
-pub fn map(poses: &[CameraPose], level_m: f64, request: &MapRequest) -> Result<Geometry, ParameterError> {
+pub fn map(poses: &[CameraPose], level_m: f64, settings: &Settings) -> Result<Geometry, ParameterError> {
     let finest = poses.iter().filter_map(CameraPose::pixel_m).reduce(f64::min);
-    let Some(cell) = request.cell_m.or(finest) else {
+    let Some(cell) = settings.cell_m.or(finest) else {
         return Err(ParameterError::new("cell_m", "is missing; pinhole cameras do not state a pixel size"));
     };
     ParameterError::positive("cell_m", cell)?;
     let shown_by = |pose: &CameraPose| footprint(&pose.camera(), level_m);
     let common = || poses.iter().map(shown_by).reduce(common).unwrap_or([f64::NAN; 4]);
-    let [x0, y0, x1, y1] = request.window_m.unwrap_or_else(common);
+    let [x0, y0, x1, y1] = settings.window_m.unwrap_or_else(common);
     let count = |low: f64, high: f64| ((high - low) / cell + ROUNDING).floor();
     let (cols, rows) = (count(x0, x1), count(y0, y1));
     if !(cols >= 4.0 && rows >= 4.0) {
-        let what = if request.window_m.is_some() { "the window" } else { "what all images show" };
+        let what = if settings.window_m.is_some() { "the window" } else { "what all images show" };
         return Err(ParameterError::new("window_m", format!("{what} is smaller than 4 x 4 cells of {cell} m")));
     }
     if cols > SIDE_MAX as f64 || rows > SIDE_MAX as f64 {
@@ -167,14 +159,14 @@ mod tests {
             rows: 40,
             cols: 60,
         };
-        let g = map(&[above], 3.0, &MapRequest::default()).unwrap();
+        let g = map(&[above], 3.0, &Settings::default()).unwrap();
         assert_eq!((g.rows, g.cols, g.cell), (40, 60, [0.5; 2]));
         assert!((g.origin[0] - 35.0).abs() < 1e-9 && (g.origin[1] - 10.0).abs() < 1e-9, "{:?}", g.origin);
         // 30 m across, seen from the east at 30 deg elevation: 60 m of ground.
         let wide = footprint(&parallel(30.0, 50.0).camera(), 3.0);
         assert!((wide[2] - wide[0] - 60.0).abs() < 1e-9 || (wide[3] - wide[1] - 60.0).abs() < 1e-9, "{wide:?}");
         let moved = shifted(above, [10.0, -4.0]);
-        let g = map(&[above, moved], 3.0, &MapRequest { cell_m: Some(1.0), window_m: None }).unwrap();
+        let g = map(&[above, moved], 3.0, &Settings { cell_m: Some(1.0), ..Settings::default() }).unwrap();
         assert_eq!((g.rows, g.cols), (16, 20));
     }
 
@@ -187,10 +179,10 @@ mod tests {
             rows: 10,
             cols: 10,
         };
-        assert_eq!(map(&[pinhole], 0.0, &MapRequest::default()).unwrap_err().key, "cell_m");
+        assert_eq!(map(&[pinhole], 0.0, &Settings::default()).unwrap_err().key, "cell_m");
         let apart = [parallel(90.0, 0.0), parallel(90.0, 500.0)];
-        assert_eq!(map(&apart, 3.0, &MapRequest::default()).unwrap_err().key, "window_m");
-        let huge = MapRequest { cell_m: Some(1e-6), window_m: None };
+        assert_eq!(map(&apart, 3.0, &Settings::default()).unwrap_err().key, "window_m");
+        let huge = Settings { cell_m: Some(1e-6), ..Settings::default() };
         assert_eq!(map(&apart[..1], 3.0, &huge).unwrap_err().key, "cell_m");
     }
 }

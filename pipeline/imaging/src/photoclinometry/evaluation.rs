@@ -45,6 +45,8 @@ pub struct Evaluation {
 /// Truth and result in a band of wavelengths.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Band {
+    /// Number of the octave, from 0.
+    pub octave: usize,
     /// Shortest wavelength, m.
     pub wavelength_min_m: f64,
     /// Longest wavelength, m.
@@ -217,6 +219,7 @@ pub fn bands(truth: &Grid, recovered: &Grid) -> Vec<Band> {
         }
     }
     let band = |(octave, ([truth, result, product], modes)): (usize, ([f64; 3], usize))| Band {
+        octave,
         wavelength_min_m: shortest * (1u64 << octave) as f64,
         wavelength_max_m: shortest * (2u64 << octave) as f64,
         modes,

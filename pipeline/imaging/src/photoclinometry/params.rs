@@ -1,11 +1,14 @@
 //! How images become heights: settings as a study writes them, with their checks.
 
+use super::described::FirstImageErrors;
 use crate::description::Noise;
 use crate::photometry::Photometry;
 use sastrugi_schemas::ParameterError;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+/// Noise of images that state none.
+pub const NOISE: Noise = Noise { relative: 0.01, absolute: 1e-4 };
 /// Most rounds of re-projection.
 pub const ROUNDS_MAX: usize = 20;
 /// Most paths of the published integration.
@@ -20,7 +23,7 @@ pub enum Integration {
     /// Weighted least squares over the whole map.
     #[default]
     Poisson,
-    /// Outward from the centre, averaged over random paths, as published.
+    /// Outward from the centre, averaged over random paths, as published; constraints on heights do not count.
     Paths,
 }
 
@@ -48,10 +51,16 @@ impl Default for Stereo {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Settings {
-    /// Law of brightness.
-    pub photometry: Photometry,
-    /// Noise of a pixel, for weights and uncertainties.
-    pub noise: Noise,
+    /// Cell size of the map, m; the finest pixel of parallel cameras when absent.
+    pub cell_m: Option<f64>,
+    /// Window of the map, `[x0, y0, x1, y1]`, m; what all images show when absent.
+    pub window_m: Option<[f64; 4]>,
+    /// Law of brightness; that of the first image when absent.
+    pub photometry: Option<Photometry>,
+    /// Noise of a pixel, for weights and uncertainties; that of the first image when absent, else 1 % and 1e-4 I/F.
+    pub noise: Option<Noise>,
+    /// Errors put on what is known of the first image, to see what they do.
+    pub first_image_errors: FirstImageErrors,
     /// Scale `noise` to the residuals of cells lit in four or more images.
     pub estimate_noise: bool,
     /// A pixel darker than this share of its image's median (less haze) is in shadow and left out.
@@ -83,8 +92,11 @@ pub struct Settings {
 impl Default for Settings {
     fn default() -> Self {
         Self {
-            photometry: Photometry::default(),
-            noise: Noise { relative: 0.01, absolute: 1e-4 },
+            cell_m: None,
+            window_m: None,
+            photometry: None,
+            noise: None,
+            first_image_errors: FirstImageErrors::default(),
             estimate_noise: false,
             shadow: 0.1,
             rounds: 10,
@@ -106,9 +118,13 @@ impl Settings {
     /// # Errors
     /// The first setting out of bounds.
     pub fn check(&self) -> Result<(), ParameterError> {
-        self.photometry.check().map_err(|e| e.within("photometry"))?;
-        self.noise.check().map_err(|e| e.within("noise"))?;
-        ParameterError::positive("noise", self.noise.absolute + self.noise.relative)?;
+        self.cell_m.map_or(Ok(0.0), |cell| ParameterError::positive("cell_m", cell))?;
+        self.photometry.map_or(Ok(()), |p| p.check().map_err(|e| e.within("photometry")))?;
+        if let Some(noise) = self.noise {
+            noise.check().map_err(|e| e.within("noise"))?;
+            ParameterError::positive("noise", noise.absolute + noise.relative)?;
+        }
+        self.first_image_errors.check().map_err(|e| e.within("first_image_errors"))?;
         ParameterError::not_negative("shadow", self.shadow)?;
         within("rounds", self.rounds, 1, ROUNDS_MAX)?;
         ParameterError::positive("tolerance", self.tolerance)?;

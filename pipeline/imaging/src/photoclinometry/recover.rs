@@ -5,11 +5,12 @@ use super::cell::{Fit, Prior, Problem, Sample};
 use super::integration::{Constraint, HeightPoint, Stop, System};
 use super::normal::Symmetric3;
 use super::observation::{Calibration, Image, Observed, Relief, Stack};
-use super::params::{Integration, Settings};
+use super::params::{Integration, NOISE, Settings};
 use super::paths::integrate_along_paths;
 use super::stereo;
 use super::uncertainty;
 use crate::description::Noise;
+use crate::photometry::Photometry;
 use rayon::prelude::*;
 use sastrugi_numeric::{Geometry, Grid, Streams, sums};
 use sastrugi_schemas::ParameterError;
@@ -201,6 +202,7 @@ struct Inversion<'a> {
     known: Vec<Constraint>,
     calibrations: Vec<Calibration>,
     noise: Noise,
+    photometry: Photometry,
     noise_scale: f64,
     heights_m: Vec<f64>,
     cells: Vec<Option<Cell>>,
@@ -230,7 +232,8 @@ impl<'a> Inversion<'a> {
             streams,
             known: constraints,
             calibrations: images.iter().map(|i| Calibration { exposure: i.exposure, haze: i.haze }).collect(),
-            noise: settings.noise,
+            noise: settings.noise.unwrap_or(NOISE),
+            photometry: settings.photometry.unwrap_or_default(),
             noise_scale: 1.0,
             heights_m: start.values.clone(),
             cells: vec![None; g.len()],
@@ -251,12 +254,12 @@ impl<'a> Inversion<'a> {
             .iter()
             .map(|image| {
                 let view = image.camera.view_from(middle);
-                let brightness = self.settings.photometry.of_slopes([0.0; 2], image.light, view);
+                let brightness = self.photometry.of_slopes([0.0; 2], image.light, view);
                 Sample { brightness, sigma: 0.01 * brightness.max(1e-3), light: image.light, view }
             })
             .collect();
         let problem = Problem {
-            photometry: &self.settings.photometry,
+            photometry: &self.photometry,
             samples: &samples,
             prior: None,
             fixed_albedo: self.settings.albedo,
@@ -295,7 +298,7 @@ impl<'a> Inversion<'a> {
         let tied = !constraints.is_empty();
         let system = System::new(self.geometry, &information, constraints);
         let (mut heights_m, iterations) = self.integrate(&system, &slopes, &information);
-        if !tied {
+        if !tied || self.settings.integration == Integration::Paths {
             let shift = sums::mean(&self.start.values) - sums::mean(&heights_m);
             heights_m.iter_mut().for_each(|z| *z += shift);
         }
@@ -303,14 +306,14 @@ impl<'a> Inversion<'a> {
         let change_m = sums::mean(&change).sqrt();
         let predicted = Relief { geometry: &self.geometry, heights_m: &heights_m };
         let albedo: Vec<f64> = cells.iter().map(|c| c.map_or(f64::NAN, |c| c.fit.albedo)).collect();
-        let brightness_rms = calibration::brightness_rms(&stack, &self.settings.photometry, predicted, &albedo);
+        let brightness_rms = calibration::brightness_rms(&stack, &self.photometry, predicted, &albedo);
         let free = self.settings.free_exposure || self.settings.free_haze;
         let mut drift = 0.0;
         let mut calibrations = self.calibrations.clone();
         if free {
             let plane = (!tied).then(|| calibration::plane(&self.geometry, &self.start.values));
             let free = [self.settings.free_exposure, self.settings.free_haze];
-            let next = calibration::update(&stack, &self.settings.photometry, predicted, &albedo, plane, free);
+            let next = calibration::update(&stack, &self.photometry, predicted, &albedo, plane, free);
             drift = calibration::drift(&calibrations, &next);
             calibrations = next;
         }
@@ -332,9 +335,9 @@ impl<'a> Inversion<'a> {
                 return None;
             }
             let start = if prior.is_some() { None } else { self.cells[k].map(|c| guess(&c.fit)) };
-            let problem = Problem { photometry: &self.settings.photometry, samples, prior, fixed_albedo: fixed };
+            let problem = Problem { photometry: &self.photometry, samples, prior, fixed_albedo: fixed };
             let fit = problem.solve(start)?;
-            Some(Cell { fit, lit: samples.len() as u8, leaning: prior.is_some() })
+            Some(Cell { fit, lit: samples.len().min(usize::from(u8::MAX)) as u8, leaning: prior.is_some() })
         };
         let cells = (0..self.geometry.len()).into_par_iter().with_min_len(256);
         let firm: Vec<Option<Cell>> = cells
@@ -385,7 +388,7 @@ impl<'a> Inversion<'a> {
             let (slopes, albedo) = surface(k)?;
             let source = &self.images[image];
             let view = source.camera.view_from(relief.point(k));
-            Some(albedo * self.settings.photometry.of_slopes(slopes, source.light, view))
+            Some(albedo * self.photometry.of_slopes(slopes, source.light, view))
         };
         stereo::points(self.images, relief, &shade, settings)
     }

@@ -21,7 +21,7 @@ const DESCRIBED_FILES: usize = 64;
 /// Set of the generated heightfields.
 const HEIGHTS: &str = "terrain-files";
 /// Files beside the tables, which the manifest lists with their hashes: id of the set, folder, ending, media type, what they are.
-const SETS: [(&str, &str, &str, &str, &str); 13] = [
+const SETS: [(&str, &str, &str, &str, &str); 14] = [
     (HEIGHTS, "terrain", ".tif", "image/tiff", "Generated heightfields, GeoTIFF, float32 metres"),
     ("terrain-pictures", "terrain", ".png", "image/png", "Generated heightfields in steps of 16 bit"),
     ("texture-files", "texture", ".tif", "image/tiff", "Synthesised textures, GeoTIFF, float32 metres"),
@@ -57,6 +57,13 @@ const SETS: [(&str, &str, &str, &str, &str); 13] = [
     ),
     ("image-descriptions", "image", ".json", "application/json", "Sun, camera and photometry of the rendered images"),
     ("image-pictures", "image", ".png", "image/png", "Rendered images to look at"),
+    (
+        "recovered-files",
+        "photoclinometry",
+        ".tif",
+        "image/tiff",
+        "Surfaces recovered from images, GeoTIFF, float32 metres; maps of albedo, uncertainty and lit images beside them",
+    ),
     ("mcap-files", "mcap", ".mcap", "application/octet-stream", "Recordings of missions and teams, MCAP"),
     ("bag-files", "mcap", "metadata.yaml", "application/yaml", "Descriptions of the recordings for bag readers"),
 ];

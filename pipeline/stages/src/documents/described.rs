@@ -9,7 +9,7 @@ use sastrugi_terrain::{MAPS, MapKind};
 use serde_json::Value;
 
 /// Folders of a release.
-pub const FOLDERS: [(&str, &str); 12] = [
+pub const FOLDERS: [(&str, &str); 13] = [
     ("dem/", "measured inputs, and the same in metres (`.metric.tif`)"),
     ("mask/", "masks of the fits, obstacles of the routes"),
     ("input/", "rasters and measured points that terrains are made with"),
@@ -25,6 +25,10 @@ pub const FOLDERS: [(&str, &str); 12] = [
     (
         "image/",
         "rendered images, GeoTIFF, float32 brightness (I/F), no data -9999 where no ground is seen; `.json`: sun, camera and the rest; `.png` to look at",
+    ),
+    (
+        "photoclinometry/",
+        "surfaces recovered from images, GeoTIFF, float32 metres, no data -9999; `.albedo.tif`, `.uncertainty.tif` (standard deviation of heights, m), `.lit.tif` (images that show a cell lit)",
     ),
     ("mcap/", "one recording per mission, or run of a team"),
     ("tables/", "Parquet, units and descriptions in the column metadata"),

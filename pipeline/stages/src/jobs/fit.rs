@@ -1,6 +1,7 @@
 //! Stage `fit`: the covariance of a measured DEM.
 
 use super::mask::{self, Mask};
+use super::photoclinometry;
 use super::surface::{Surface, SurfaceRows};
 use crate::builder::{BuildError, Builder, HEIGHTS, unknown_id};
 use crate::job::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work};
@@ -93,8 +94,23 @@ impl Subtrahend {
 /// # Errors
 /// A wrong item.
 pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
+    add_where(builder, false)
+}
+
+/// Adds the fits of surfaces recovered from images, which come after those of DEMs and terrains: textures may lie between.
+///
+/// # Errors
+/// As [`add`].
+pub fn add_of_recovered(builder: &mut Builder<'_>) -> Result<(), BuildError> {
+    add_where(builder, true)
+}
+
+fn add_where(builder: &mut Builder<'_>, recovered: bool) -> Result<(), BuildError> {
     for entry in builder.study.entries(STAGE)? {
         let (item, params): (FitItem, Value) = entry.read()?;
+        if photoclinometry::may_be_recovered(builder, &item.dem) != recovered {
+            continue;
+        }
         entry.check_keys::<FitItem>(&params, &schema_of::<FitParameters>())?;
         let Some(field) = builder.heightfields.get(&item.dem).cloned() else {
             return Err(unknown_id(&entry, "dem", &item.dem, builder.heightfields.keys()).into());

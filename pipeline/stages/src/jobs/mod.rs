@@ -11,6 +11,7 @@ pub mod missions;
 pub mod navigate;
 pub mod original;
 pub mod perturbation;
+pub mod photoclinometry;
 pub mod rasters;
 pub mod roughness;
 pub mod route;

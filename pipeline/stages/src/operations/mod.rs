@@ -7,6 +7,7 @@ pub mod fits;
 pub mod images;
 pub mod inputs;
 pub mod masks;
+pub mod photoclinometry;
 pub mod place;
 pub mod roughness;
 pub mod routes;

@@ -9,6 +9,7 @@ pub mod hillshade;
 pub mod local;
 pub mod navigate;
 pub mod parameters;
+pub mod photoclinometry;
 mod reading;
 pub mod releases;
 pub mod render;

@@ -44,7 +44,7 @@ fn val_refusals_say_what_is_wrong() {
     for (settings, key) in [
         (Settings { rounds: 21, ..quick() }, "`rounds`"),
         (Settings { paths: 451, ..quick() }, "`paths`"),
-        (Settings { noise: Noise { absolute: 0.0, relative: 0.0 }, ..quick() }, "`noise`"),
+        (Settings { noise: Some(Noise { absolute: 0.0, relative: 0.0 }), ..quick() }, "`noise`"),
         (Settings { albedo: Some(-0.1), ..quick() }, "`albedo`"),
         (Settings { stereo: Some(Stereo { quality: 1.5, ..Stereo::default() }), ..quick() }, "`stereo.quality`"),
     ] {

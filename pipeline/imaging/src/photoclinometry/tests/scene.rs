@@ -109,7 +109,7 @@ impl Scene {
                     [x, y] = [ray.origin_m[0] + t * back[0], ray.origin_m[1] + t * back[1]];
                 }
                 let (_, slopes) = facet(self, x, y, step);
-                (self.albedo)(x, y) * brightness(slopes, light, camera.view_from([x, y, 0.0]))
+                (self.albedo)(x, y) * brightness(slopes, light, camera.view_from([x, y, (self.height)(x, y)]))
             });
             rays.sum::<f64>() / (FINER * FINER) as f64
         };

@@ -50,7 +50,7 @@ fn conv_errors_grow_in_proportion() {
     };
     let law = |by: f64| {
         let photometry = Photometry { lambert: 0.35 + by, lommel_seeliger: 0.65 - by };
-        errors(&exact, &scene, &truth, &Settings { photometry, ..quick() })
+        errors(&exact, &scene, &truth, &Settings { photometry: Some(photometry), ..quick() })
     };
     let registration = |by: f64| {
         // One image taken by a camera that stands beside where it is said to.

@@ -1,0 +1,176 @@
+//! `photoclinometry`: heights and albedo from images and what is known of them.
+
+use super::{Reading, parameters, read};
+use crate::error::Error;
+use crate::jobs::photoclinometry::STAGE;
+use crate::operations::photoclinometry::{self, Beside, Described, Files, Made, read_description, read_image, refusal};
+use sastrugi_imaging::ImageDescription;
+use sastrugi_imaging::photoclinometry::{Coarse, RecoverError, Settings};
+use sastrugi_numeric::{Streams, sums};
+use sastrugi_schemas::kind::{read_parameters, schema_of};
+use sastrugi_store::dem::{Format, WriteOptions};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+
+/// `IMAGES.toml`: images, and what else is known. Paths are relative to the file.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct ImagesFile {
+    /// Descriptions, the JSON files that `render` and a release have beside images.
+    pub images: Vec<String>,
+    /// Images described here, with the same keys.
+    pub image: Vec<ImageDescription>,
+    /// Coarse DEM that holds the heights: rounds begin there, and it is a soft constraint.
+    pub coarse: Option<String>,
+    /// Standard deviation of the heights of its cells, m.
+    pub coarse_sigma_m: Option<f64>,
+    /// Height of the level ground where rounds begin, m; what the middles of the images show when absent.
+    pub level_m: Option<f64>,
+    /// True surface to compare with.
+    pub truth: Option<String>,
+    /// Settings (see `sastrugi kinds photoclinometry`).
+    pub settings: Settings,
+}
+
+/// What to recover.
+pub struct Request<'a> {
+    /// `IMAGES.toml`.
+    pub images: &'a Path,
+    /// `name=value` pairs of settings.
+    pub set: &'a [String],
+    /// Seed of the random streams.
+    pub seed: u64,
+    /// Heights to write; the maps stand beside them.
+    pub output: &'a Path,
+    /// How to write.
+    pub options: WriteOptions,
+}
+
+/// Recovers a surface and writes it with its maps. Returns what was made.
+///
+/// # Errors
+/// Unknown keys, images that cannot be read or do not determine a surface, files that cannot be written.
+pub fn photoclinometry(request: &Request<'_>) -> Result<Value, Error> {
+    if Format::of_name(request.output) != Some(Format::GeoTiff) {
+        return Err(Error::Usage(format!("{}: heights and maps are GeoTIFFs; name it .tif", request.output.display())));
+    }
+    let file = read_file(request)?;
+    file.settings.check().map_err(Error::from)?;
+    let maps = ["albedo.tif", "uncertainty.tif", "lit.tif"].map(|ending| request.output.with_extension(ending));
+    let folder = request.images.parent().unwrap_or(Path::new("."));
+    let (images, inputs) = described(&file, folder)?;
+    let outputs: Vec<&Path> = [request.output].into_iter().chain(maps.iter().map(PathBuf::as_path)).collect();
+    super::check_distinct(&outputs, &inputs.iter().map(PathBuf::as_path).collect::<Vec<_>>())?;
+    let streams = Streams::for_seed(request.seed, STAGE);
+    let made = photoclinometry::make(images, beside(&file, folder)?, &file.settings, &streams).map_err(refused)?;
+    let [albedo, uncertainty, lit] = &maps;
+    let files = Files {
+        heights: request.output.into(),
+        albedo: albedo.as_path().into(),
+        uncertainty: uncertainty.as_path().into(),
+        lit: lit.as_path().into(),
+    };
+    let mut notes = made.write(files, &request.options)?;
+    notes.extend(made.recovered.warnings.iter().cloned());
+    Ok(told(request, &made, &maps, notes))
+}
+
+fn refused(error: RecoverError) -> Error {
+    match error {
+        RecoverError::Setting(e) => e.into(),
+        RecoverError::TooFewImages(_) | RecoverError::CoplanarLights { .. } => Error::Usage(error.to_string()),
+        _ => refusal(&error).into(),
+    }
+}
+
+fn read_file(request: &Request<'_>) -> Result<ImagesFile, Error> {
+    let mut table = parameters::read_file(request.images)?;
+    if !request.set.is_empty() {
+        let mut settings = table.get("settings").cloned().unwrap_or_else(|| json!({}));
+        parameters::assign(&mut settings, request.set)?;
+        table["settings"] = settings;
+    }
+    parameters::check_schema(&table, &schema_of::<ImagesFile>(), "photoclinometry")?;
+    Ok(read_parameters(&table)?)
+}
+
+/// The images, and their files.
+fn described(file: &ImagesFile, folder: &Path) -> Result<(Vec<Described>, Vec<PathBuf>), Error> {
+    let mut all: Vec<(ImageDescription, PathBuf)> = Vec::new();
+    for name in &file.images {
+        let path = folder.join(name);
+        let description = read_description(&path)?;
+        let image = path.with_file_name(&description.image);
+        all.push((description, image));
+    }
+    for (k, description) in file.image.iter().enumerate() {
+        description.check().map_err(|e| e.within(&format!("image.{k}")))?;
+        all.push((description.clone(), folder.join(&description.image)));
+    }
+    let paths = all.iter().map(|(_, path)| path.clone()).collect();
+    let images = all.into_iter().map(|(description, path)| read_image(description, &path)).collect::<Result<_, _>>()?;
+    Ok((images, paths))
+}
+
+fn beside(file: &ImagesFile, folder: &Path) -> Result<Beside, Error> {
+    let dem = |name: &String| Ok::<_, Error>(read(&folder.join(name), &Reading::default())?.dem.grid);
+    let coarse = match (&file.coarse, file.coarse_sigma_m) {
+        (Some(name), Some(sigma_m)) => Some(Coarse { dem: dem(name)?, sigma_m }),
+        (None, None) => None,
+        _ => return Err(Error::Usage("`coarse` and `coarse_sigma_m` go together".to_owned())),
+    };
+    Ok(Beside { truth: file.truth.as_ref().map(dem).transpose()?, coarse, level_m: file.level_m })
+}
+
+fn told(request: &Request<'_>, made: &Made, maps: &[PathBuf; 3], notes: Vec<String>) -> Value {
+    let r = &made.recovered;
+    let median = |values: &[f64]| sums::median(&sums::finite(values));
+    let rounds: Vec<Value> = r
+        .rounds
+        .iter()
+        .map(|round| {
+            json!({
+                "brightness_rms": round.brightness_rms,
+                "change_m": round.change_m,
+                "iterations": round.iterations,
+                "stereo_points": round.stereo_points,
+            })
+        })
+        .collect();
+    let calibrations: Vec<Value> =
+        r.calibrations.iter().map(|c| json!({ "exposure": c.exposure, "haze": c.haze })).collect();
+    let evaluation = made.evaluation.map(|e| {
+        json!({
+            "cells": e.cells,
+            "shaded_correlation": e.shaded_correlation,
+            "shaded_correlation_ceiling": e.shaded_correlation_ceiling,
+            "slope_error_rms": e.slope_error_rms,
+            "slope_error_rms_ceiling": e.slope_error_rms_ceiling,
+            "slope_rms": e.slope_rms,
+            "height_error_rms_m": e.height_error_rms_m,
+            "height_error_rms_detrended_m": e.height_error_rms_detrended_m,
+            "height_rms_m": e.height_rms_m,
+        })
+    });
+    let written = made.maps();
+    let files: Vec<String> =
+        maps.iter().zip(&written).filter(|(_, map)| map.is_some()).map(|(p, _)| p.display().to_string()).collect();
+    json!({
+        "file": request.output.display().to_string(),
+        "maps": files,
+        "seed": request.seed,
+        "grid": super::describe_grid(&r.heights),
+        "rounds": rounds,
+        "converged": r.converged,
+        "share_leaning": made.share_leaning(),
+        "condition": median(&r.condition.values),
+        "albedo_slope_correlation": median(&r.albedo_slope_correlation.values),
+        "noise_scale": r.noise_scale,
+        "height_sigma_m": r.height_sigma.as_ref().map(|s| median(&s.values)),
+        "calibrations": calibrations,
+        "evaluation": evaluation,
+        "notes": notes,
+    })
+}
