@@ -3,8 +3,8 @@
 #![allow(clippy::unwrap_used, reason = "a test may end where it stands")]
 
 mod machine;
-mod route;
 mod perturb;
+mod route;
 mod rover;
 mod team;
 mod traverse;
