@@ -5,9 +5,9 @@
 mod image;
 mod inputs;
 mod machine;
+mod perturb;
 mod photoclinometry;
 mod route;
-mod perturb;
 mod rover;
 mod team;
 mod traverse;

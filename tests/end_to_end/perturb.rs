@@ -60,7 +60,8 @@ fn text<'a>(row: &'a Row, column: &str) -> &'a str {
 /// `sastrugi rover` on a study; what it prints as JSON.
 fn rover(folder: &Path, study: &str, more: &[&str]) -> Value {
     write(folder, "study.toml", study);
-    let arguments = ["rover", "study.toml", "-o", "release", "--json", "--quiet"].into_iter().chain(more.iter().copied());
+    let arguments =
+        ["rover", "study.toml", "-o", "release", "--json", "--quiet"].into_iter().chain(more.iter().copied());
     let call = sastrugi_in(folder, &arguments.collect::<Vec<_>>());
     assert_eq!(call.code, 0, "{}", call.stderr);
     serde_json::from_str(&call.stdout).unwrap()
@@ -128,7 +129,10 @@ fn val_the_hazard_height_matters_most() {
     let effects = told["effects"].as_array().unwrap();
     let first = effects.iter().find(|row| row["measure"] == "efficiency" && row["rank"] == 1).unwrap();
     for row in effects.iter().filter(|row| row["measure"] == "efficiency") {
-        println!("{} {} {} [{} {}] noise {}", row["parameter"], row["mu_star"], row["mu"], row["mu_low"], row["mu_high"], row["mu_star_noise"]);
+        println!(
+            "{} {} {} [{} {}] noise {}",
+            row["parameter"], row["mu_star"], row["mu"], row["mu_low"], row["mu_high"], row["mu_star_noise"]
+        );
     }
     assert_eq!(first["parameter"], "hazard_step_m");
     assert!(first["mu_low"].as_f64().unwrap() > 0.0, "{first}");
@@ -164,7 +168,10 @@ fn val_one_world_has_no_intervals() {
     let told = rover(folder.path(), &study, &["--trajectories", "1"]);
     for row in told["effects"].as_array().unwrap() {
         assert!(row["mu"].is_f64() && row["mu_star"].is_f64() && row["share"] == 0.1, "{row}");
-        assert!(["mu_low", "mu_star_high", "sigma", "mu_star_noise"].iter().all(|column| row[*column].is_null()), "{row}");
+        assert!(
+            ["mu_low", "mu_star_high", "sigma", "mu_star_noise"].iter().all(|column| row[*column].is_null()),
+            "{row}"
+        );
     }
     let manifest = std::fs::read_to_string(folder.path().join("release/manifest.json")).unwrap();
     assert!(manifest.contains("have no intervals: they need two worlds or more"));
@@ -192,7 +199,8 @@ fn val_wrong_perturbations_are_refused() {
     let steep = STUDY.replace("sample_m = 1.0", "tilt_max_deg = 85.0").replace("\"turn_deg\"", "\"tilt_max_deg\"");
     told(&steep, &["--perturb", "50%"], "a design that is refused: `tilt_max_deg` is");
     told(STUDY.split("[[rover]]").next().unwrap(), &[], "the study has no rovers");
-    let plain: String = STUDY.lines().filter(|line| !line.starts_with("perturb")).map(|line| format!("{line}\n")).collect();
+    let plain: String =
+        STUDY.lines().filter(|line| !line.starts_with("perturb")).map(|line| format!("{line}\n")).collect();
     told(&plain, &["--trajectories", "3"], "`--trajectories` needs --perturb");
     assert!(!folder.path().join("release").exists());
 }

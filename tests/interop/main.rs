@@ -252,7 +252,6 @@ fn val_routes_cost_what_scipy_and_scikit_image_find() {
     [("found", 50), ("no_path", 15), ("isotropic", 20)].into_iter().for_each(|(kind, count)| at_least(kind, count));
 }
 
-/// Every measured DEM reads as rasterio (or numpy) reads it.
 /// Which number of a rover matters most: mu, mu* and sigma of a release as SALib takes them from its designs.
 #[test]
 fn val_effects_of_rovers_are_those_of_salib() {
@@ -297,6 +296,7 @@ levels = 6
 parameters = ["hazard_step_m", "turn_deg", "rows_m", "clearance_m"]
 "#;
 
+/// Every measured DEM reads as rasterio (or numpy) reads it.
 #[test]
 fn val_measured_dems_read_as_rasterio_reads_them() {
     let Some(python) = python() else { return };

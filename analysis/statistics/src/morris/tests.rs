@@ -1,6 +1,7 @@
 //! Elementary effects against closed forms and a published function.
 
 use super::*;
+use proptest::prelude::*;
 use sastrugi_numeric::Streams;
 
 fn stream(purpose: &str) -> Stream {
@@ -202,4 +203,31 @@ fn stat_noise_is_the_star_of_no_effect() {
         noise += i.noise;
     }
     assert!((noise / star - 0.973).abs() < 0.06, "{}", noise / star);
+}
+
+proptest! {
+    /// Effects do not know the order of worlds or trajectories, nor a constant, and go with the unit of the output; mu* is no less than |mu|.
+    /// Tolerance 1e-9 of rounding, for effects up to 100.
+    #[test]
+    fn prop_effects_go_with_the_output(
+        effects in prop::collection::vec(prop::collection::vec(-100.0..100.0f64, 3), 2..6),
+        unit in 0.1..10.0f64,
+        constant in -10.0..10.0f64,
+    ) {
+        let of = |effects: &[Vec<f64>]| screen(&[effects.to_vec()], 0, 0.95, &mut stream("property"))[0];
+        let plain = of(&effects);
+        let mut turned: Vec<Vec<f64>> = effects.iter().map(|t| t.iter().rev().map(|d| d * unit).collect()).collect();
+        turned.reverse();
+        let other = of(&turned);
+        let close = |a: f64, b: f64| (a * unit - b).abs() < 1e-9;
+        prop_assert!(close(plain.mu, other.mu) && close(plain.mu_star, other.mu_star));
+        prop_assert!(close(plain.sigma, other.sigma) && close(plain.noise, other.noise));
+        prop_assert!(plain.mu_star >= plain.mu.abs() - 1e-12);
+        // Of one trajectory: the output moves as a whole.
+        let (points, order) = (vec![vec![0.9, 1.1], vec![1.1, 1.1], vec![1.1, 0.9]], [0, 1]);
+        let values = [effects[0][0], effects[0][1], effects[0][2]];
+        let moved = values.map(|v| v + constant);
+        let pairs = [values, moved].map(|v| elementary_effects(&points, &order, &v));
+        prop_assert!(pairs[0].iter().zip(&pairs[1]).all(|(a, b)| (a - b).abs() < 1e-9));
+    }
 }
