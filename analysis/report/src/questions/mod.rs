@@ -15,6 +15,7 @@ pub mod published;
 pub mod releases;
 mod relief;
 pub mod routes;
+pub mod rovers;
 pub mod scoreboard;
 pub mod sensitivity;
 mod sql;
@@ -41,7 +42,7 @@ pub struct Question {
 }
 
 /// All questions, in the order of the page.
-pub const ALL: [Question; 16] = [
+pub const ALL: [Question; 17] = [
     failures::QUESTION,
     terrain::QUESTION,
     covariance::QUESTION,
@@ -50,6 +51,7 @@ pub const ALL: [Question; 16] = [
     routes::QUESTION,
     formations::QUESTION,
     losses::QUESTION,
+    rovers::QUESTION,
     missions::QUESTION,
     comparison::QUESTION,
     releases::QUESTION,
