@@ -2,7 +2,9 @@
 
     python check_report.py RELEASE REPORT    every query that the report states runs in duckdb and gives its numbers, or rows that they
                                              are computed from: medians, quartiles, shifts and deltas are computed from them once
-                                             more; files that it names are there; a mission ends in its recording as in its row
+                                             more; files that it names are there; a mission ends in its recording as in its row.
+                                             Rovers (of one stage): efficiencies, arrival, intraclass correlation and distance budgets of each
+                                             group are computed from their rows the obvious way
 """
 
 import json
@@ -139,6 +141,63 @@ def quartiles(document):
         same_rows(f"mission-medians, {figure}", ours, theirs)
 
 
+def rovers(report):
+    """Tables on rovers from the rows that their queries give."""
+    document = lambda name: json.loads((report / "data" / f"{name}.json").read_text())
+    efficiency = document("rover-efficiency")
+    names = [column[0] for column in duckdb.sql(efficiency["query"]).description]
+    rows = [dict(zip(names, row)) for row in duckdb.sql(efficiency["query"]).fetchall()]
+    groups = {}
+    for row in (row for row in rows if row["variant"] is None):
+        groups.setdefault(row["group"], []).append(row)
+    expect(len(groups) == len(efficiency["rows"]), f"{len(efficiency['rows'])} sets of rovers, {len(groups)} groups")
+    close = lambda a, b: a is None and b is None or abs(a - b) <= 1e-9 * max(1.0, abs(b))
+    for row in efficiency["rows"]:
+        own = groups[row[0]]
+        worlds = {r["terrain_id"] for r in own}
+        arrived = 100.0 * mean(r["outcome"] == "reached" for r in own)
+        ways = [r for r in own if r["oracle"] == "found"]
+        over = mean(r["efficiency"] * r["oracle_m"] / r["straight_m"] for r in ways) if ways else None
+        found = [len(worlds), len(own), arrived, mean(r["efficiency"] for r in own)]
+        found += [sum(r["straight_m"] for r in own) / sum(r["distance_m"] for r in own), mean(r["efficiency_half_limit"] for r in own), over]
+        ours = [row[k] for k in (1, 2, 3, 6, 9, 12, 13)]
+        expect(all(close(a, b) for a, b in zip(ours, found)), f"rover-efficiency, {row}: {found}")
+        expect(row[4] is None or row[4] <= row[3] <= row[5] and row[7] <= row[6] <= row[8], f"intervals, {row}")
+    for row in document("rover-intraclass")["rows"]:
+        value = (lambda r: r["efficiency"]) if row[1] == "efficiency" else (lambda r: float(r["outcome"] == "reached"))
+        expect(close(row[4], intraclass(groups[row[0]], value)), f"rover-intraclass, {row}: {intraclass(groups[row[0]], value)}")
+    for row in document("rover-budgets")["rows"]:
+        expect(close(row[2], budget(groups[row[0]], row[1] / 100.0)), f"rover-budgets, {row}: {budget(groups[row[0]], row[1] / 100.0)}")
+    return len(groups)
+
+
+def intraclass(rows, value):
+    """One-way analysis of variance of worlds."""
+    worlds = {}
+    for row in rows:
+        worlds.setdefault(row["terrain_id"], []).append(value(row))
+    worlds, n, k = list(worlds.values()), len(rows), len(worlds)
+    centre = mean(v for w in worlds for v in w)
+    between = sum(len(w) * (mean(w) - centre) ** 2 for w in worlds) / (k - 1)
+    within = sum((v - mean(w)) ** 2 for w in worlds for v in w) / (n - k)
+    m = (n - sum(len(w) ** 2 for w in worlds) / n) / (k - 1)
+    return (between - within) / (between + (m - 1) * within)
+
+
+def budget(rows, share):
+    """Where the share that has arrived (Aalen and Johansen) reaches one; none where it does not."""
+    left, arrived, under_way = len(rows), 0.0, 1.0
+    for at in sorted({row["distance_m"] for row in rows}):
+        here = [row["outcome"] for row in rows if row["distance_m"] == at]
+        arrivals, never = here.count("reached"), here.count("lost") + here.count("no_way")
+        arrived += under_way * arrivals / left
+        under_way *= 1 - (arrivals + never) / left
+        left -= len(here)
+        if arrivals and arrived >= share - 1e-12:
+            return at
+    return None
+
+
 def recording():
     """A mission's row and its recording say the same."""
     [(path, outcome, time_s)] = duckdb.sql(
@@ -166,9 +225,11 @@ def check(release):
         if path.stem == "comparison":
             compared(document)
     expect(queries >= 10, f"{queries} queries in the report")
-    quartiles(json.loads((report / "data" / "mission-medians.json").read_text()))
-    recording()
-    return {"queries": queries, "files": files}
+    if (medians := report / "data" / "mission-medians.json").exists():
+        quartiles(json.loads(medians.read_text()))
+        recording()
+    sets = rovers(report) if (report / "data" / "rover-efficiency.json").exists() else 0
+    return {"queries": queries, "files": files, "sets of rovers": sets}
 
 
 if __name__ == "__main__":

@@ -45,6 +45,35 @@ fn val_readers_agree_with_a_release() {
     assert_eq!(call.code, 0, "{}{}", call.stdout, call.stderr);
 }
 
+/// The page on rovers: efficiencies, intraclass correlations and distance budgets come out of the rows again, every query runs.
+#[test]
+fn val_rover_pages_follow_from_their_rows() {
+    let Some(python) = python() else { return };
+    let folder = area();
+    let world = |id: &str, group: &str, coverage: f64| {
+        format!(
+            "[[terrain]]\nid = \"{id}\"\nkind = \"planetary\"\ngroup = \"{group}\"\ncount = 3\nsize_m = [12.0, 12.0]\ncell_m = 0.16\n\
+             basic_spacing_m = 0.01\norigin_m = [-6.0, -6.0]\n\
+             processes = [{{ kind = \"rocks\", coverage = {coverage}, diameter_min_m = 0.04, diameter_max_m = 1.0 }}]\n"
+        )
+    };
+    let study = "[study]\nname = \"rovers\"\ntitle = \"Rovers\"\nseed = 5\ndate = \"2026-11-24\"\nlicense = \"CC0-1.0\"\ncreators = [\"x\"]\n"
+        .to_owned()
+        + &world("thin", "5 %", 0.05)
+        + &world("dense", "18 %", 0.18)
+        + "[[rover]]\nid = \"circle\"\nkind = \"sojourner_like\"\nterrains = [\"thin\", \"dense\"]\nrovers = 6\nradius_m = 5.0\n\
+           distance_limit_m = 60.0\nsweep.hazard_step_m = [0.05, 0.08]\n\
+           [[rover]]\nid = \"plain\"\nkind = \"sojourner_like\"\nterrains = [\"thin\", \"dense\"]\nrovers = 6\nradius_m = 5.0\ndistance_limit_m = 40.0\n";
+    write(folder.path(), "study.toml", &study);
+    let call = sastrugi_in(folder.path(), &["run", "study.toml", "-o", "release", "--quiet"]);
+    assert_eq!(call.code, 0, "{}", call.stderr);
+    let release = folder.path().join("release");
+    let call = check(&python, "check_report.py", &[&release, &release.join("report")]);
+    assert_eq!(call.code, 0, "{}{}", call.stdout, call.stderr);
+    let counts: Value = serde_json::from_str(&call.stdout).unwrap();
+    assert!(counts["sets of rovers"].as_u64() == Some(2) && counts["queries"].as_u64() >= Some(15), "{counts}");
+}
+
 /// Bags of ROS 2 as rosbags and mcap-ros2-support read them, and `analyze`: the same missions as in the viewer flavour. Grid maps
 /// with the terrain's own cells, and with larger ones.
 #[test]

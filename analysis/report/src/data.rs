@@ -11,8 +11,8 @@ use sastrugi_schemas::study::{HypothesisItem, RoughnessSection};
 use sastrugi_schemas::tables::{
     CandidateCurveRow, CandidateRow, CovarianceRow, FitRow, FormationEventRow, FormationRow, FormationSampleRow,
     HeightDistributionRow, ImageRow, LikelihoodProfileRow, LogRow, MissionRow, ParameterRow, ProfilePsdRow, PsdRow,
-    ReplicateRow, RoutePointRow, RouteRow, SampleRow, ScoreCovarianceRow, ScoreRow, StructureRow, SurfaceRow,
-    TerrainRow,
+    ReplicateRow, RoutePointRow, RouteRow, RoverEffectRow, RoverRow, RoverSampleRow, SampleRow, ScoreCovarianceRow,
+    ScoreRow, StructureRow, SurfaceRow, TerrainRow,
 };
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -28,6 +28,8 @@ pub trait Files {
     fn route_points(&self) -> Result<Vec<RoutePointRow>, ReportError>;
     /// Recorded samples of every team on a terrain.
     fn formation_samples(&self, terrain_id: &str) -> Result<Vec<FormationSampleRow>, ReportError>;
+    /// Recorded samples of every rover on a terrain.
+    fn rover_samples(&self, terrain_id: &str) -> Result<Vec<RoverSampleRow>, ReportError>;
     /// A fit file.
     fn fit(&self, path: &str) -> Result<Option<FitFile>, ReportError>;
 }
@@ -114,6 +116,10 @@ pub struct Data {
     pub formations: Vec<FormationRow>,
     /// What happened on these runs.
     pub formation_events: Vec<FormationEventRow>,
+    /// Rovers that made their own way.
+    pub rovers: Vec<RoverRow>,
+    /// Effects of their perturbed parameters.
+    pub rover_effects: Vec<RoverEffectRow>,
     /// Every number of every run.
     pub parameters: Vec<ParameterRow>,
     /// Hashes of decoded content by path, once the release is sealed.

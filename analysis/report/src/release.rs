@@ -7,7 +7,7 @@ use sastrugi_schemas::Record;
 use sastrugi_schemas::fit::FitFile;
 use sastrugi_schemas::manifest::{self, Manifest};
 use sastrugi_schemas::study::{HypothesisItem, RoughnessSection};
-use sastrugi_schemas::tables::{FormationSampleRow, LogRow, RoutePointRow, SampleRow};
+use sastrugi_schemas::tables::{FormationSampleRow, LogRow, RoutePointRow, RoverSampleRow, SampleRow};
 use sastrugi_store::release::{MANIFEST, SHARD, TABLES};
 use sastrugi_store::{dem, digest, parquet};
 use std::fmt::Display;
@@ -61,6 +61,8 @@ impl Data {
             images: release.rows()?,
             formations: release.rows()?,
             formation_events: release.rows()?,
+            rovers: release.rows()?,
+            rover_effects: release.rows()?,
             parameters: release.rows()?,
             contents,
             against: None,
@@ -121,6 +123,10 @@ impl Files for Release {
     }
 
     fn formation_samples(&self, terrain_id: &str) -> Result<Vec<FormationSampleRow>, ReportError> {
+        self.rows_of(terrain_id)
+    }
+
+    fn rover_samples(&self, terrain_id: &str) -> Result<Vec<RoverSampleRow>, ReportError> {
         self.rows_of(terrain_id)
     }
 

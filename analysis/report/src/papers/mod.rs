@@ -1,6 +1,7 @@
 //! Published figures as data, for comparison beside ours. They are never used to tune anything.
 
 pub mod bayrak;
+pub mod jpl;
 
 use crate::data::Data;
 use serde::Deserialize;

@@ -16,6 +16,7 @@ pub mod published;
 pub mod releases;
 mod relief;
 pub mod routes;
+pub mod rovers;
 pub mod scoreboard;
 pub mod sensitivity;
 mod sql;
@@ -42,7 +43,7 @@ pub struct Question {
 }
 
 /// All questions, in the order of the page.
-pub const ALL: [Question; 17] = [
+pub const ALL: [Question; 18] = [
     failures::QUESTION,
     terrain::QUESTION,
     images::QUESTION,
@@ -52,6 +53,7 @@ pub const ALL: [Question; 17] = [
     routes::QUESTION,
     formations::QUESTION,
     losses::QUESTION,
+    rovers::QUESTION,
     missions::QUESTION,
     comparison::QUESTION,
     releases::QUESTION,

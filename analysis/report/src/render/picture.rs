@@ -96,6 +96,29 @@ pub fn classes(
     Ok(placed(codes, data_uri(&png), [cols, rows]))
 }
 
+/// Ground in the colours of its codes (the first where there are none) under its relief, which is not exaggerated: rocks and sand.
+///
+/// # Errors
+/// When the picture cannot be encoded.
+pub fn ground(
+    heights: &Grid,
+    codes: Option<&Grid<u8>>,
+    colours: &[(u8, Rgb)],
+    most: usize,
+) -> Result<Picture, ReportError> {
+    let step = thin::step(heights.rows(), heights.cols(), most);
+    let thin_heights = thin::block_mean(heights, step);
+    let shade = hillshade(&thin_heights, 1.0);
+    let thin_codes = codes.map(|c| thin::block_majority(c, step));
+    let plain = colours.first().map_or(colour::NO_DATA, |c| c.1);
+    let colour_of = |i: usize| match &thin_codes {
+        Some(codes) => colours.iter().find(|(code, _)| *code == codes.values[i]).map_or(colour::NO_DATA, |c| c.1),
+        None => plain,
+    };
+    let png = rgb(&thin_heights, |i| lit(colour_of(i), shade.values[i]))?;
+    Ok(placed(heights, data_uri(&png), [thin_heights.cols(), thin_heights.rows()]))
+}
+
 /// Codes in their colours, by majority; a code without one as no data.
 pub fn codes(codes: &Grid<u8>, colours: &[(u8, Rgb)], most: usize) -> Result<Picture, ReportError> {
     let thin = thin::block_majority(codes, thin::step(codes.rows(), codes.cols(), most));

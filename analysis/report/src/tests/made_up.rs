@@ -1,6 +1,7 @@
 //! A release that was never made: three groups of terrains with missions, a measured DEM with two fits, a texture.
 
 mod navigation;
+pub mod rovers;
 
 use crate::ReportError;
 use crate::data::{Artifact, Data, Files, Study};
@@ -8,8 +9,8 @@ use sastrugi_numeric::{Geometry, Grid, Stream, Streams, sums};
 use sastrugi_schemas::fit::FitFile;
 use sastrugi_schemas::tables::{
     CandidateCurveRow, CandidateRow, CovarianceRow, FitRow, FormationSampleRow, HeightDistributionRow,
-    LikelihoodProfileRow, LogRow, MissionRow, ProfilePsdRow, PsdRow, ReplicateRow, RoutePointRow, SampleRow,
-    StructureRow, SurfaceRow, TerrainRow,
+    LikelihoodProfileRow, LogRow, MissionRow, ProfilePsdRow, PsdRow, ReplicateRow, RoutePointRow, RoverSampleRow,
+    SampleRow, StructureRow, SurfaceRow, TerrainRow,
 };
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
@@ -23,6 +24,7 @@ pub struct Shelf {
     pub fits: BTreeMap<String, FitFile>,
     pub route_points: Vec<RoutePointRow>,
     pub formation_samples: BTreeMap<String, Vec<FormationSampleRow>>,
+    pub rover_samples: BTreeMap<String, Vec<RoverSampleRow>>,
 }
 
 impl Files for Shelf {
@@ -40,6 +42,9 @@ impl Files for Shelf {
     }
     fn formation_samples(&self, terrain_id: &str) -> Result<Vec<FormationSampleRow>, ReportError> {
         Ok(self.formation_samples.get(terrain_id).cloned().unwrap_or_default())
+    }
+    fn rover_samples(&self, terrain_id: &str) -> Result<Vec<RoverSampleRow>, ReportError> {
+        Ok(self.rover_samples.get(terrain_id).cloned().unwrap_or_default())
     }
     fn fit(&self, path: &str) -> Result<Option<FitFile>, ReportError> {
         Ok(self.fits.get(path).cloned())
@@ -80,6 +85,8 @@ pub fn empty() -> Data {
         images: Vec::new(),
         formations: Vec::new(),
         formation_events: Vec::new(),
+        rovers: Vec::new(),
+        rover_effects: Vec::new(),
         parameters: Vec::new(),
         contents: BTreeMap::new(),
         against: None,
@@ -156,6 +163,7 @@ pub fn parts(per_group: usize, side: usize) -> (Data, Shelf) {
     replicates(&mut data);
     measured(&mut data, &mut shelf);
     navigation::add(&mut data, &mut shelf);
+    rovers::add(&mut data, &mut shelf);
     (data, shelf)
 }
 

@@ -3,6 +3,7 @@
 pub mod made_up;
 mod navigation;
 mod on_disk;
+mod rovers;
 pub mod xml;
 
 use crate::content::Block;
@@ -55,6 +56,7 @@ fn prop_a_full_report_is_sound() {
         "routes",
         "formations",
         "losses",
+        "rovers",
         "missions",
         "comparison",
         "published",
@@ -159,7 +161,9 @@ fn prop_an_empty_release_has_a_page_without_empty_boxes() {
 #[test]
 fn prop_any_part_may_be_absent() {
     type Take = (&'static str, fn(&mut Data));
-    let takes: [Take; 25] = [
+    let takes: [Take; 27] = [
+        ("rovers", |d| d.rovers.clear()),
+        ("effects", |d| d.rover_effects.clear()),
         ("routes", |d| d.routes.clear()),
         ("paths", |d| d.routes.iter_mut().for_each(|r| (r.outcome, r.path) = ("no_path".into(), None))),
         ("formations", |d| d.formations.clear()),

@@ -1,0 +1,287 @@
+//! Efficiency and arrival of each set: worlds as marks, means with intervals, how alike the rovers of a world are.
+
+use super::outcomes;
+use super::published::trial;
+use super::sets::{Set, World, reached};
+use super::worlds::{ARRIVED, DISTANCE, EFFICIENCY, Figure, GREATEST, LEAST, STRAIGHT, share};
+use crate::content::{self, Numbers, TableBlock, count, number, text};
+use crate::data::Data;
+use crate::questions::clusters::LEVEL;
+use crate::questions::missions::boxes::capital;
+use crate::render::axis::Axis;
+use crate::render::chart::{Entry, Mark, RowLabel, Rows};
+use crate::render::number as set_number;
+use crate::render::svg::{Paint, Stroke, Symbol};
+use sastrugi_numeric::sums;
+use sastrugi_schemas::tables::RoverRow;
+use sastrugi_statistics::Intraclass;
+
+/// Sets that are drawn; all are in the tables.
+const DRAWN_MAX: usize = 16;
+/// Columns that the tables are computed from.
+const QUERY: &str = "select terrain_id, rover_id, \"group\", stage_id, variant, navigator, outcome, straight_m, distance_m, efficiency, \
+efficiency_half_limit, oracle, oracle_m from 'tables/rovers/*.parquet'";
+
+/// Efficiency over the one that the ground allows; NaN where there is no way or nobody looked for one.
+pub fn of_oracle(rover: &RoverRow) -> f64 {
+    if rover.oracle == "found" { rover.efficiency * rover.oracle_m / rover.straight_m } else { f64::NAN }
+}
+
+/// True where the ground has no way to the goal; `None` where nobody looked for one.
+pub fn without_way(rover: &RoverRow) -> Option<bool> {
+    matches!(rover.oracle.as_str(), "found" | "none").then(|| rover.oracle == "none")
+}
+
+/// Strips of the two efficiencies and of arrival.
+pub fn figures(data: &Data, sets: &[Set]) -> Vec<content::Figure> {
+    let drawn = &sets[..sets.len().min(DRAWN_MAX)];
+    [EFFICIENCY, STRAIGHT, ARRIVED].iter().map(|f| strip(data, drawn, f, sets.len() - drawn.len())).collect()
+}
+
+fn strip(data: &Data, sets: &[Set], figure: &Figure, left_out: usize) -> content::Figure {
+    let printed: Vec<Option<f64>> =
+        sets.iter().map(|s| trial(data, s)?.value(figure.id).filter(|_| figure.id != EFFICIENCY.id)).collect();
+    let bands = figure.id != ARRIVED.id;
+    let label = |s: &Set| RowLabel {
+        name: s.name.clone(),
+        detail: format!("{}, n = {}", set_number::counted(s.worlds.len(), "world"), s.count()),
+    };
+    let labels: Vec<RowLabel> = sets.iter().map(label).collect();
+    let mut legend: Vec<Entry> = vec![
+        (Mark::Symbol(Symbol::Ring, Paint::Muted), "one world".into()),
+        (Mark::Line(Stroke::new(Paint::Ink, 2.2)), "all, 95 % interval".into()),
+    ];
+    if bands && sets.iter().any(|s| s.worlds.len() > 1) {
+        legend.push((Mark::Line(Stroke::new(Paint::Muted, 7.0).faint(0.3)), "band of one more world".into()));
+    }
+    if printed.iter().any(Option::is_some) {
+        legend.push((Mark::Symbol(Symbol::Diamond, Paint::Ink), "paper, one world".into()));
+    }
+    let mut rows = Rows::new(&labels, 46.0, (Axis::linear(0.0, 1.0), figure.name), &legend);
+    for (row, (set, printed)) in sets.iter().zip(&printed).enumerate() {
+        draw(&mut rows, row, set, figure, bands, *printed);
+    }
+    let more =
+        if left_out > 0 { format!(" {} more are in the table.", set_number::count(left_out)) } else { String::new() };
+    content::Figure {
+        id: content::slug(&format!("rover-{}", figure.id.replace('_', "-"))),
+        title: format!("{}.", capital(figure.name)),
+        caption: format!("n counts rovers.{more}"),
+        description: describe(sets, figure),
+        svg: rows.svg,
+        numbers: numbers(sets, figure),
+    }
+}
+
+fn draw(rows: &mut Rows, row: usize, set: &Set, figure: &Figure, bands: bool, printed: Option<f64>) {
+    let (y, paint) = (rows.centre(row), Paint::Series(set.index));
+    let band = figure.one_more(set).filter(|_| bands);
+    if let Some((from, to)) = band.and_then(|b| Some((rows.x.clamped(b.low)?, rows.x.clamped(b.high)?))) {
+        rows.svg.rect((from, y - 13.0), ((to - from).max(1.0), 26.0), paint, 0.13);
+    }
+    for (k, (_, value)) in figure.values(set).into_iter().enumerate() {
+        // Lanes keep equal values apart.
+        let lane = 4.0 * ((k % 5) as f64 - 2.0) * 0.5 - 5.0;
+        if let Some(x) = rows.x.clamped(value) {
+            rows.svg.ring((x, y + lane), 2.6, Stroke::new(paint, 1.1).faint(0.85));
+        }
+    }
+    let pooled = figure.pooled(set);
+    let [low, high] = pooled.ends();
+    if let (Some(from), Some(to)) = (rows.x.clamped(low), rows.x.clamped(high)) {
+        rows.svg.segment((from, y + 7.0), (to, y + 7.0), Stroke::new(Paint::Ink, 2.2));
+    }
+    if let Some(x) = rows.x.clamped(pooled.value) {
+        rows.svg.disc((x, y + 7.0), 3.2, Paint::Ink, 1.0);
+    }
+    if let Some(x) = printed.and_then(|v| rows.x.clamped(v)) {
+        rows.svg.symbol(Symbol::Diamond, (x, y - 5.0), 5.2, Paint::Paper);
+        rows.svg.symbol(Symbol::Diamond, (x, y - 5.0), 4.0, Paint::Ink);
+    }
+}
+
+fn describe(sets: &[Set], figure: &Figure) -> String {
+    let part = |s: &Set| {
+        let pooled = figure.pooled(s);
+        let [low, high] = pooled.ends();
+        let interval = pooled.interval.map_or_else(String::new, |_| {
+            format!(" ({} to {})", set_number::significant(low, 3), set_number::significant(high, 3))
+        });
+        format!("{}: {}{interval}", s.name, set_number::significant(pooled.value, 3))
+    };
+    format!("{} by set. {}.", capital(figure.name), sets.iter().map(part).collect::<Vec<_>>().join("; "))
+}
+
+fn numbers(sets: &[Set], figure: &Figure) -> Numbers {
+    let mut numbers = Numbers::computed(QUERY, &[("set", ""), ("terrain_id", ""), (figure.id, figure.unit)]);
+    for set in sets {
+        figure.values(set).into_iter().for_each(|v| numbers.row([text(&set.name), text(v.0), number(v.1)]));
+    }
+    numbers
+}
+
+/// Both efficiencies, the limit's part in them, and the ground's.
+pub fn table(sets: &[Set]) -> TableBlock {
+    let columns = [
+        ("set", ""),
+        ("worlds", "1"),
+        ("rovers", "1"),
+        ("reached", "%"),
+        ("low", "%"),
+        ("high", "%"),
+        ("mean efficiency", "1"),
+        ("low", "1"),
+        ("high", "1"),
+        ("straight over mean distance", "1"),
+        ("low", "1"),
+        ("high", "1"),
+        ("efficiency at half the limit", "1"),
+        ("efficiency over the ground's", "1"),
+        ("no way exists", "%"),
+    ];
+    let mut numbers = Numbers::computed(QUERY, &columns);
+    for set in sets {
+        let arrived = ARRIVED.pooled(set);
+        let (efficiency, straight) = (EFFICIENCY.pooled(set), STRAIGHT.pooled(set));
+        let [reached, low, high] = [arrived.value, arrived.ends()[0], arrived.ends()[1]].map(|v| number(100.0 * v));
+        let mean = |of: fn(&RoverRow) -> f64| number(set.mean(of, LEVEL).value);
+        numbers.row([
+            text(&set.name),
+            count(set.worlds.len()),
+            count(set.count()),
+            reached,
+            low,
+            high,
+            number(efficiency.value),
+            number(efficiency.ends()[0]),
+            number(efficiency.ends()[1]),
+            number(straight.value),
+            number(straight.ends()[0]),
+            number(straight.ends()[1]),
+            mean(|r| r.efficiency_half_limit),
+            mean(of_oracle),
+            number(100.0 * share(set, without_way).value),
+        ]);
+    }
+    TableBlock {
+        id: "rover-efficiency".into(),
+        caption: "Efficiency and arrival, with 95 % intervals over worlds".into(),
+        numbers,
+    }
+}
+
+/// How alike the rovers of one world are.
+pub fn intraclass(sets: &[Set]) -> TableBlock {
+    let columns = [
+        ("set", ""),
+        ("of", ""),
+        ("worlds", "1"),
+        ("rovers", "1"),
+        ("intraclass correlation", "1"),
+        ("low", "1"),
+        ("high", "1"),
+        ("design effect", "1"),
+        ("worth of independent rovers", "1"),
+    ];
+    let mut numbers = Numbers::computed(QUERY, &columns).with_mixed_units();
+    for set in sets {
+        let kinds: [(&str, fn(&RoverRow) -> f64); 2] =
+            [("efficiency", |r| r.efficiency), ("reached", |r| f64::from(u8::from(reached(r))))];
+        for (name, of) in kinds {
+            let clusters: Vec<Vec<f64>> = set.worlds.iter().map(|w| w.values(of)).collect();
+            let Some(i) = Intraclass::of(&clusters, LEVEL) else { continue };
+            numbers.row([
+                text(&set.name),
+                text(name),
+                count(i.clusters),
+                count(i.values),
+                number(i.correlation.estimate),
+                number(i.correlation.low),
+                number(i.correlation.high),
+                number(i.design_effect),
+                number((i.values as f64 / i.design_effect).round()),
+            ]);
+        }
+    }
+    TableBlock { id: "rover-intraclass".into(), caption: "How alike the rovers of one world are".into(), numbers }
+}
+
+/// Every world alone.
+pub fn worlds(sets: &[Set]) -> TableBlock {
+    let columns = [
+        ("set", ""),
+        ("terrain_id", ""),
+        ("rovers", "1"),
+        ("reached", "1"),
+        ("mean_efficiency", "1"),
+        ("straight_over_mean_distance", "1"),
+        ("mean_distance_m", "m"),
+        ("greatest_efficiency", "1"),
+        ("least_efficiency", "1"),
+        ("without_way", "1"),
+    ];
+    let mut numbers = Numbers::computed(QUERY, &columns);
+    let ways = |w: &World| w.rovers.iter().filter(|r| without_way(r) == Some(true)).count();
+    for (set, world) in sets.iter().flat_map(|s| s.worlds.iter().map(move |w| (s, w))) {
+        numbers.row([
+            text(&set.name),
+            text(world.terrain_id),
+            count(world.rovers.len()),
+            count(world.rovers.iter().filter(|r| outcomes::index(r) == 0).count()),
+            number(EFFICIENCY.of(world)),
+            number(STRAIGHT.of(world)),
+            number(DISTANCE.of(world)),
+            number(GREATEST.of(world)),
+            number(LEAST.of(world)),
+            count(ways(world)),
+        ]);
+    }
+    TableBlock { id: "rover-worlds".into(), caption: "Rovers by world".into(), numbers }
+}
+
+/// Mean effort of a rover.
+pub fn effort(sets: &[Set]) -> TableBlock {
+    let columns = [
+        ("set", ""),
+        ("distance", "m"),
+        ("time", "s"),
+        ("cycles", "1"),
+        ("turns", "1"),
+        ("turned", "deg"),
+        ("reversals", "1"),
+        ("cycles with hazards", "1"),
+        ("contacts", "1"),
+        ("low", "1"),
+        ("high", "1"),
+        ("centre contacts", "1"),
+        ("no centre contact", "%"),
+        ("greatest tilt", "deg"),
+        ("pitch rate, RMS", "deg/s"),
+    ];
+    let query = "select terrain_id, rover_id, \"group\", stage_id, variant, distance_m, time_s, cycles, turns, turned_deg, reversals, hazards, contacts, \
+                 centre_contacts, max_tilt_deg, rms_pitch_rate_deg_s from 'tables/rovers/*.parquet'";
+    let mut numbers = Numbers::computed(query, &columns).with_mixed_units();
+    for set in sets {
+        let mean = |of: fn(&RoverRow) -> f64| number(set.mean(of, LEVEL).value);
+        let contacts = set.mean(|r| r.contacts as f64, LEVEL);
+        let tilt = sums::finite(&set.rovers().map(|r| r.max_tilt_deg).collect::<Vec<_>>());
+        numbers.row([
+            text(&set.name),
+            mean(|r| r.distance_m),
+            mean(|r| r.time_s),
+            mean(|r| r.cycles as f64),
+            mean(|r| r.turns as f64),
+            mean(|r| r.turned_deg),
+            mean(|r| r.reversals as f64),
+            mean(|r| r.hazards as f64),
+            number(contacts.value),
+            number(contacts.ends()[0]),
+            number(contacts.ends()[1]),
+            mean(|r| r.centre_contacts as f64),
+            number(100.0 * share(set, |r| Some(r.centre_contacts == 0)).value),
+            number(tilt.into_iter().fold(f64::NEG_INFINITY, f64::max)),
+            mean(|r| r.rms_pitch_rate_deg_s),
+        ]);
+    }
+    TableBlock { id: "rover-effort".into(), caption: "Effort and contacts, means over rovers".into(), numbers }
+}

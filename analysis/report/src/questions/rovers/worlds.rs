@@ -1,0 +1,101 @@
+//! Figures of one world, as a paper would print them of its only one: the mean over worlds, and the band of one world more.
+
+use super::sets::{Estimate, Set, World, reached};
+use crate::questions::clusters::LEVEL;
+use sastrugi_numeric::sums;
+use sastrugi_schemas::tables::RoverRow;
+use sastrugi_statistics::{Interval, prediction};
+
+/// A figure of a world.
+#[derive(Clone, Copy, Debug)]
+pub struct Figure {
+    /// Name, as the data of papers have it.
+    pub id: &'static str,
+    /// Words.
+    pub name: &'static str,
+    /// Unit; `1` for pure numbers.
+    pub unit: &'static str,
+    /// What it is the ratio of, in a world.
+    pub totals: fn(&World) -> (f64, f64),
+}
+
+/// Mean of the rovers' efficiencies.
+pub const EFFICIENCY: Figure =
+    Figure { id: "mean_efficiency", name: "mean efficiency", unit: "1", totals: |w| w.total(|r| r.efficiency) };
+/// Straight metres over metres driven.
+pub const STRAIGHT: Figure = Figure {
+    id: "straight_over_mean_distance",
+    name: "straight over mean distance",
+    unit: "1",
+    totals: |w| (w.total(|r| r.straight_m).0, w.total(|r| r.distance_m).0),
+};
+/// Mean distance driven.
+pub const DISTANCE: Figure =
+    Figure { id: "mean_distance_m", name: "mean distance", unit: "m", totals: |w| w.total(|r| r.distance_m) };
+/// Greatest efficiency of a world's rovers.
+pub const GREATEST: Figure = Figure {
+    id: "greatest_efficiency",
+    name: "greatest efficiency of a world",
+    unit: "1",
+    totals: |w| (w.values(|r| r.efficiency).into_iter().fold(f64::NEG_INFINITY, f64::max), 1.0),
+};
+/// Least efficiency of a world's rovers.
+pub const LEAST: Figure = Figure {
+    id: "least_efficiency",
+    name: "least efficiency of a world",
+    unit: "1",
+    totals: |w| (w.values(|r| r.efficiency).into_iter().fold(f64::INFINITY, f64::min), 1.0),
+};
+/// Share of the rovers that arrive.
+pub const ARRIVED: Figure = Figure {
+    id: "reached",
+    name: "rovers that reach the goal",
+    unit: "1",
+    totals: |w| w.total(|r| f64::from(u8::from(reached(r)))),
+};
+/// All figures that papers print.
+pub const PRINTED: [Figure; 5] = [STRAIGHT, EFFICIENCY, DISTANCE, GREATEST, LEAST];
+
+impl Figure {
+    /// Value of a world; NaN where it is not known.
+    pub fn of(&self, world: &World) -> f64 {
+        let (a, b) = (self.totals)(world);
+        a / b
+    }
+
+    /// Known values of the worlds of a set, with their terrain.
+    pub fn values<'a>(&self, set: &Set<'a>) -> Vec<(&'a str, f64)> {
+        set.worlds.iter().map(|w| (w.terrain_id, self.of(w))).filter(|v| v.1.is_finite()).collect()
+    }
+
+    /// Of all rovers of a set, with the interval over worlds.
+    pub fn pooled(&self, set: &Set) -> Estimate {
+        if self.id == ARRIVED.id {
+            return arrived(set);
+        }
+        set.ratio(|w| (self.totals)(w), LEVEL)
+    }
+
+    /// Band in which one more world falls; `None` for a single world.
+    pub fn one_more(&self, set: &Set) -> Option<Interval> {
+        let values: Vec<f64> = self.values(set).into_iter().map(|v| v.1).collect();
+        prediction::one_more_positive(&values, LEVEL)
+    }
+}
+
+/// Share of the rovers that arrive, with its interval over worlds.
+pub fn arrived(set: &Set) -> Estimate {
+    share(set, |r| Some(reached(r)))
+}
+
+/// Share of the rovers of which that is true among those of which it is known.
+pub fn share(set: &Set, is: impl Fn(&RoverRow) -> Option<bool>) -> Estimate {
+    let of = |r: &RoverRow| is(r).map_or(f64::NAN, |yes| f64::from(u8::from(yes)));
+    let totals: Vec<(f64, f64)> = set.worlds.iter().map(|w| w.total(of)).filter(|t| t.1 > 0.0).collect();
+    let (n, k) = (totals.iter().map(|t| t.1).sum::<f64>(), totals.len() as f64);
+    let value = sums::sum(&totals.iter().map(|t| t.0).collect::<Vec<_>>()) / n;
+    let residuals: f64 = totals.iter().map(|t| (t.0 - value * t.1) * (t.0 - value * t.1)).sum();
+    let variance = k / (k - 1.0) * residuals / (n * n);
+    let interval = sastrugi_statistics::proportion::of_clusters(value, variance, n as usize, totals.len(), LEVEL);
+    Estimate { value, interval }
+}

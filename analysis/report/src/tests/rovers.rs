@@ -1,0 +1,195 @@
+//! Pages about rovers.
+
+use super::made_up::rovers::{LIMIT_M, RADIUS_M, ROVERS, factor};
+use super::{assert_sound, made_up, report, rows};
+use crate::data::Data;
+use sastrugi_schemas::tables::RoverRow;
+use serde_json::Value;
+
+/// Rovers alone, on `per_group` terrains in each of three groups.
+fn driven(per_group: usize) -> Data {
+    let mut data = made_up::full(per_group, 24);
+    data.missions.clear();
+    data.replicates.clear();
+    data.fits.clear();
+    data.routes.clear();
+    data.formations.clear();
+    data.formation_events.clear();
+    data.terrains.retain(|t| t.stage == "terrain");
+    data
+}
+
+fn near(cell: &Value, expected: f64) -> bool {
+    cell.as_f64().is_some_and(|v| (v - expected).abs() <= 1e-9 * expected.abs().max(1.0))
+}
+
+/// The made-up distances of the first group, rover by rover.
+fn distances(worlds: usize) -> Vec<f64> {
+    let of = |w: usize| (0..ROVERS).map(move |r| RADIUS_M * factor(0.0, w as f64, r as f64));
+    (0..worlds).flat_map(of).collect()
+}
+
+/// Both efficiencies by hand: all of the first group arrive with 0.4 m left; of the last every fifth is stopped.
+#[test]
+fn val_efficiencies() {
+    let (files, summary) = report(&driven(4));
+    assert_sound(&files);
+    let found = rows(&files, "rover-efficiency");
+    assert_eq!(found.len(), 3);
+    let all = distances(4);
+    let efficiency = all.iter().map(|d| RADIUS_M / (d + 0.4)).sum::<f64>() / all.len() as f64;
+    let row = &found[0];
+    assert_eq!((row[0].as_str(), row[1].as_u64(), row[2].as_u64()), (Some("2.30"), Some(4), Some(40)));
+    assert!(near(&row[3], 100.0) && near(&row[6], efficiency), "{row:?}");
+    assert!(near(&row[9], RADIUS_M * 40.0 / all.iter().sum::<f64>()), "{row:?}");
+    // Efficiency over that of the ground's shortest way, 1.05 times the straight line.
+    assert!(near(&row[13], 1.05 * efficiency) && near(&row[14], 0.0), "{row:?}");
+    // All arrive on four worlds: worlds count as single trials, 0.025^(1/4).
+    assert!(near(&row[4], 100.0 * libm::pow(0.025, 0.25)) && near(&row[5], 100.0), "{row:?}");
+    // Two of ten rovers of the last group are stopped, one of them without a way.
+    assert!(near(&found[2][3], 80.0) && near(&found[2][14], 10.0), "{:?}", found[2]);
+    for figure in [
+        "rover-mean-efficiency",
+        "rover-straight-over-mean-distance",
+        "rover-reached",
+        "rover-outcomes",
+        "rover-arrival-circle",
+        "rover-tracks-2.30",
+    ] {
+        assert!(summary.figures.iter().any(|f| f == figure), "{figure} of {:?}", summary.figures);
+    }
+    let page = &files["index.html"];
+    assert!(page.contains("Every set stands on fewer than 20 worlds (the least: 4)"));
+    assert!(page.contains("For 4 of 120 rovers the ground has no way"));
+    assert!(page.contains("2.60: 80 %"));
+}
+
+/// Budgets are read off the sorted distances; where a fifth is stopped, 90 % is not reached and the row says so.
+#[test]
+fn val_budgets() {
+    let files = report(&driven(4)).0;
+    let found = rows(&files, "rover-budgets");
+    assert_eq!(found.len(), 3 * 4);
+    let mut all = distances(4);
+    all.sort_by(f64::total_cmp);
+    for row in found.iter().filter(|r| r[0] == "2.30") {
+        let n = (row[1].as_f64().unwrap() / 100.0 * 40.0).round() as usize;
+        assert!(near(&row[2], all[n - 1]) && near(&row[5], all[n - 1] / RADIUS_M), "{row:?}");
+        assert!(row[3].as_f64().unwrap() <= all[n - 1]);
+    }
+    let row = found.iter().find(|r| r[0] == "2.60" && near(&r[1], 90.0)).unwrap();
+    assert!(row[2].is_null() && row[6] == format!("not reached within {LIMIT_M:.1} m"), "{row:?}");
+    // The curve of the last group ends at 80 %, its last step at the last arrival.
+    let curve = rows(&files, "rover-arrival-circle");
+    let last = curve.iter().rfind(|r| r[0] == "2.60").unwrap();
+    assert!(near(&last[2], 0.8) && near(&last[1], RADIUS_M * factor(2.0, 3.0, 8.0)), "{last:?}");
+}
+
+/// Rows of size, columns of clearance, a block for each group; the list has every combination.
+#[test]
+fn val_designs() {
+    let files = report(&driven(3)).0;
+    for block in 1..=3 {
+        let text = &files[&format!("data/rover-design-1-{block}.json")];
+        let json: Value = serde_json::from_str(text).unwrap();
+        let heads: Vec<&str> =
+            json["columns"].as_array().unwrap().iter().map(|c| c["name"].as_str().unwrap()).collect();
+        assert_eq!(heads, ["scale", "clearance_m = 0.1", "clearance_m = 0.2"]);
+        let rows = json["rows"].as_array().unwrap();
+        assert_eq!((rows.len(), &rows[0][0], &rows[1][0]), (2, &Value::from("0.8"), &Value::from("1.2")));
+        assert!(rows.iter().all(|r| r[1].as_str().unwrap().contains("; ") && r[2].is_string()), "{rows:?}");
+    }
+    let all = rows(&files, "rover-designs");
+    assert_eq!(all.len(), 3 * 4);
+    let of = |variant: &str| all.iter().find(|r| r[1] == "2.45" && r[2] == variant).unwrap()[5].as_f64().unwrap();
+    let ratio = of("clearance_m = 0.1, scale = 1.2") / of("clearance_m = 0.2, scale = 0.8");
+    assert!((ratio - 0.8).abs() < 1e-12, "{ratio}");
+}
+
+/// A release whose groups repeat the paper's trials.
+fn repeated(worlds: usize) -> Data {
+    let mut data = driven(worlds);
+    let rocks = |coverage: f64| {
+        format!("{{\"processes\": [{{\"kind\": \"texture\"}}, {{\"kind\": \"rocks\", \"coverage\": {coverage}}}]}}")
+    };
+    for terrain in &mut data.terrains {
+        terrain.params = rocks(if terrain.group.as_deref() == Some("2.60") { 0.176 } else { 0.069 });
+    }
+    data.rovers.retain(|r| r.variant.is_none());
+    data.rovers.iter_mut().for_each(|r| r.straight_m = 25.0);
+    data
+}
+
+/// The paper's circle is the last group's alone; each verdict follows from its row; other numbers of rovers are warned of.
+#[test]
+fn val_published_trials_stand_beside_their_group() {
+    assert!(!report(&driven(3)).0.contains_key("data/rover-published.json"));
+    let files = report(&repeated(4)).0;
+    assert_sound(&files);
+    let found = rows(&files, "rover-published");
+    assert_eq!(found.len(), 5);
+    for row in &found {
+        let [paper, ours, low, high, from, to] = [3, 4, 5, 6, 7, 8].map(|k| row[k].as_f64().unwrap());
+        assert!(from < low && low < ours && ours < high && high < to, "{row:?}");
+        assert_eq!(row[9] == "inside", (from..=to).contains(&paper), "{row:?}");
+    }
+    assert_eq!(found[0][3].as_f64(), Some(0.0893));
+    assert!(files["index.html"].contains("2.60: the paper has 100 rovers on its world, 4 of ours have another number"));
+    // A single world has no band and no verdict.
+    let files = report(&repeated(1)).0;
+    assert!(rows(&files, "rover-published").iter().all(|r| r[7].is_null() && r[9] == "–"));
+}
+
+/// The strongest parameter stands first; the colour of a bar follows the interval of its mean effect.
+#[test]
+fn val_effects() {
+    let (files, summary) = report(&driven(2));
+    let figures: Vec<&String> = summary.figures.iter().filter(|f| f.starts_with("rover-effects-")).collect();
+    assert_eq!(figures.len(), 3, "{figures:?}");
+    assert_eq!(rows(&files, "rover-effects").len(), 9);
+    let page = &files["index.html"];
+    assert!(page.contains(
+        "circle, 2.30: efficiency most by hazard_step_m, arrival most by hazard_step_m, distance most by hazard_step_m."
+    ));
+    let svg = &files["figures/rover-effects-circle-2.30--efficiency.svg"];
+    let at = |word: &str| svg.find(word).unwrap_or_else(|| panic!("{word}"));
+    assert!(at(">hazard step<") < at(">turn deg<") && at(">turn deg<") < at(">goal tolerance<"), "order");
+    assert!(["raises", "lowers", "cannot be told"].iter().all(|w| svg.contains(w)));
+}
+
+/// Whatever is missing or extreme, the page stands.
+#[test]
+fn prop_odd_releases_have_sound_pages() {
+    type Take = (&'static str, fn(&mut Data));
+    let each = |data: &mut Data, change: fn(&mut RoverRow)| data.rovers.iter_mut().for_each(change);
+    let takes: [Take; 11] = [
+        ("nothing", |_| ()),
+        ("one rover", |d| d.rovers.truncate(1)),
+        ("one world", |d| d.rovers.retain(|r| r.terrain_id == "d2.30-0000" && r.variant.is_none())),
+        ("plain trials", |d| d.rovers.retain(|r| r.variant.is_some())),
+        ("variants", |d| d.rovers.retain(|r| r.variant.is_none())),
+        ("arrivals", |d| {
+            d.rovers.iter_mut().for_each(|r| (r.outcome, r.distance_m) = ("distance_limit".into(), LIMIT_M))
+        }),
+        ("failures", |d| d.rovers.iter_mut().for_each(|r| (r.outcome, r.distance_m) = ("reached".into(), 22.0))),
+        ("ways", |d| d.rovers.iter_mut().for_each(|r| (r.oracle, r.oracle_m) = ("none".into(), f64::NAN))),
+        ("oracle", |d| d.rovers.iter_mut().for_each(|r| (r.oracle, r.oracle_m) = (String::new(), f64::NAN))),
+        ("groups", |d| {
+            d.rovers.iter_mut().for_each(|r| r.group = None);
+            d.terrains.clear();
+        }),
+        ("files", |d| d.files = Box::new(made_up::Shelf::default())),
+    ];
+    for (name, take) in takes {
+        let mut data = driven(2);
+        take(&mut data);
+        let (files, _) = report(&data);
+        assert_sound(&files);
+        assert!(files["index.html"].contains("<section id=\"rovers\">"), "without {name}");
+    }
+    let mut data = driven(1);
+    each(&mut data, |r| r.efficiency = f64::NAN);
+    assert_sound(&report(&data).0);
+    data.rovers.clear();
+    assert!(!report(&data).0["index.html"].contains("<section id=\"rovers\">"));
+}
