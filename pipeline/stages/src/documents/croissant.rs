@@ -48,7 +48,7 @@ const SETS: [(&str, &str, &str, &str, &str); 10] = [
         "application/geo+json",
         "Planned routes, GeoJSON in the terrain's own coordinates",
     ),
-    ("mcap-files", "mcap", ".mcap", "application/octet-stream", "Recordings of missions and teams, MCAP"),
+    ("mcap-files", "mcap", ".mcap", "application/octet-stream", "Recordings of missions, teams and rovers, MCAP"),
     ("bag-files", "mcap", "metadata.yaml", "application/yaml", "Descriptions of the recordings for bag readers"),
 ];
 /// What the release says of itself, and shows: id of the set, patterns, media types, what they are.

@@ -21,7 +21,7 @@ pub const FOLDERS: [(&str, &str); 11] = [
         "route/",
         "planned routes, GeoJSON in the terrain's own coordinates (m), not RFC 7946's WGS84; `.blocked.tif`: 1 where obstacles keep routes out",
     ),
-    ("mcap/", "one recording per mission, or run of a team"),
+    ("mcap/", "one recording per mission, run of a team, or recorded rover"),
     ("tables/", "Parquet, units and descriptions in the column metadata"),
     ("report/", "report: `index.html`, one offline page"),
 ];

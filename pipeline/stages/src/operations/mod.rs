@@ -6,6 +6,7 @@ pub mod drawn;
 pub mod fits;
 pub mod masks;
 pub mod place;
+pub mod planner;
 pub mod roughness;
 pub mod routes;
 pub mod rovers;
