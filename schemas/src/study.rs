@@ -468,6 +468,9 @@ pub struct RoverItem {
     /// Distance between two rows of `rover_samples` of a rover, m; 0 for a row every cycle; 0.5 when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sample_m: Option<f64>,
+    /// Rovers of each terrain that are recorded as MCAP files, the first ones; 1 when absent, 0 for none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub record: Option<u32>,
     /// Explicit seed of starts and noise instead of the study's.
     #[serde(default)]
     pub seed: Option<u64>,

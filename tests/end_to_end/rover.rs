@@ -58,6 +58,15 @@ distance_m = 9.0
 sweep.clearance_m = [0.13, 0.2]
 
 [[rover]]
+id = "plans"
+kind = "planner"
+sensor = "rectangles"
+terrains = ["dense"]
+rovers = 3
+radius_m = 6.0
+record = 0
+
+[[rover]]
 id = "plates"
 kind = "sojourner_like"
 terrains = ["plate"]
@@ -91,7 +100,7 @@ fn val_rovers_have_rows_and_samples() {
     run(folder.path(), STUDY, &[]);
     let release = folder.path().join("release");
     let (rovers, samples) = (rows(&release, "rovers"), rows(&release, "rover_samples"));
-    assert_eq!(rovers.len(), 2 * 2 * 6 + 2 * 2 * 3 + 4);
+    assert_eq!(rovers.len(), 2 * 2 * 6 + 2 * 2 * 3 + 2 * 3 + 4);
     for rover in &rovers {
         let of = |row: &&Row| ["terrain_id", "rover_id"].iter().all(|key| text(row, key) == text(rover, key));
         let own: Vec<&Row> = samples.iter().filter(of).collect();
@@ -159,6 +168,87 @@ fn prop_a_release_of_rovers_has_the_same_bytes() {
     let call = sastrugi_in(shards.path(), &["merge", "part-1", "part-2", "-o", "release", "--quiet"]);
     assert_eq!(call.code, 0, "{}", call.stderr);
     assert_eq!(differing(&first, &sums(&shards.path().join("release"))), Vec::<String>::new());
+    assert!(first.keys().filter(|path| path.ends_with(".mcap")).count() == 4 + 4 + 1, "recordings are among them");
+    // Killed on the way, and started again.
+    let killed = area();
+    write(killed.path(), "study.toml", STUDY);
+    for pause_ms in [50, 400, 1200, 2500] {
+        let mut child = std::process::Command::new(sastrugi_tests::program())
+            .args(["run", "study.toml", "-o", "release", "--quiet"])
+            .current_dir(killed.path())
+            .spawn()
+            .unwrap();
+        std::thread::sleep(std::time::Duration::from_millis(pause_ms));
+        child.kill().unwrap();
+        child.wait().unwrap();
+    }
+    assert_eq!(differing(&first, &run(killed.path(), STUDY, &[])), Vec::<String>::new());
+}
+
+/// The first rovers of each terrain are recorded, and `analyze` finds in a recording the metrics of the table: the same code judges the same poses.
+#[test]
+fn val_recordings_have_the_metrics_of_the_table() {
+    let folder = area();
+    run(folder.path(), &STUDY.replace("sample_m = 1.0", "record = 2"), &[]);
+    let release = folder.path().join("release");
+    let rovers = rows(&release, "rovers");
+    let recorded: Vec<&Row> = rovers.iter().filter(|row| !row["path"].is_null()).collect();
+    let of = |stage: &str| recorded.iter().filter(|row| text(row, "stage_id").starts_with(stage)).count();
+    assert_eq!(["rays", "boxes", "plans", "plates"].map(of), [2 * 2 * 2, 2 * 2, 0, 1]);
+    for row in recorded.into_iter().filter(|row| text(row, "stage_id") == "rays") {
+        let path = text(row, "path");
+        assert_eq!(path, format!("mcap/{}/{}.mcap", text(row, "terrain_id"), text(row, "rover_id")));
+        let call = sastrugi_in(folder.path(), &["analyze", &format!("release/{path}"), "--json"]);
+        assert_eq!(call.code, 0, "{}", call.stderr);
+        let told: serde_json::Value = serde_json::from_str(&call.stdout).unwrap();
+        let log = &told[0]["log"];
+        let same = |column: &str, tolerance: f64| {
+            let (found, expected) = (log[column].as_f64().unwrap_or(f64::NAN), number(row, column));
+            assert!((found - expected).abs() <= tolerance * expected.abs(), "{path}: {column} {found} {expected}");
+        };
+        ["max_pitch_deg", "max_roll_deg", "rms_pitch_rate_deg_s", "rms_roll_rate_deg_s"]
+            .map(|column| same(column, 1e-9));
+        // The poses of the last second are not recorded.
+        assert!((log["time_s"].as_f64().unwrap() - number(row, "time_s")).abs() <= 1.0);
+        assert_eq!(log["outcome"], row["outcome"], "{path}");
+    }
+}
+
+/// A rover whose start or goal nobody could reach has its row, marked, and the others of its draw stay where they were (section 11).
+#[test]
+fn val_pairs_without_a_way_are_marked() {
+    let of = |clearance_m: &str| {
+        let folder = area();
+        let study = STUDY
+            .replace("sweep.clearance_m = [0.13, 0.2]", &format!("clearance_m = {clearance_m}\ncycle_limit = 300"));
+        run(folder.path(), &study, &[]);
+        let rovers = rows(&folder.path().join("release"), "rovers");
+        rovers.into_iter().filter(|row| text(row, "stage_id") == "boxes").collect::<Vec<Row>>()
+    };
+    let (low, usual) = (of("0.03"), of("0.13"));
+    let without = low.iter().filter(|row| text(row, "oracle") == "none").count();
+    assert!(without > 0 && low.len() == usual.len(), "{without} of {}", low.len());
+    for (a, b) in low.iter().zip(&usual) {
+        assert_eq!(number(a, "oracle_m").is_nan(), text(a, "oracle") == "none");
+        assert!(["start_x_m", "start_y_m", "goal_x_m", "goal_y_m"].iter().all(|column| a[*column] == b[*column]));
+    }
+}
+
+/// Heights in steps are no ground for rovers: a step would look like a rock (section 11). The step is told.
+#[test]
+fn val_heights_in_steps_are_refused() {
+    let folder = area();
+    // 64 x 64 cells, 600 m of relief in steps of 61 mm.
+    let heights = (0..64 * 64).map(|k: u32| format!("{:.3}", 0.061 * f64::from(k * 7919 % 9973)));
+    let heights = heights.collect::<Vec<_>>().join(" ");
+    let header = "ncols 64\nnrows 64\nxllcorner 0\nyllcorner 0\ncellsize 0.5\nNODATA_value -9999\n";
+    write(folder.path(), "steps.asc", &format!("{header}{heights}\n"));
+    let study = "[study]\nname = \"steps\"\nseed = 1\ndate = \"2026-01-01\"\n\n[[dem]]\nid = \"steps\"\nfile = \"steps.asc\"\n\n\
+                 [[rover]]\nid = \"rays\"\nkind = \"sojourner_like\"\nterrains = [\"steps\"]\nrovers = 1\nradius_m = 5.0\ncentre_m = [16.0, 16.0]\n";
+    write(folder.path(), "study.toml", study);
+    let call = sastrugi_in(folder.path(), &["run", "study.toml", "-o", "release", "--quiet"]);
+    let told: String = call.stderr.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(call.code != 0 && told.contains("heights come in steps of 61.0 mm"), "{}: {told}", call.code);
 }
 
 /// Refusals of section 8, one sentence each.
@@ -180,6 +270,11 @@ fn val_wrong_studies_are_refused() {
         ("terrains = [\"plate\"]", "terrains = [\"plait\"]", "names \"plait\""),
         ("hazard_step_m = 1.0", "hazard_step_m = -1.0", "`hazard_step_m` is -1"),
         ("hazard_step_m = 1.0", "noise = { slip = 2.0 }", "`noise.slip` is 2"),
+        ("sensor = \"rectangles\"", "sensor = \"sonar\"", "sonar"),
+        ("sensor = \"rectangles\"", "pass_m = 1.0", "`pass_m` is a rule of another navigator"),
+        ("sensor = \"rectangles\"", "rectangles = 4", "rectangles"),
+        ("sensor = \"rectangles\"", "map_cell_m = 0.001", "more than 1048576"),
+        ("sensor = \"rectangles\"", "map_beyond_m = 0.0", "`map_beyond_m` is 0"),
     ] {
         assert!(STUDY.contains(from), "{from}");
         write(folder.path(), "study.toml", &STUDY.replace(from, to));

@@ -7,6 +7,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may end where it stands")]
 
 mod photoclinometry;
+mod rover;
 mod team;
 
 use sastrugi_tests::{Called, area, called, program, sastrugi_in, small_study, write};

@@ -8,7 +8,7 @@ use sastrugi_mobility::rover::{
 };
 use sastrugi_numeric::{Counter, Streams};
 use sastrugi_terrain::planetary::{Clearing, Planetary, RawPlanetary};
-use serde_json::json;
+use serde_json::{Value, json};
 
 /// Flat sand with rocks of 0.04 to 4 m, on which the specification's figures were measured.
 fn world(coverage: f64) -> Planetary {
@@ -94,6 +94,42 @@ fn stat_schoppers_like_rovers_arrive() {
     assert!((0.85..=0.93).contains(&ratio) && reached >= 0.95);
     let clean = mean(drives.iter().map(|d| f64::from(u8::from(d.contacts.on_centre_line == 0))));
     assert!(clean >= 0.95, "{clean}");
+}
+
+/// The planner to compare with, as a study makes it.
+fn planner(parameters: &Value) -> (Navigator, RoverParameters) {
+    sastrugi_stages::jobs::rover::prepare(Navigator::PLANNER, parameters).unwrap()
+}
+
+/// Every navigator on one world at four densities, 100 rovers of 25 m: the planner with a sensor arrives more directly than the navigator
+/// with the same sensor at the greatest density, where the navigators lose their way, and every one that arrives ends at the goal.
+#[test]
+#[ignore = "slow: ./test --full"]
+fn stat_planners_beside_navigators() {
+    let default = RoverParameters::default;
+    let navigators = [
+        ("rays, rules", (Navigator::Sojourner(SojournerParameters::default()), default())),
+        ("rays, plans", planner(&json!({"sensor": "rays"}))),
+        ("rectangles, rules", (Navigator::Schoppers(SchoppersParameters::default()), default())),
+        ("rectangles, plans", planner(&json!({"sensor": "rectangles"}))),
+    ];
+    let mut dense = Vec::new();
+    for coverage in [0.069, 0.088, 0.118, 0.176] {
+        for (name, (navigator, parameters)) in &navigators {
+            let drives = trial(navigator, parameters, coverage, 1);
+            let [distance_m, ratio, e, least, most, reached] = summary(&drives);
+            let no_way = drives.iter().filter(|d| d.ending.name() == "no_way").count();
+            let contacts = mean(drives.iter().map(|d| f64::from(d.contacts.anywhere)));
+            println!(
+                "{coverage} {name}: {distance_m:.1} m, {ratio:.3}, e {e:.3} ({least:.3} to {most:.3}), {reached:.2} arrived, {no_way} no way, {contacts:.2} contacts"
+            );
+            assert!(drives.iter().all(|d| !d.reached() || d.residual_m <= 0.5));
+            if coverage == 0.176 {
+                dense.push(e);
+            }
+        }
+    }
+    assert!(dense[1] > dense[0] && dense[3] > dense[2], "{dense:?}");
 }
 
 /// With room for one tile of the ground and for all, rovers do the same to the last bit (section 11).

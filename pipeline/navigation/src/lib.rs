@@ -12,6 +12,7 @@
 
 pub mod clearance;
 pub mod cost;
+pub mod explorer;
 pub mod formation;
 pub mod line;
 pub mod map;

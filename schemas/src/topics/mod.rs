@@ -1,4 +1,4 @@
-//! MCAP topics of a release and the recordings of a mission and of a team that fill them.
+//! MCAP topics of a release and the recordings of a mission, of a team and of a rover that fill them.
 //!
 //! ROS 2 flavour: see [`ros2`]. Viewer flavour: Foxglove's public protobuf messages where there is one, own protobuf messages (package `sastrugi`)
 //! for the rest. Each own message starts with field 1, `timestamp` (google.protobuf.Timestamp); the listed fields
@@ -9,6 +9,14 @@ pub mod events;
 pub mod imu;
 pub mod recording;
 pub mod ros2;
+pub mod rover;
+pub mod rover_events;
+pub mod rover_path;
+pub mod rover_plan;
+pub mod rover_shape;
+pub mod rover_state;
+pub mod rover_tf;
+pub mod rover_view;
 pub mod state;
 pub mod team;
 pub mod team_box;
@@ -31,6 +39,7 @@ pub use recording::{
     CommandSample, Event, EventKind, ImuSample, Recording, StateSample, VehicleOutline, WheelOutline, WheelSample,
     WheelState,
 };
+pub use rover::{RoverCycle, RoverEvent, RoverEventKind, RoverPlan, RoverRecording, SeenArea, SeenRay};
 pub use team::{
     DiscState, FormationBox, Member, MemberState, MovingDisc, PlannedRoute, TeamEvent, TeamEventKind, TeamRecording,
 };
@@ -82,6 +91,8 @@ pub enum FieldKind {
     Doubles,
     /// `repeated float`, packed.
     Floats,
+    /// `string`
+    Text,
     /// `repeated string`
     Texts,
 }
@@ -116,6 +127,20 @@ pub const TEAM_VIEWER: [&Topic; 10] = [
     &team_tf::TOPIC,
     &team_state::TOPIC,
     &team_events::TOPIC,
+];
+
+/// All topics of a rover in the viewer flavour, in the order of their channels.
+pub const ROVER_VIEWER: [&Topic; 10] = [
+    &terrain_mesh::TOPIC,
+    &terrain_grid::TOPIC,
+    &rover_shape::TOPIC,
+    &rover_path::TOPIC,
+    &rover_plan::TOPIC,
+    &rover_tf::TOPIC,
+    &vehicle_pose::TOPIC,
+    &rover_view::TOPIC,
+    &rover_state::TOPIC,
+    &rover_events::TOPIC,
 ];
 
 /// A field; keeps the lists of the topics readable.

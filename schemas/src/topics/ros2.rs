@@ -104,6 +104,54 @@ pub const TEAM_EVENTS: Topic = topic(
     "what happened to the team or, with its name at the head of the message, to a member; the kind of event as the logger's name",
 );
 
+/// Topic `/tf` of a rover.
+pub const ROVER_TF: Topic = topic("/tf", "tf2_msgs/msg/TFMessage", "map -> base_link, once a second");
+/// Topic `/odom` of a rover.
+pub const ROVER_ODOM: Topic = topic(
+    "/odom",
+    "nav_msgs/msg/Odometry",
+    "true pose of base_link in map and its motion in base_link, once a second; covariances are 0",
+);
+/// Topic `/path` of a rover.
+pub const ROVER_PATH: Topic = topic(
+    "/path",
+    "nav_msgs/msg/Path",
+    "the whole path that the rover drove, a pose every 10 s and the last, in one message at the start",
+);
+/// Topic `/plan` of a rover.
+pub const ROVER_PLAN: Topic = topic(
+    "/plan",
+    "nav_msgs/msg/Path",
+    "the way that a rover with a planner plans to take, from where it believes to be; whenever that changes",
+);
+/// Topic `/markers` of a rover.
+pub const ROVER_MARKERS: Topic = topic(
+    "/markers",
+    "visualization_msgs/msg/MarkerArray",
+    "body of the rover in base_link, start and goal in the frame terrain; one message at the start",
+);
+/// Topic `/sensor/view` of a rover.
+pub const ROVER_VIEW: Topic = topic(
+    "/sensor/view",
+    "visualization_msgs/msg/MarkerArray",
+    "what the rover sees, in the frame terrain: areas and rays in the colour of their hazard (red: a hazard, green: none, grey: a ray      that met nothing); once a cycle",
+);
+/// Topic `/state` of a rover.
+pub const ROVER_STATE: Topic =
+    topic("/state", "std_msgs/msg/String", "what the navigator is at, in words; whenever that changes");
+/// Topic `/cmd_vel` of a rover.
+pub const ROVER_CMD_VEL: Topic = topic(
+    "/cmd_vel",
+    "geometry_msgs/msg/TwistStamped",
+    "speed and yaw rate in base_link as carried out, at the beginning of every turn and drive, and 0 at the end",
+);
+/// Topic `/events` of a rover.
+pub const ROVER_EVENTS: Topic = topic(
+    "/events",
+    "rcl_interfaces/msg/Log",
+    "start, hazards that come into view, first turns, drives back, contacts and the end; the name of the event as the logger's",
+);
+
 /// All topics of a mission in the ROS 2 flavour, in the order of their channels.
 pub const ROS2: [&Topic; 9] =
     [&TF_STATIC, &TERRAIN, &TERRAIN_POINTS, &TF, &ODOM, &IMU, &JOINT_STATES, &CMD_VEL, &EVENTS];
@@ -120,4 +168,20 @@ pub const TEAM_ROS2: [&Topic; 10] = [
     &MEMBER_ODOM,
     &MEMBER_PATH,
     &TEAM_EVENTS,
+];
+
+/// All topics of a rover in the ROS 2 flavour, in the order of their channels.
+pub const ROVER_ROS2: [&Topic; 12] = [
+    &TF_STATIC,
+    &TERRAIN,
+    &TERRAIN_POINTS,
+    &ROVER_TF,
+    &ROVER_ODOM,
+    &ROVER_PATH,
+    &ROVER_PLAN,
+    &ROVER_MARKERS,
+    &ROVER_VIEW,
+    &ROVER_STATE,
+    &ROVER_CMD_VEL,
+    &ROVER_EVENTS,
 ];

@@ -5,7 +5,7 @@ use crate::args::{Arguments, Common, Completions, Kinds, Schema};
 use crate::failure::{Code, Failure};
 use crate::output::{columns, print};
 use clap::CommandFactory;
-use sastrugi_schemas::topics::ros2::{ROS2, TEAM_ROS2};
+use sastrugi_schemas::topics::ros2::{ROS2, ROVER_ROS2, TEAM_ROS2};
 use sastrugi_schemas::topics::{self, Field, Topic};
 use sastrugi_schemas::{Kind, Table, tables};
 use sastrugi_stages::study::keys::nearest;
@@ -128,20 +128,30 @@ pub fn schema(args: &Schema, common: &Common) -> Verdict {
                 of("mcap = \"ros2\"", &ROS2),
                 of("mcap = \"viewer\", teams", &topics::TEAM_VIEWER),
                 of("mcap = \"ros2\", teams", &TEAM_ROS2),
+                of("mcap = \"viewer\", rovers", &topics::ROVER_VIEWER),
+                of("mcap = \"ros2\", rovers", &ROVER_ROS2),
             ];
             let all = json!({
                 "viewer": topics::VIEWER,
                 "ros2": ROS2,
                 "team_viewer": topics::TEAM_VIEWER,
                 "team_ros2": TEAM_ROS2,
+                "rover_viewer": topics::ROVER_VIEWER,
+                "rover_ros2": ROVER_ROS2,
             });
             print(common.json, &all, &text.join("\n\n"))?;
         }
         Some(name) if name.starts_with('/') => {
-            let all = topics::VIEWER.into_iter().chain(ROS2).chain(topics::TEAM_VIEWER).chain(TEAM_ROS2);
-            let mut found: Vec<&Topic> = all.filter(|t| t.name == name).collect();
-            // Missions and teams share the terrain's.
-            found.dedup();
+            let teams = topics::TEAM_VIEWER.into_iter().chain(TEAM_ROS2);
+            let rovers = topics::ROVER_VIEWER.into_iter().chain(ROVER_ROS2);
+            let all = topics::VIEWER.into_iter().chain(ROS2).chain(teams).chain(rovers);
+            let mut found: Vec<&Topic> = Vec::new();
+            // Missions, teams and rovers share the terrain's.
+            for topic in all.filter(|t| t.name == name) {
+                if !found.contains(&topic) {
+                    found.push(topic);
+                }
+            }
             if found.is_empty() {
                 return Err(Failure::usage(format!("there is no topic `{name}`; `sastrugi schema topics` lists them")));
             }

@@ -31,12 +31,12 @@ impl Contacts {
         clearance_m: f64,
     ) -> Result<(), NoGround> {
         let (a, t) = (chassis.axle_m, chassis.track_m);
-        let mut now = [false; 2];
+        let (axes, mut now) = (pose.axes(), [false; 2]);
         // The sand is asked for only where there is a rock.
         let mut sand = None;
         for left in [-t, -0.5 * t, 0.0, 0.5 * t, t] {
             for ahead in [-a, -0.5 * a, 0.0, 0.5 * a, a] {
-                let [x, y] = pose.to_ground([ahead, left]);
+                let [x, y] = axes.to_ground([ahead, left]);
                 let point = ground.at(x, y)?;
                 if point.class != GroundClass::Rock {
                     continue;

@@ -160,14 +160,70 @@ impl Default for SchoppersParameters {
     }
 }
 
-/// A navigator with its numbers.
+/// The planner to compare with: it searches a way over what its sensor has shown of the ground, and knows nothing else.
+#[derive(Clone, Debug, Serialize)]
+pub struct PlannerParameters {
+    /// The navigator whose body and sensor it has; the rules of that one do not count.
+    #[serde(flatten)]
+    pub eyes: PlannerEyes,
+    /// What it plans with.
+    #[serde(flatten)]
+    pub map: PlannerMap,
+    /// Its search, which is not of this room.
+    #[serde(skip)]
+    pub mind: fn(&PlannerParameters) -> Box<dyn Policy>,
+}
+
+/// What a planner sees with.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(tag = "sensor", rename_all = "snake_case")]
+pub enum PlannerEyes {
+    /// Rays of the Sojourner-like navigator.
+    Rays(SojournerParameters),
+    /// Rectangles of the Schoppers-like navigator.
+    Rectangles(SchoppersParameters),
+}
+
+/// Name of the sensor of a planner.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum PlannerSensor {
+    /// Rays of the Sojourner-like navigator.
+    #[default]
+    Rays,
+    /// Rectangles of the Schoppers-like navigator.
+    Rectangles,
+}
+
+/// The map that a planner keeps of what it has seen.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct PlannerMap {
+    /// What it sees with: the sensor of the Sojourner-like or of the Schoppers-like navigator, with the body and the limits of that one.
+    #[serde(skip_serializing)]
+    pub sensor: PlannerSensor,
+    /// Side of the cells of its map, m (our choice: that of the oracle's).
+    pub map_cell_m: f64,
+    /// How far its map reaches beyond start and goal at first, m; it grows where a way needs more (our choice).
+    pub map_beyond_m: f64,
+}
+
+impl Default for PlannerMap {
+    fn default() -> Self {
+        Self { sensor: PlannerSensor::Rays, map_cell_m: 0.1, map_beyond_m: 10.0 }
+    }
+}
+
+/// A navigator with its numbers.
+#[derive(Clone, Debug, Serialize)]
 #[serde(untagged)]
 pub enum Navigator {
     /// Rays.
     Sojourner(SojournerParameters),
     /// Rectangles.
     Schoppers(SchoppersParameters),
+    /// A search over what has been seen.
+    Planner(PlannerParameters),
 }
 
 /// Where rovers start.
@@ -406,12 +462,15 @@ impl Navigator {
     pub const SOJOURNER: &str = "sojourner_like";
     /// Name of the Schoppers-like one.
     pub const SCHOPPERS: &str = "schoppers_like";
+    /// Name of the one that plans.
+    pub const PLANNER: &str = "planner";
 
     /// Name in studies and tables.
     pub fn kind(&self) -> &'static str {
         match self {
             Self::Sojourner(_) => Self::SOJOURNER,
             Self::Schoppers(_) => Self::SCHOPPERS,
+            Self::Planner(_) => Self::PLANNER,
         }
     }
 
@@ -421,6 +480,7 @@ impl Navigator {
         match self {
             Self::Sojourner(p) => p.check(),
             Self::Schoppers(p) => p.check(),
+            Self::Planner(p) => p.check(),
         }
     }
 
@@ -429,27 +489,82 @@ impl Navigator {
         match self {
             Self::Sojourner(p) => Box::new(SojournerLike::new(p.rules())),
             Self::Schoppers(p) => Box::new(SchoppersLike::new(p.rules())),
+            Self::Planner(p) => (p.mind)(p),
         }
     }
 
     /// The task of its rovers in a trial.
     pub fn task(&self, trial: &RoverParameters) -> Task {
-        let (sensor, scale, axle_m, track_m) = match self {
-            Self::Sojourner(p) => (Sensor::Rays(p.sensor()), p.scale, p.axle_m, p.track_m),
-            Self::Schoppers(p) => (Sensor::Rectangles(p.sensor()), p.scale, p.axle_m, p.track_m),
-        };
-        let (goal_tolerance_m, clearance_m, distance_limit_m, cycle_limit) = match self {
-            Self::Sojourner(p) => (p.goal_tolerance_m, p.clearance_m, p.distance_limit_m, p.cycle_limit),
-            Self::Schoppers(p) => (p.goal_tolerance_m, p.clearance_m, p.distance_limit_m, p.cycle_limit),
-        };
+        match self {
+            Self::Sojourner(p) => p.task(trial),
+            Self::Schoppers(p) => p.task(trial),
+            Self::Planner(p) => p.task(trial),
+        }
+    }
+}
+
+impl PlannerParameters {
+    /// # Errors
+    /// A value out of range.
+    pub fn check(&self) -> Result<(), ParameterError> {
+        match &self.eyes {
+            PlannerEyes::Rays(p) => p.check(),
+            PlannerEyes::Rectangles(p) => p.check(),
+        }?;
+        all_positive(&[("map_cell_m", self.map.map_cell_m), ("map_beyond_m", self.map.map_beyond_m)])
+    }
+
+    /// The task of its rovers in a trial.
+    pub fn task(&self, trial: &RoverParameters) -> Task {
+        match &self.eyes {
+            PlannerEyes::Rays(p) => p.task(trial),
+            PlannerEyes::Rectangles(p) => p.task(trial),
+        }
+    }
+
+    /// Turn of a cycle, rad.
+    pub fn turn_rad(&self) -> f64 {
+        match &self.eyes {
+            PlannerEyes::Rays(p) => p.turn_deg.to_radians(),
+            PlannerEyes::Rectangles(p) => p.turn_deg.to_radians(),
+        }
+    }
+
+    /// Drive of a cycle, m.
+    pub fn step_m(&self) -> f64 {
+        match &self.eyes {
+            PlannerEyes::Rays(p) => p.step_m * p.scale,
+            PlannerEyes::Rectangles(p) => p.step_m * p.scale,
+        }
+    }
+}
+
+impl SojournerParameters {
+    fn task(&self, trial: &RoverParameters) -> Task {
         Task {
-            chassis: Chassis { axle_m: axle_m * scale, track_m: track_m * scale },
-            sensor,
+            chassis: Chassis { axle_m: self.axle_m * self.scale, track_m: self.track_m * self.scale },
+            sensor: Sensor::Rays(self.sensor()),
             noise: trial.noise,
-            goal_tolerance_m,
-            clearance_m,
-            distance_limit_m,
-            cycle_limit,
+            goal_tolerance_m: self.goal_tolerance_m,
+            clearance_m: self.clearance_m,
+            distance_limit_m: self.distance_limit_m,
+            cycle_limit: self.cycle_limit,
+            speed_m_s: trial.speed_m_s,
+            turn_rate_rad_s: trial.turn_rate_deg_s.to_radians(),
+        }
+    }
+}
+
+impl SchoppersParameters {
+    fn task(&self, trial: &RoverParameters) -> Task {
+        Task {
+            chassis: Chassis { axle_m: self.axle_m * self.scale, track_m: self.track_m * self.scale },
+            sensor: Sensor::Rectangles(self.sensor()),
+            noise: trial.noise,
+            goal_tolerance_m: self.goal_tolerance_m,
+            clearance_m: self.clearance_m,
+            distance_limit_m: self.distance_limit_m,
+            cycle_limit: self.cycle_limit,
             speed_m_s: trial.speed_m_s,
             turn_rate_rad_s: trial.turn_rate_deg_s.to_radians(),
         }

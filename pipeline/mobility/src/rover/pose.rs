@@ -13,10 +13,15 @@ pub struct Pose {
 }
 
 impl Pose {
-    /// A point of the rover's own axes (ahead, left), m, in those of the terrain.
-    pub fn to_ground(&self, [ahead, left]: [f64; 2]) -> [f64; 2] {
+    /// The rover's own axes.
+    pub fn axes(&self) -> Axes {
         let (sin, cos) = libm::sincos(self.heading_rad);
-        [self.position_m[0] + ahead * cos - left * sin, self.position_m[1] + ahead * sin + left * cos]
+        Axes { origin_m: self.position_m, sin, cos }
+    }
+
+    /// A point of the rover's own axes (ahead, left), m, in those of the terrain.
+    pub fn to_ground(&self, point: [f64; 2]) -> [f64; 2] {
+        self.axes().to_ground(point)
     }
 
     /// The same place after a turn to the left.
@@ -38,6 +43,23 @@ impl Pose {
     /// Turn to the left after which the rover faces a point, in -pi to pi.
     pub fn bearing_error_rad(&self, [x, y]: [f64; 2]) -> f64 {
         wrapped(libm::atan2(y - self.position_m[1], x - self.position_m[0]) - self.heading_rad)
+    }
+}
+
+/// Axes of a rover (ahead, left): for many points of one pose, whose heading is turned into sine and cosine once.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Axes {
+    origin_m: [f64; 2],
+    sin: f64,
+    cos: f64,
+}
+
+impl Axes {
+    /// A point (ahead, left), m, in the axes of the terrain.
+    #[inline]
+    pub fn to_ground(&self, [ahead, left]: [f64; 2]) -> [f64; 2] {
+        let Self { origin_m: [x, y], sin, cos } = *self;
+        [x + ahead * cos - left * sin, y + ahead * sin + left * cos]
     }
 }
 
@@ -72,8 +94,9 @@ impl Body {
     /// A wheel over ground that is not known.
     pub fn standing(ground: &impl Ground, pose: &Pose, chassis: &Chassis) -> Result<Self, NoGround> {
         let Chassis { axle_m: a, track_m: t } = *chassis;
+        let axes = pose.axes();
         let wheel = |ahead: f64, left: f64| {
-            let [x, y] = pose.to_ground([ahead, left]);
+            let [x, y] = axes.to_ground([ahead, left]);
             ground.at(x, y).map(|point| point.height_m)
         };
         let [fl, fr, rl, rr] = [wheel(a, t)?, wheel(a, -t)?, wheel(-a, t)?, wheel(-a, -t)?];

@@ -289,6 +289,125 @@ fn val_slip_goes_unnoticed_by_dead_reckoning() {
     assert!((reckoning.distance_m - 0.9 * 24.5).abs() < 0.1, "{reckoning:?}");
 }
 
+/// Each option of noise changes what it should and nothing else: turn, drive, heading after the drive, heights; and only dead reckoning parts
+/// what the rover believes from where it is.
+#[test]
+fn val_each_noise_has_its_own_effect() {
+    use super::motion::Poses;
+    let pose = Pose { position_m: [1.0, 2.0], heading_rad: 0.3 };
+    let command = Command { turn_rad: 0.2, drive_m: 0.1, stop: None };
+    let draws = CycleDraws::new(noise(), 5);
+    let after = |options: NoiseParameters| {
+        let mut poses = Poses { real: pose, believed: pose };
+        let moved = poses.carry_out(&command, &options, &draws);
+        (poses, moved)
+    };
+    let none = NoiseParameters::default();
+    let (exact, moved) = after(none);
+    assert_eq!((moved.turn_rad, moved.drive_m, exact.believed), (0.2, 0.1, exact.real));
+    let (slipped, moved) = after(NoiseParameters { slip: 0.25, ..none });
+    assert_eq!((moved.turn_rad, slipped.real.heading_rad), (0.2, exact.real.heading_rad));
+    assert!((moved.drive_m - 0.075).abs() < 1e-15 && slipped.believed == slipped.real);
+    let (scattered, moved) = after(NoiseParameters { slip: 0.25, slip_deviation: 0.1, ..none });
+    assert!(moved.turn_rad == 0.2 && moved.drive_m != 0.075 && scattered.real.heading_rad == exact.real.heading_rad);
+    let (_, moved) = after(NoiseParameters { turn: 0.1, ..none });
+    assert!(moved.turn_rad != 0.2 && (moved.turn_rad - 0.2).abs() < 0.1 && moved.drive_m == 0.1);
+    let (drifted, moved) = after(NoiseParameters { drift_rad: 0.1, ..none });
+    assert_eq!((moved.turn_rad, moved.drive_m, drifted.real.position_m), (0.2, 0.1, exact.real.position_m));
+    assert_ne!(drifted.real.heading_rad, exact.real.heading_rad);
+    let all = NoiseParameters { slip: 0.25, turn: 0.1, drift_rad: 0.1, dead_reckoning: true, ..none };
+    let (reckoned, _) = after(all);
+    assert!(reckoned.believed == exact.real && reckoned.real != exact.real);
+    // The draws do not move: with another option besides, the turn is off by the same.
+    let (_, alone) = after(NoiseParameters { turn: 0.1, ..none });
+    let (_, beside) = after(NoiseParameters { turn: 0.1, slip: 0.3, slip_deviation: 0.2, drift_rad: 0.1, ..none });
+    assert_eq!(alone.turn_rad, beside.turn_rad);
+    // Heights: what is sensed changes, where it is sensed and how the rover stands does not.
+    let ground = Made::flat(&[]);
+    for navigator in [sojourner(), schoppers()] {
+        let task = navigator.task(&RoverParameters::default());
+        let body = Body::standing(&ground, &pose, &task.chassis).unwrap();
+        let [plain, noisy] = [0.0, 0.3].map(|m| task.sensor.look(&ground, &pose, &body, m, &draws).unwrap());
+        assert!(plain.areas.iter().zip(&noisy.areas).all(|(a, b)| a.corners_m == b.corners_m));
+        assert!(plain.rays.iter().zip(&noisy.rays).all(|(a, b)| a.from_m == b.from_m && a.height_m != b.height_m));
+        assert!(!plain.has_hazard() && plain.tilted == noisy.tilted);
+    }
+}
+
+/// Censoring: the efficiency at half of the limit is that of the same rover with half of the limit, to within a step.
+#[test]
+fn val_half_of_the_limit_is_as_if_it_were_the_limit() {
+    let ring: Vec<Rock> = (0..60)
+        .map(|k| {
+            let (sin, cos) = libm::sincos(TAU * f64::from(k) / 60.0);
+            ([3.0 * cos, 3.0 * sin], 0.3, 0.5)
+        })
+        .collect();
+    let limited = |distance_limit_m: f64| {
+        let navigator = Navigator::Sojourner(SojournerParameters { distance_limit_m, ..Default::default() });
+        run(&Made::flat(&ring), &navigator, &ahead(20.0))
+    };
+    let (whole, half) = (limited(60.0), limited(30.0));
+    assert_eq!([whole.ending, half.ending], [Ending::DistanceLimit; 2]);
+    assert!((whole.efficiency_at_half(60.0) - half.efficiency()).abs() < 0.065 / 45.0);
+    assert!(whole.efficiency_at_half(60.0) > whole.efficiency() + 0.1);
+}
+
+/// Heights in steps are told from others, whatever their offset: those of a 16-bit image over 4 km, of whole millimetres, of a float
+/// raster; terraces of a few heights are ground.
+#[test]
+fn val_steps_of_heights_are_found() {
+    use super::quantised::height_step_m;
+    let mut stream = Streams::for_seed(2, "heights").stream("heights");
+    let drawn: Vec<f64> = (0..4000).map(|_| stream.uniform_in(-700.0, 3300.0)).collect();
+    let in_steps = |step_m: f64, offset_m: f64| -> Vec<f32> {
+        drawn.iter().map(|z| (offset_m + step_m * (z / step_m).round()) as f32).collect()
+    };
+    for (step_m, offset_m) in [(4000.0 / 65535.0, 0.0), (4000.0 / 65535.0, 12.345), (1.0, 0.0)] {
+        let found = height_step_m(&in_steps(step_m, offset_m)).unwrap();
+        assert!(
+            (found / step_m - (found / step_m).round()).abs() < 0.02 && found >= 0.98 * step_m,
+            "{step_m}: {found}"
+        );
+    }
+    assert_eq!(height_step_m(&drawn.iter().map(|z| *z as f32).collect::<Vec<_>>()), None);
+    assert_eq!(height_step_m(&[0.0, 0.5, 1.0, 1.5].repeat(100)), None);
+    assert_eq!(height_step_m(&[]), None);
+}
+
+/// A recording tells what happened, with its numbers; its states are those that the metrics judge.
+#[test]
+fn val_recordings_hold_every_cycle() {
+    use sastrugi_schemas::topics::RoverEventKind as Kind;
+    let ground = Made::flat(&[([3.0, 0.05], 0.3, 0.4), ([7.0, 0.0], 0.1, 0.14)]);
+    let recorded = |navigator: &Navigator, start: &Start| {
+        let task = navigator.task(&RoverParameters::default());
+        let (mut recorder, mut track) = (Recorder::new(&task), Track::new(&ground, &task, 1.0));
+        let drive = drive(&ground, &task, navigator.policy().as_mut(), start, noise(), |cycle| {
+            track.add(cycle);
+            recorder.add(cycle, start.goal_m);
+        });
+        (drive, recorder.finish(&drive, track.finish().states, None))
+    };
+    let blind =
+        Navigator::Sojourner(SojournerParameters { hazard_step_m: 9.0, hazard_span_m: 9.0, ..Default::default() });
+    for (navigator, contacts) in [(sojourner(), 0), (schoppers(), 0), (blind, 2)] {
+        let (drive, recording) = recorded(&navigator, &ahead(10.0));
+        assert_eq!(recording.cycles.len(), drive.cycles as usize + 1, "the last cycle stops");
+        let count = |kind: Kind| recording.events.iter().filter(|event| event.kind == kind).count();
+        assert_eq!([count(Kind::Start), count(Kind::Reached), count(Kind::Contact)], [1, 1, contacts]);
+        assert_eq!(count(Kind::Hazard) > 0, contacts == 0);
+        assert!(recording.events.is_sorted_by(|a, b| a.time_s <= b.time_s));
+        let last = recording.states.last().unwrap();
+        assert!((last.time_s - drive.time_s).abs() <= 1.0 && drive.time_s >= last.time_s);
+        // Speeds lead from state to state, turns aside.
+        let driven: f64 = recording.states.iter().map(|s| libm::hypot(s.velocity_m_s[0], s.velocity_m_s[1])).sum();
+        assert!((driven - drive.distance_m).abs() < 0.05 * drive.distance_m, "{driven} {}", drive.distance_m);
+        assert_eq!(recording.cycles[0].areas.len(), if matches!(navigator, Navigator::Schoppers(_)) { 4 } else { 5 });
+        assert!(recording.plans.is_empty());
+    }
+}
+
 /// Starts lie on the circle, at equal angles, and more rovers leave headings where they were.
 #[test]
 fn val_starts_on_the_circle() {

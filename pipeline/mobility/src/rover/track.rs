@@ -6,10 +6,20 @@ use super::trial::{Cycle, Task};
 use crate::metrics::{Differentiator, Metrics};
 use sastrugi_numeric::Ground;
 use sastrugi_schemas::tables::RoverSampleRow;
-use sastrugi_schemas::topics::StateSample;
+use sastrugi_schemas::topics::{RoverRecording, StateSample};
 
 /// Rate of the poses for metrics, Hz.
-pub const METRICS_RATE_HZ: f64 = 1.0;
+pub const METRICS_RATE_HZ: f64 = RoverRecording::RATE_HZ;
+
+/// What is kept of a finished drive.
+pub struct Tracked {
+    /// Samples, without the names of terrain and rover.
+    pub samples: Vec<RoverSampleRow>,
+    /// The figures that judge vehicles.
+    pub metrics: Metrics,
+    /// Poses at [`METRICS_RATE_HZ`].
+    pub states: Vec<StateSample>,
+}
 
 /// A rover's way as it comes.
 pub struct Track<'a, G> {
@@ -53,24 +63,31 @@ impl<'a, G: Ground> Track<'a, G> {
             let driven = if drive_s > 0.0 { ((since_s - turn_s) / drive_s).clamp(0.0, 1.0) } else { 0.0 };
             let pose = cycle.poses.real.turned(turned * turn_rad).driven(driven * drive_m);
             let Ok(body) = Body::standing(self.ground, &pose, &self.task.chassis) else { return };
-            self.states.push(state(time_s, &pose, &body));
+            let motion = match () {
+                () if since_s < turn_s => [0.0, turn_rad / turn_s],
+                () if since_s < turn_s + drive_s => [drive_m / drive_s, 0.0],
+                () => [0.0; 2],
+            };
+            self.states.push(state(time_s, &pose, &body, motion));
         }
     }
 
-    /// The samples, without the names of terrain and rover, and the figures that judge vehicles.
-    pub fn finish(self) -> (Vec<RoverSampleRow>, Metrics) {
+    /// What was kept of a finished drive.
+    pub fn finish(self) -> Tracked {
         let metrics = Metrics::of(&self.states, METRICS_RATE_HZ, Differentiator::SecondDifference);
-        (self.samples, metrics)
+        Tracked { samples: self.samples, metrics, states: self.states }
     }
 }
 
-fn state(time_s: f64, pose: &Pose, body: &Body) -> StateSample {
+/// A state that moves ahead on the plane of the body (m/s) or turns to the left (rad/s).
+fn state(time_s: f64, pose: &Pose, body: &Body, [speed_m_s, turn_rate_rad_s]: [f64; 2]) -> StateSample {
+    let (sin, cos) = libm::sincos(pose.heading_rad);
     StateSample {
         time_s,
         position_m: [pose.position_m[0], pose.position_m[1], body.height_m],
         orientation: body.orientation(pose.heading_rad),
-        velocity_m_s: [0.0; 3],
-        angular_velocity_rad_s: [0.0; 3],
+        velocity_m_s: [speed_m_s * cos, speed_m_s * sin, speed_m_s * body.slopes[0]],
+        angular_velocity_rad_s: [0.0, 0.0, turn_rate_rad_s],
     }
 }
 

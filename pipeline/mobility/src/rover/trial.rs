@@ -80,6 +80,8 @@ pub struct Cycle<'a> {
     pub view: &'a View,
     /// What it is at.
     pub state: &'static str,
+    /// The way that it plans to take, m; empty for policies without plans.
+    pub plan: &'a [[f64; 2]],
     /// What it does; nothing at the end.
     pub moved: Moved,
     /// Contacts so far.
@@ -227,6 +229,7 @@ impl<G: Ground> Run<'_, G> {
             body,
             view: &view,
             state: policy.state(),
+            plan: policy.plan(),
             moved: Moved { turn_rad: 0.0, drive_m: 0.0 },
             contacts: self.drive.contacts,
         };

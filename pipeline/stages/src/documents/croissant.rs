@@ -64,7 +64,7 @@ const SETS: [(&str, &str, &str, &str, &str); 14] = [
         "image/tiff",
         "Surfaces recovered from images, GeoTIFF, float32 metres; maps of albedo, uncertainty and lit images beside them",
     ),
-    ("mcap-files", "mcap", ".mcap", "application/octet-stream", "Recordings of missions and teams, MCAP"),
+    ("mcap-files", "mcap", ".mcap", "application/octet-stream", "Recordings of missions, teams and rovers, MCAP"),
     ("bag-files", "mcap", "metadata.yaml", "application/yaml", "Descriptions of the recordings for bag readers"),
 ];
 /// What the release says of itself, and shows: id of the set, patterns, media types, what they are.

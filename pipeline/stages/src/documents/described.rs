@@ -30,7 +30,7 @@ pub const FOLDERS: [(&str, &str); 13] = [
         "photoclinometry/",
         "surfaces recovered from images, GeoTIFF, float32 metres, no data -9999; `.albedo.tif`, `.uncertainty.tif` (standard deviation of heights, m), `.lit.tif` (images that show a cell lit)",
     ),
-    ("mcap/", "one recording per mission, or run of a team"),
+    ("mcap/", "one recording per mission, run of a team, or recorded rover"),
     ("tables/", "Parquet, units and descriptions in the column metadata"),
     ("report/", "report: `index.html`, one offline page"),
 ];

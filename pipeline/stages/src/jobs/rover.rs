@@ -2,27 +2,41 @@
 
 use super::rover_designs;
 use crate::builder::{BuildError, Builder, HEIGHTS, Heightfield, common};
-use crate::job::{Estimate, ItemRef, Job, JobError, Outcome, Work};
+use crate::job::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work};
+use crate::operations::planner;
 use crate::operations::rovers::{self, Grounds, Oracle};
 use crate::revision::Room;
 use crate::runner::graph::Node;
 use crate::study::entry::joined;
 use crate::study::{Entry, StudyError, keys};
 use rayon::prelude::*;
-use sastrugi_mobility::rover::{Navigator, RoverParameters, SchoppersParameters, SojournerParameters, Start, Track};
+use sastrugi_mobility::rover::{
+    Navigator, PlannerEyes, PlannerMap, PlannerParameters, PlannerSensor, Recorder, RoverParameters,
+    SchoppersParameters, SojournerParameters, Start, Surroundings, Track,
+};
 use sastrugi_numeric::{Counter, Ground, Streams};
 use sastrugi_schemas::kind::schema_of;
-use sastrugi_schemas::study::RoverItem;
+use sastrugi_schemas::study::{McapFlavour, RoverItem, StudyHead};
 use sastrugi_schemas::tables::{RoverRow, RoverSampleRow};
+use sastrugi_schemas::topics::RoverRecording;
 use sastrugi_schemas::{Kind, ParameterError};
+use sastrugi_store::digest;
+use sastrugi_store::mcap::{RoverMcap, TerrainView, bag_metadata, write_rover};
 use serde_json::{Value, json};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 /// Name of the stage.
 pub const STAGE: &str = "rover";
 /// Distance between samples when none is given, m.
 const SAMPLE_M: f64 = 0.5;
+/// Rovers that are recorded when no number is given: one of each terrain.
+const RECORD: u32 = 1;
+/// Memory of a recorded cycle, with its messages, bytes.
+const BYTES_PER_RECORDED_CYCLE: u64 = 6000;
+/// Rules of the two navigators, which the planner does not have.
+const RULES: [&str; 7] =
+    ["bearing_tolerance_rad", "turn_noise_rad", "pass_m", "commit_m", "commit_growth", "commit_max_m", "progress_m"];
 /// Rough time of a cycle, s.
 const SECONDS_PER_CYCLE: f64 = 6e-5;
 
@@ -43,6 +57,11 @@ pub fn kinds() -> Vec<Kind> {
             "four rectangles ahead, safe or unsafe by perfect sensing: keeps what is straight ahead safe",
             "JPL synthetic terrain environment, section 4",
         ),
+        kind(
+            Navigator::PLANNER,
+            "D* Lite over what the sensor of one of the two others has shown: to compare them with",
+            "Koenig and Likhachev (2002); the rest is our choice",
+        ),
     ]
 }
 
@@ -51,8 +70,54 @@ fn schema(kind: &str) -> Option<Value> {
     match kind {
         Navigator::SOJOURNER => Some(keys::schema_of_both::<SojournerParameters, RoverParameters>()),
         Navigator::SCHOPPERS => Some(keys::schema_of_both::<SchoppersParameters, RoverParameters>()),
+        Navigator::PLANNER => Some(planner_schema()),
         _ => None,
     }
+}
+
+/// Parameters of the planner: those of bodies and sensors of both navigators, without their rules.
+fn planner_schema() -> Value {
+    let mut schema = keys::schema_of_both::<SojournerParameters, RoverParameters>();
+    let [mut others, own] = [schema_of::<SchoppersParameters>(), schema_of::<PlannerMap>()];
+    let Some(all) = schema["properties"].as_object_mut() else { return schema };
+    for (key, mut other) in others["properties"].as_object_mut().map(std::mem::take).unwrap_or_default() {
+        match all.get_mut(&key) {
+            Some(one) if one["default"] != other["default"] => {
+                let said = one["description"].as_str().unwrap_or_default().trim_end_matches('.');
+                one["description"] = json!(format!("{said}; {} with rectangles.", other["default"]));
+            }
+            Some(_) => {}
+            None => {
+                all.insert(key, other.take());
+            }
+        }
+    }
+    all.retain(|key, _| !RULES.contains(&key.as_str()));
+    all.extend(own["properties"].as_object().cloned().unwrap_or_default());
+    if let Some(more) = own["$defs"].as_object().cloned() {
+        match schema["$defs"].as_object_mut() {
+            Some(defs) => defs.extend(more),
+            None => schema["$defs"] = Value::Object(more),
+        }
+    }
+    schema
+}
+
+/// The planner with the body and the sensor of a navigator.
+fn read_planner(params: &Value) -> Result<(Navigator, RoverParameters), ParameterError> {
+    let (rest, map): (Value, PlannerMap) = keys::read_both(params)?;
+    if let Some(rule) = RULES.iter().find(|rule| rest.get(rule).is_some()) {
+        return Err(ParameterError::new(*rule, "is a rule of another navigator; the planner has none of them"));
+    }
+    let (eyes, trial) = match map.sensor {
+        PlannerSensor::Rays => keys::read_both(&rest).map(|(own, trial)| (PlannerEyes::Rays(own), trial)),
+        PlannerSensor::Rectangles => keys::read_both(&rest).map(|(own, trial)| (PlannerEyes::Rectangles(own), trial)),
+    }?;
+    let parameters = PlannerParameters { eyes, map, mind: planner::policy };
+    parameters.check()?;
+    RoverParameters::check(&trial)?;
+    planner::check(&parameters, &trial)?;
+    Ok((Navigator::Planner(parameters), trial))
 }
 
 /// A navigator and its trial, checked.
@@ -60,13 +125,11 @@ fn schema(kind: &str) -> Option<Value> {
 /// # Errors
 /// A wrong value; an unknown kind must have been refused.
 pub fn prepare(kind: &str, params: &Value) -> Result<(Navigator, RoverParameters), ParameterError> {
-    let (navigator, trial) = if kind == Navigator::SOJOURNER {
-        let (own, trial) = keys::read_both(params)?;
-        (Navigator::Sojourner(own), trial)
-    } else {
-        let (own, trial) = keys::read_both(params)?;
-        (Navigator::Schoppers(own), trial)
-    };
+    let (navigator, trial) = match kind {
+        Navigator::SOJOURNER => keys::read_both(params).map(|(own, trial)| (Navigator::Sojourner(own), trial)),
+        Navigator::PLANNER => read_planner(params),
+        _ => keys::read_both(params).map(|(own, trial)| (Navigator::Schoppers(own), trial)),
+    }?;
     navigator.check()?;
     RoverParameters::check(&trial)?;
     Ok((navigator, trial))
@@ -81,6 +144,9 @@ struct Trial {
     navigator: Navigator,
     parameters: RoverParameters,
     sample_m: f64,
+    /// Rovers that are recorded, the first ones.
+    record: usize,
+    head: StudyHead,
 }
 
 struct RoverJob {
@@ -101,13 +167,15 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
         let Some(schema) = schema(&envelope.kind) else { return Err(unknown(&entry, &envelope.kind).into()) };
         let terrains = terrains(builder, &entry, &envelope.terrains)?;
         let sample_m = envelope.sample_m.unwrap_or(SAMPLE_M);
+        let (record, head) = (envelope.record.unwrap_or(RECORD) as usize, &builder.study.head.clone());
         ParameterError::not_negative("sample_m", sample_m).map_err(|e| entry.refuse(e))?;
         for one in entry.expand(&envelope.id, None, &envelope.sweep, &params)? {
             entry.check_keys::<RoverItem>(&one.params, &schema)?;
             builder.claim(&entry, STAGE, &one.id)?;
             let (navigator, parameters) = prepare(&envelope.kind, &one.params).map_err(|e| entry.refuse(e))?;
             rover_designs::add(builder, &entry, &envelope, &one, &terrains)?;
-            let trial = Arc::new(Trial { id: one.id, variant: one.sweep, navigator, parameters, sample_m });
+            let (id, variant, head) = (one.id, one.sweep, head.clone());
+            let trial = Arc::new(Trial { id, variant, navigator, parameters, sample_m, record, head });
             terrains.iter().try_for_each(|terrain| add_one(builder, &entry, &envelope, &trial, terrain))?;
         }
     }
@@ -162,28 +230,43 @@ pub fn estimate(parameters: &RoverParameters) -> Estimate {
     Estimate { seconds: SECONDS_PER_CYCLE * cycles, bytes: 40.0 * cycles / 10.0 }
 }
 
-/// One rover: its row and its samples.
+/// One rover: its row and its samples, and its recording, which is on disk.
 struct Driven {
     row: RoverRow,
     samples: Vec<RoverSampleRow>,
+    products: Vec<Product>,
 }
 
 impl RoverJob {
-    /// Drives a rover from its start.
-    fn drive(&self, ground: &impl Ground, number: usize, start: &Start, noise: Counter, oracle: Oracle) -> Driven {
+    /// Drives a rover from its start; the first ones are recorded.
+    fn drive(
+        &self,
+        work: &Work<'_>,
+        ground: &impl Ground,
+        number: usize,
+        (start, oracle): (&Start, Oracle),
+        noise: Counter,
+    ) -> Result<Driven, JobError> {
         let trial = &self.trial;
         let task = trial.navigator.task(&trial.parameters);
         let mut policy = trial.navigator.policy();
         let mut track = Track::new(ground, &task, trial.sample_m);
+        let mut recorder = (number < trial.record).then(|| Recorder::new(&task));
         let key = noise.at(number as i64);
-        let drive = sastrugi_mobility::rover::drive(ground, &task, policy.as_mut(), start, key, |c| track.add(c));
-        let (mut samples, metrics) = track.finish();
+        let drive = sastrugi_mobility::rover::drive(ground, &task, policy.as_mut(), start, key, |cycle| {
+            track.add(cycle);
+            recorder.iter_mut().for_each(|recorder| recorder.add(cycle, start.goal_m));
+        });
+        let tracked = track.finish();
+        let (mut samples, metrics) = (tracked.samples, tracked.metrics);
         let rover_id = format!("{}-{:04}", trial.id, number + 1);
         for sample in &mut samples {
             sample.terrain_id.clone_from(&self.terrain);
             sample.rover_id.clone_from(&rover_id);
         }
-        let row = RoverRow {
+        let note = rovers::note(&drive, &task);
+        let recording = recorder.map(|recorder| recorder.finish(&drive, tracked.states, note.as_deref()));
+        let mut row = RoverRow {
             terrain_id: self.terrain.clone(),
             rover_id,
             group: self.field.group.clone(),
@@ -219,10 +302,86 @@ impl RoverJob {
             max_roll_deg: metrics.max_roll_rad.to_degrees(),
             rms_pitch_rate_deg_s: metrics.rms_pitch_rate_rad_s.to_degrees(),
             rms_roll_rate_deg_s: metrics.rms_roll_rate_rad_s.to_degrees(),
-            note: rovers::note(&drive, &task),
+            note,
             path: None,
         };
-        Driven { row, samples }
+        let products = match recording {
+            Some(recording) => self.write_recording(work, ground, start, &recording, &mut row)?,
+            None => Vec::new(),
+        };
+        Ok(Driven { row, samples, products })
+    }
+
+    /// Writes a recording, and where it is into the row.
+    fn write_recording(
+        &self,
+        work: &Work<'_>,
+        ground: &impl Ground,
+        start: &Start,
+        recording: &RoverRecording,
+        row: &mut RoverRow,
+    ) -> Result<Vec<Product>, JobError> {
+        let (head, id) = (&self.trial.head, row.rover_id.clone());
+        let fail = |e: JobError| e.reworded(|words| format!("{id}: {words}"));
+        let around = Surroundings::of(ground, recording, [start.start_m, start.goal_m]);
+        let classes = rovers::ground_codes(&around);
+        let terrain = TerrainView::new(&around.heights, Some(&classes)).map_err(|e| fail(JobError::new(e)))?;
+        let mcap = RoverMcap {
+            flavour: head.mcap,
+            recording,
+            terrain: &terrain,
+            start_m: start.start_m,
+            goal_m: start.goal_m,
+            epoch_ns: head.epoch_ns,
+            metadata: &self.metadata(row, &digest::heights(&around.heights)),
+        };
+        let file = format!("{id}.mcap");
+        let summary = write_rover(&work.output(&file), &mcap).map_err(|e| fail(JobError::io(e)))?;
+        let mut products = Vec::new();
+        let release_path = match head.mcap {
+            McapFlavour::Viewer => format!("mcap/{}/{file}", self.terrain),
+            McapFlavour::Ros2 => format!("mcap/{}/{id}/{file}", self.terrain),
+        };
+        if head.mcap == McapFlavour::Ros2 {
+            let (bag, place) = (format!("{id}.metadata.yaml"), format!("mcap/{}/{id}/metadata.yaml", self.terrain));
+            work.write(&bag, bag_metadata(&file, &summary).as_bytes()).map_err(fail)?;
+            products.push(Product::released(&bag, place, None));
+        }
+        row.path = Some(release_path.clone());
+        let recorded = Product::released(&file, release_path, Some(summary.content_sha256));
+        products.push(Product { records: Some(summary.messages), ..recorded });
+        Ok(products)
+    }
+
+    /// Records that a viewer of one file needs to know where it came from.
+    fn metadata(&self, row: &RoverRow, heights_sha256: &str) -> BTreeMap<String, BTreeMap<String, String>> {
+        let head = &self.trial.head;
+        let study = [("name", head.name.clone()), ("seed", head.seed.to_string()), ("license", head.license.clone())];
+        let terrain = [("id", self.terrain.clone()), ("group", self.field.group.clone().unwrap_or_default())];
+        let rover = [
+            ("id", row.rover_id.clone()),
+            ("start_m", format!("{} {}", row.start_x_m, row.start_y_m)),
+            ("goal_m", format!("{} {}", row.goal_x_m, row.goal_y_m)),
+        ];
+        let parameters = serde_json::to_string(&self.trial.navigator).unwrap_or_default();
+        let trial = serde_json::to_string(&self.trial.parameters).unwrap_or_default();
+        let navigator = [("name", row.navigator.clone()), ("parameters", parameters), ("trial", trial)];
+        let outcome = [
+            ("outcome", row.outcome.clone()),
+            ("time_s", row.time_s.to_string()),
+            ("distance_m", row.distance_m.to_string()),
+            ("efficiency", row.efficiency.to_string()),
+        ];
+        let map = |pairs: &[(&str, String)]| pairs.iter().map(|(k, v)| ((*k).to_owned(), v.clone())).collect();
+        [
+            ("study".to_owned(), map(&study)),
+            ("terrain".to_owned(), map(&terrain)),
+            ("rover".to_owned(), map(&rover)),
+            ("navigator".to_owned(), map(&navigator)),
+            ("outcome".to_owned(), map(&outcome)),
+            ("hashes".to_owned(), map(&[("drawn_heights_sha256", heights_sha256.to_owned())])),
+        ]
+        .into()
     }
 }
 
@@ -253,6 +412,11 @@ impl Job for RoverJob {
             "variant": joined(self.field.variant.as_deref(), self.trial.variant.as_deref()),
             "terrain": self.terrain,
             "group": self.field.group,
+            "record": self.trial.record,
+            "study": (self.trial.record > 0).then(|| {
+                let head = &self.trial.head;
+                json!({ "name": head.name, "seed": head.seed, "license": head.license, "epoch_ns": head.epoch_ns, "mcap": head.mcap })
+            }),
             // The world goes on beyond the heights of the item.
             "world": [self.field.parameters.clone(), json!(self.field.stream())],
         })
@@ -263,7 +427,14 @@ impl Job for RoverJob {
     }
 
     fn memory_bytes(&self) -> u64 {
-        Grounds::memory_bytes(&self.field)
+        let task = self.trial.navigator.task(&self.trial.parameters);
+        let at_once = self.trial.record.min(rayon::current_num_threads()) as u64;
+        let recordings = at_once * u64::from(task.cycle_limit) * BYTES_PER_RECORDED_CYCLE;
+        let maps = match self.trial.navigator {
+            Navigator::Planner(_) => rayon::current_num_threads() as u64 * planner::memory_bytes(),
+            _ => 0,
+        };
+        Grounds::memory_bytes(&self.field) + recordings + maps
     }
 
     fn estimate(&self) -> Estimate {
@@ -277,11 +448,13 @@ impl Job for RoverJob {
         let grounds = Grounds::new(&self.field, &work.parent(&self.field.item, HEIGHTS)?, parameters, &starts)?;
         let oracles = rovers::oracles(&grounds, &self.trial.navigator.task(parameters), &starts)?;
         let one = |(k, start): (usize, &Start)| match &grounds {
-            Grounds::World(world) => self.drive(&world.view(), k, start, noise, oracles[k]),
-            Grounds::Grid(grid) => self.drive(grid, k, start, noise, oracles[k]),
+            Grounds::World(world) => self.drive(work, &world.view(), k, (start, oracles[k]), noise),
+            Grounds::Grid(grid) => self.drive(work, grid, k, (start, oracles[k]), noise),
         };
-        let mut driven: Vec<Driven> = starts.par_iter().enumerate().map(one).collect();
-        let mut outcome = Outcome { products: Vec::new(), notes: notes(&driven) };
+        let driven: Result<Vec<Driven>, JobError> = starts.par_iter().enumerate().map(one).collect();
+        let mut driven = driven?;
+        let products = driven.iter_mut().flat_map(|d| std::mem::take(&mut d.products)).collect();
+        let mut outcome = Outcome { products, notes: notes(&driven) };
         outcome.write_rows(work, driven.iter_mut().flat_map(|d| std::mem::take(&mut d.samples)))?;
         outcome.write_rows(work, driven.into_iter().map(|d| d.row))?;
         Ok(outcome)

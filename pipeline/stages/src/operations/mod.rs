@@ -9,6 +9,7 @@ pub mod inputs;
 pub mod masks;
 pub mod photoclinometry;
 pub mod place;
+pub mod planner;
 pub mod roughness;
 pub mod routes;
 pub mod rovers;

@@ -6,13 +6,15 @@ use crate::operations::dem::input_error;
 use crate::operations::inputs::read_kept;
 use rayon::prelude::*;
 use sastrugi_mobility::rover::obstacles;
-use sastrugi_mobility::rover::{Drive, Ending, RoverParameters, Start, Task};
+use sastrugi_mobility::rover::quantised::{HEIGHT_STEP_MAX_M, height_step_m};
+use sastrugi_mobility::rover::{Drive, Ending, RoverParameters, Start, Surroundings, Task};
 use sastrugi_navigation::map::Neighbourhood;
 use sastrugi_navigation::obstacles::block_cells;
 use sastrugi_navigation::{CostModel, Method, RouteError, RouteSettings, SlopeCost, SlopeLimits, TravelMap, line};
-use sastrugi_numeric::{Grid, GroundGrid};
-use sastrugi_schemas::ParameterError;
+use sastrugi_numeric::{Grid, GroundClass, GroundGrid};
+use sastrugi_schemas::{ParameterError, RoughnessClass};
 use sastrugi_store::dem;
+use sastrugi_store::mcap::{ROCK, SAND};
 use sastrugi_terrain::planetary::{self, Clearing, GROUND_BYTES_PER_TILE, Planetary, RawPlanetary, WorldGround};
 use std::path::Path;
 
@@ -67,6 +69,14 @@ impl Grounds {
             return Ok(Self::World(Box::new(ground)));
         }
         let heights_m = dem::read(heights).map_err(input_error)?.grid.to_f32();
+        if let Some(step_m) = height_step_m(&heights_m.values).filter(|step_m| *step_m > HEIGHT_STEP_MAX_M) {
+            return Err(JobError::input(format!(
+                "heights come in steps of {:.1} mm, which rovers would take for rocks; they need steps of at most {:.0} mm: \
+                 floating-point heights, or less relief in one file",
+                1e3 * step_m,
+                1e3 * HEIGHT_STEP_MAX_M
+            )));
+        }
         let map = |name: &str| -> Result<Option<Grid>, JobError> {
             let path = heights.with_file_name(name);
             path.is_file().then(|| dem::read(&path).map(|read| read.grid).map_err(input_error)).transpose()
@@ -149,6 +159,16 @@ fn planetary(field: &Heightfield) -> Result<Option<Planetary>, ParameterError> {
     }
     let raw: RawPlanetary = sastrugi_schemas::kind::read_parameters(&field.parameters)?;
     Planetary::try_from(raw).map(Some)
+}
+
+/// Rock and sand by the codes of recordings.
+pub fn ground_codes(around: &Surroundings) -> Grid<u8> {
+    let code = |class: &Option<GroundClass>| match class {
+        Some(GroundClass::Sand) => SAND,
+        Some(GroundClass::Rock) => ROCK,
+        None => RoughnessClass::NO_DATA,
+    };
+    Grid { geometry: around.classes.geometry, values: around.classes.values.iter().map(code).collect() }
 }
 
 /// Why a rover went no farther, in words.

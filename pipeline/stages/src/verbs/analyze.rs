@@ -9,7 +9,7 @@ use sastrugi_roughness::{classify, moore_gradient};
 use sastrugi_schemas::log::Log;
 use sastrugi_schemas::study::RoughnessSection;
 use sastrugi_schemas::tables::LogRow;
-use sastrugi_schemas::topics::EventKind;
+use sastrugi_schemas::topics::{EventKind, RoverEventKind};
 use sastrugi_store::PROGRAM;
 use sastrugi_store::mcap::{McapError, read_log};
 use sastrugi_store::parquet::{TableMetadata, write_table};
@@ -147,8 +147,16 @@ impl Request<'_> {
 
 /// How the mission ended, where the log has an event that says so; loggers of other programs say other things.
 fn outcome(log: &Log) -> Option<String> {
-    let end = log.events.iter().rev().find_map(|(_, name)| EventKind::outcome(name));
-    end.map(|end| end.name().to_owned())
+    const ROVERS: [RoverEventKind; 6] = [
+        RoverEventKind::Reached,
+        RoverEventKind::Lost,
+        RoverEventKind::NoWay,
+        RoverEventKind::DistanceLimit,
+        RoverEventKind::CycleLimit,
+        RoverEventKind::OffGround,
+    ];
+    let known = |name: &str| EventKind::outcome(name).is_some() || ROVERS.iter().any(|end| end.name() == name);
+    log.events.iter().rev().map(|(_, name)| name).find(|name| known(name)).cloned()
 }
 
 /// Writes the table `logs`, sorted by the names of the logs.

@@ -15,6 +15,14 @@ pub(super) const IDENTITY: [f64; 4] = [0.0, 0.0, 0.0, 1.0];
 pub(super) const START: [u8; 3] = [0x2c, 0xa0, 0x5a];
 /// Colour of a goal.
 pub(super) const GOAL: [u8; 3] = [0xc8, 0x32, 0x32];
+/// Class code of sand where ground is told by what it is, not by its roughness; beyond the codes of [`RoughnessClass`].
+pub const SAND: u8 = 100;
+/// Class code of rock.
+pub const ROCK: u8 = 101;
+/// Colour of sand.
+const SAND_RGB: [u8; 3] = [0xc8, 0x9b, 0x6c];
+/// Colour of rock.
+const ROCK_RGB: [u8; 3] = [0x5e, 0x4b, 0x45];
 /// Ground without a class.
 const GREY: [u8; 3] = [0x9a, 0x9a, 0x94];
 
@@ -56,7 +64,11 @@ pub(super) fn rotated([qx, qy, qz, qw]: [f64; 4], v: [f64; 3]) -> [f64; 3] {
     [v[0] + qw * t[0] + u[0], v[1] + qw * t[1] + u[1], v[2] + qw * t[2] + u[2]]
 }
 
-/// Colour of a roughness class.
+/// Colour of a roughness class, of sand and of rock.
 pub(super) fn class_rgb(code: u8) -> [u8; 3] {
-    RoughnessClass::from_code(code).map_or(GREY, RoughnessClass::colour)
+    match code {
+        SAND => SAND_RGB,
+        ROCK => ROCK_RGB,
+        _ => RoughnessClass::from_code(code).map_or(GREY, RoughnessClass::colour),
+    }
 }

@@ -1,4 +1,4 @@
-//! MCAP recordings of missions and of teams in two flavours, which never mix in a file: for viewers (Foxglove's messages and our own, in
+//! MCAP recordings of missions, of teams and of rovers in two flavours, which never mix in a file: for viewers (Foxglove's messages and our own, in
 //! protobuf) and for ROS 2 (CDR). The topics are those of `sastrugi_schemas::topics`.
 //!
 //! Messages stand in the order of their time; chunks are compressed with Zstandard on one thread and carry checksums;
@@ -9,13 +9,16 @@ mod log;
 mod mesh;
 mod protobuf;
 mod ros2;
+mod rover;
 mod team;
 mod viewer;
 
 #[cfg(test)]
 mod tests;
 
+pub use frames::{ROCK, SAND};
 pub use log::read_log;
+pub use rover::{RoverMcap, encode_rover, write_rover};
 pub use team::{TeamMcap, encode_team, write_team};
 
 use crate::PROGRAM;

@@ -20,6 +20,7 @@ pub(super) enum Value {
     Float(f64),
     Doubles(Vec<f64>),
     Floats(Vec<f64>),
+    Text(String),
     Texts(Vec<String>),
 }
 
@@ -31,6 +32,7 @@ impl Value {
             Self::Float(_) => FieldKind::Float,
             Self::Doubles(_) => FieldKind::Doubles,
             Self::Floats(_) => FieldKind::Floats,
+            Self::Text(_) => FieldKind::Text,
             Self::Texts(_) => FieldKind::Texts,
         }
     }
@@ -44,6 +46,7 @@ impl Value {
                 let v: Vec<f32> = v.iter().map(|&v| v as f32).collect();
                 wire::float::encode_packed(number, &v, out);
             }
+            Self::Text(v) => wire::string::encode(number, v, out),
             Self::Texts(v) => wire::string::encode_repeated(number, v, out),
         }
     }
@@ -98,6 +101,7 @@ fn wire_type(kind: FieldKind) -> (Type, Label) {
         FieldKind::Float => (Type::Float, Label::Optional),
         FieldKind::Doubles => (Type::Double, Label::Repeated),
         FieldKind::Floats => (Type::Float, Label::Repeated),
+        FieldKind::Text => (Type::String, Label::Optional),
         FieldKind::Texts => (Type::String, Label::Repeated),
     }
 }

@@ -111,4 +111,9 @@ pub trait Policy {
 
     /// What it is at, for recordings.
     fn state(&self) -> &'static str;
+
+    /// The way that it plans to take, from where it believes to be, m; empty for policies without plans.
+    fn plan(&self) -> &[[f64; 2]] {
+        &[]
+    }
 }

@@ -13,7 +13,7 @@
 
 use super::{Area, Ray, View};
 use crate::rover::draws::{CycleDraws, Purpose};
-use crate::rover::pose::{Body, Pose};
+use crate::rover::pose::{Axes, Body, Pose};
 use sastrugi_numeric::{Ground, NoGround};
 
 /// Rays are followed to this many nominal ranges.
@@ -53,10 +53,11 @@ impl RaySensor {
         noise_m: f64,
         draws: &CycleDraws,
     ) -> Result<View, NoGround> {
+        let axes = pose.axes();
         let mut rays = Vec::with_capacity(self.columns_m.len() * self.rows_m.len());
         for left in &self.columns_m {
             for ahead in &self.rows_m {
-                let mut ray = self.follow(ground, pose, body, [*ahead, *left])?;
+                let mut ray = self.follow(ground, &axes, body, [*ahead, *left])?;
                 if noise_m > 0.0 {
                     let error_m = noise_m * draws.normal_of(Purpose::Height, rays.len());
                     ray.height_m = ray.height_m.map(|v| v + error_m);
@@ -86,7 +87,7 @@ impl RaySensor {
     }
 
     /// The ray of a row and a column.
-    fn follow(&self, ground: &impl Ground, pose: &Pose, body: &Body, [row, column]: [f64; 2]) -> Result<Ray, NoGround> {
+    fn follow(&self, ground: &impl Ground, axes: &Axes, body: &Body, [row, column]: [f64; 2]) -> Result<Ray, NoGround> {
         let from = [self.nose_m - self.behind_nose_m, SPREAD * column];
         let aim = [self.nose_m + row - from[0], column - from[1]];
         let range_m = (aim[0] * aim[0] + aim[1] * aim[1]).sqrt();
@@ -94,14 +95,14 @@ impl RaySensor {
         let point = |t: f64| [from[0] + t * aim[0], from[1] + t * aim[1]];
         let above = |t: f64| self.height_m * (1.0 - t);
         let space = |t: f64, z: f64| {
-            let [x, y] = pose.to_ground(point(t));
+            let [x, y] = axes.to_ground(point(t));
             [x, y, z]
         };
         let from_m = space(0.0, body.height_at_m(from) + self.height_m);
         let mut last = f64::INFINITY;
         for n in 0..=steps {
             let t = REACH * f64::from(n) / f64::from(steps);
-            let [x, y] = pose.to_ground(point(t));
+            let [x, y] = axes.to_ground(point(t));
             let gap = above(t) - (ground.at(x, y)?.height_m - body.height_at_m(point(t)));
             if gap <= 0.0 {
                 // Between the last step and this one, as far as both are off; at the origin itself there is no last one.

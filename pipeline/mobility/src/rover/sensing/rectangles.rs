@@ -7,7 +7,7 @@
 
 use super::{Area, View};
 use crate::rover::draws::{CycleDraws, Purpose};
-use crate::rover::pose::{Body, Pose};
+use crate::rover::pose::{Axes, Body, Pose};
 use crate::rover::sand::{PlaneSums, SandPlane};
 use sastrugi_numeric::{Ground, GroundClass, NoGround};
 
@@ -46,9 +46,10 @@ impl RectangleSensor {
         noise_m: f64,
         draws: &CycleDraws,
     ) -> Result<View, NoGround> {
+        let axes = pose.axes();
         let mut pixels = Vec::with_capacity(self.count);
         for number in 0..self.count {
-            pixels.push(self.pixels(ground, pose, number, noise_m, draws)?);
+            pixels.push(self.pixels(ground, &axes, number, noise_m, draws)?);
         }
         let sand = |pixels: &Vec<Pixel>| {
             let mut sums = PlaneSums::default();
@@ -82,7 +83,7 @@ impl RectangleSensor {
     fn pixels(
         &self,
         ground: &impl Ground,
-        pose: &Pose,
+        axes: &Axes,
         number: usize,
         noise_m: f64,
         draws: &CycleDraws,
@@ -97,7 +98,7 @@ impl RectangleSensor {
                     self.near_m + (i as f64 + 0.5) / along as f64 * self.length_m,
                     right + (j as f64 + 0.5) / across as f64 * (left - right),
                 ];
-                let [x, y] = pose.to_ground(at);
+                let [x, y] = axes.to_ground(at);
                 let point = ground.at(x, y)?;
                 let error_m = if noise_m > 0.0 {
                     noise_m * draws.normal_of(Purpose::Height, (number * along + i) * across + j)

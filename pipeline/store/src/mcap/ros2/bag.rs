@@ -2,10 +2,13 @@
 
 use super::super::{ChannelSummary, McapSummary};
 use sastrugi_schemas::topics::Topic;
-use sastrugi_schemas::topics::ros2::{MEMBER_PATH, TEAM_MARKERS, TEAM_ROUTE, TERRAIN, TERRAIN_POINTS, TF_STATIC};
+use sastrugi_schemas::topics::ros2::{
+    MEMBER_PATH, ROVER_MARKERS, ROVER_PATH, TEAM_MARKERS, TEAM_ROUTE, TERRAIN, TERRAIN_POINTS, TF_STATIC,
+};
 
 /// Topics with one message, at the start.
-const LASTING: [&Topic; 6] = [&TF_STATIC, &TERRAIN, &TERRAIN_POINTS, &TEAM_ROUTE, &TEAM_MARKERS, &MEMBER_PATH];
+const LASTING: [&Topic; 8] =
+    [&TF_STATIC, &TERRAIN, &TERRAIN_POINTS, &TEAM_ROUTE, &TEAM_MARKERS, &MEMBER_PATH, &ROVER_PATH, &ROVER_MARKERS];
 
 /// What a bag's player offers for a topic. What is said once at the start stays for those who come late.
 pub(super) fn quality_of_service(topic: &Topic) -> String {

@@ -2,7 +2,7 @@
 //! and constants of each .msg file with their packages written out. Later distributions read the same bytes.
 
 /// Name and fields of every message used, also those inside of others.
-const DEFINITIONS: [(&str, &str); 33] = [
+const DEFINITIONS: [(&str, &str); 34] = [
     (
         "builtin_interfaces/Time",
         "int32 sec\n\
@@ -13,6 +13,7 @@ const DEFINITIONS: [(&str, &str); 33] = [
         "builtin_interfaces/Time stamp\n\
          string frame_id",
     ),
+    ("std_msgs/String", "string data"),
     (
         "std_msgs/MultiArrayDimension",
         "string label\n\

@@ -86,7 +86,7 @@ pub(in super::super) struct Imu {
 
 /// `geometry_msgs/TwistStamped`.
 #[derive(Serialize)]
-pub(super) struct TwistStamped {
+pub(in super::super) struct TwistStamped {
     pub header: Header,
     pub linear: [f64; 3],
     pub angular: [f64; 3],
@@ -180,8 +180,10 @@ pub(in super::super) struct Path {
 /// The shapes of a [`Marker`] that are used, by their numbers.
 #[derive(Clone, Copy)]
 pub(in super::super) enum MarkerKind {
+    Cube = 1,
     Cylinder = 3,
     LineStrip = 4,
+    LineList = 5,
     Spheres = 7,
     Points = 8,
     Triangles = 11,

@@ -1,0 +1,31 @@
+//! Heights that come in steps, as those of 16-bit images: over 4 km of relief a step is 61 mm, the hazard height of a rover.
+
+/// Largest step of heights that rovers can be asked to drive on, m.
+pub const HEIGHT_STEP_MAX_M: f64 = 1e-3;
+/// Fewest different heights that tell steps of a file from ground that is made of terraces.
+const LEVELS_MIN: usize = 64;
+/// How near to whole steps heights must lie, in steps.
+const NEAR: f64 = 0.02;
+
+/// The step of heights that all are whole steps apart, m; `None` where they are not, or where there are too few to tell. Holes are left out.
+pub fn height_step_m(heights_m: &[f32]) -> Option<f64> {
+    let mut levels: Vec<f32> = heights_m.iter().copied().filter(|z| z.is_finite()).collect();
+    levels.sort_unstable_by(f32::total_cmp);
+    levels.dedup();
+    if levels.len() < LEVELS_MIN {
+        return None;
+    }
+    let (lowest, highest) = (f64::from(levels[0]), f64::from(levels[levels.len() - 1]));
+    let gaps = levels.windows(2).map(|pair| f64::from(pair[1]) - f64::from(pair[0]));
+    let least = gaps.clone().fold(f64::INFINITY, f64::min);
+    // The mean of the gaps that are about one step: single ones are off by the rounding of the heights.
+    let (count, sum) = gaps.filter(|gap| *gap < 1.5 * least).fold((0.0, 0.0), |(n, sum), gap| (n + 1.0, sum + gap));
+    let step = sum / count;
+    let rounding = f64::from(f32::EPSILON) * lowest.abs().max(highest.abs());
+    // Errors of the step add up over a gap, not over the whole height.
+    let whole = levels.windows(2).all(|pair| {
+        let gap = f64::from(pair[1]) - f64::from(pair[0]);
+        (gap - step * (gap / step).round()).abs() <= NEAR * gap + 2.0 * rounding
+    });
+    (whole && rounding < 0.1 * step).then_some(step)
+}

@@ -1,0 +1,182 @@
+use super::*;
+use crate::testing::Random;
+
+const SETTINGS: ExplorerSettings = ExplorerSettings { cell_m: 0.1, margin_m: 0.2, arrive_m: 0.5, beyond_m: 2.0 };
+
+fn explorer(goal_m: [f64; 2]) -> Explorer {
+    Explorer::new(SETTINGS, [0.0; 2], goal_m).unwrap()
+}
+
+/// Corners of an upright rectangle.
+fn rectangle([west, south]: [f64; 2], [east, north]: [f64; 2]) -> [[f64; 2]; 4] {
+    [[west, south], [east, south], [east, north], [west, north]]
+}
+
+fn length_m(points_m: &[[f64; 2]]) -> f64 {
+    points_m.windows(2).map(|pair| libm::hypot(pair[1][0] - pair[0][0], pair[1][1] - pair[0][1])).sum()
+}
+
+/// A wall across x = 1 m from `south` to `north`.
+fn wall(explorer: &mut Explorer, south: f64, north: f64, sight: Sight) {
+    explorer.see(&rectangle([1.0, south], [1.2, north]), sight);
+}
+
+#[test]
+fn val_free_ground_is_planned_straight_to_the_goal() {
+    let mut explorer = explorer([3.0, 0.4]);
+    assert_eq!(explorer.plan([0.02, 0.03]), Some(vec![[0.02, 0.03], [3.0, 0.4]]));
+}
+
+/// A wall is passed by its end, at no less than the margin: the shortest way around the end point (1.0 to 1.2, 0.6 + margin).
+#[test]
+fn val_a_wall_is_passed_at_the_margin() {
+    let mut explorer = explorer([3.0, 0.0]);
+    wall(&mut explorer, -3.0, 0.6, Sight::Hazard);
+    let plan = explorer.plan([0.0; 2]).unwrap();
+    for pair in plan.windows(2) {
+        for k in 0..=100 {
+            let [x, y] = [0, 1].map(|axis| pair[0][axis] + 0.01 * f64::from(k) * (pair[1][axis] - pair[0][axis]));
+            assert!(!(0.85..=1.35).contains(&x) || y >= 0.75 - 1e-9, "{x} {y}");
+        }
+    }
+    // Around the corners of the blocked cells, at any angle; way points are centres of cells.
+    let least_m = libm::hypot(0.8, 0.8) + 0.6 + libm::hypot(1.6, 0.8);
+    assert!(length_m(&plan) >= least_m && length_m(&plan) < 1.06 * least_m, "{plan:?}");
+}
+
+/// What is known only rises: a suspect cell is freed by a safe look; a safe one is no longer where a hazard may lie, unless no other cell is
+/// left for it, when the whole area is a hazard whatever later looks say.
+#[test]
+fn val_knowledge_only_rises() {
+    let look = |explorer: &mut Explorer, south: f64, north: f64, sight| wall(explorer, south, north, sight);
+    let blocked = |sights: &[(f64, f64, Sight)]| {
+        let mut explorer = explorer([3.0, 0.0]);
+        sights.iter().for_each(|(south, north, sight)| look(&mut explorer, *south, *north, *sight));
+        explorer.is_blocked([1.1, 0.05])
+    };
+    use Sight::{Hazard, Safe};
+    assert!(blocked(&[(-0.2, 0.2, Hazard)]) && !blocked(&[(-0.2, 0.2, Hazard), (-0.2, 0.2, Safe)]));
+    // The hazard lies in what was not seen safe: far from here.
+    assert!(!blocked(&[(-0.2, 0.5, Safe), (-0.2, 1.2, Hazard)]));
+    // It lies nowhere else.
+    assert!(blocked(&[(-0.2, 0.2, Safe), (-0.2, 0.2, Hazard)]));
+    assert!(blocked(&[(-0.2, 0.2, Safe), (-0.2, 0.2, Hazard), (-0.2, 0.2, Safe)]));
+}
+
+/// What was forgotten is free again, and planned over as if it had never been seen.
+#[test]
+fn val_what_is_forgotten_is_free() {
+    let mut explorer = explorer([3.0, 0.0]);
+    let before = explorer.plan([0.02, 0.03]);
+    wall(&mut explorer, -1.5, 1.2, Sight::Hazard);
+    assert_ne!(explorer.plan([0.02, 0.03]), before);
+    explorer.forget();
+    assert!(!explorer.is_blocked([1.1, 0.05]));
+    assert_eq!(explorer.plan([0.02, 0.03]), before);
+}
+
+/// The map is not the world: a wall as long as the map is passed by ground beyond it, and a closed ring is not passed at all. How large
+/// the map grows is bounded.
+#[test]
+fn val_the_map_grows_where_a_way_needs_it() {
+    let mut explorer = explorer([3.0, 0.0]);
+    let before = explorer.len();
+    wall(&mut explorer, -2.0, 2.0, Sight::Hazard);
+    let plan = explorer.plan([0.0; 2]).unwrap();
+    assert!(explorer.len() > before && plan.iter().any(|point| point[1].abs() > 2.0), "{plan:?}");
+    // What it knew it knows on the larger map.
+    assert!(explorer.is_blocked([1.1, 1.0]));
+
+    let ring = |centre: [f64; 2], explorer: &mut Explorer| {
+        for [dx, dy] in [[0.0, 0.9], [0.0, -0.9], [0.9, 0.0], [-0.9, 0.0]] {
+            let (x, y, along, across) = (centre[0] + dx, centre[1] + dy, 1.0, 0.1);
+            let [w, h] = if dx == 0.0 { [along, across] } else { [across, along] };
+            explorer.see(&rectangle([x - w, y - h], [x + w, y + h]), Sight::Hazard);
+        }
+    };
+    for centre in [[0.0, 0.0], [3.0, 0.0]] {
+        let mut explorer = super::tests::explorer([3.0, 0.0]);
+        ring(centre, &mut explorer);
+        assert_eq!(explorer.plan([0.0; 2]), None);
+        assert_eq!(explorer.len(), before, "a larger map would not help");
+    }
+    // A wall longer than any map: growth ends, and so does the plan.
+    let mut explorer = super::tests::explorer([3.0, 0.0]);
+    let mut grown = 0;
+    while grown < 20 {
+        wall(&mut explorer, -1e3, 1e3, Sight::Hazard);
+        grown += 1;
+        if explorer.plan([0.0; 2]).is_none() {
+            break;
+        }
+    }
+    assert!(grown < 20 && explorer.len() <= CELLS_MAX);
+}
+
+/// A goal among hazards is made for as long as a free cell lies within its tolerance.
+#[test]
+fn val_a_blocked_goal_is_reached_to_within_its_tolerance() {
+    let mut explorer = explorer([3.0, 0.0]);
+    explorer.see(&rectangle([2.75, -0.2], [3.2, 0.2]), Sight::Hazard);
+    assert!(explorer.is_blocked([3.0, 0.0]));
+    let plan = explorer.plan([0.0; 2]).unwrap();
+    let last_free = plan[plan.len() - 2];
+    assert!(plan.len() > 2 || libm::hypot(3.0 - last_free[0], last_free[1]) <= 0.5, "{plan:?}");
+    explorer.see(&rectangle([2.3, -0.7], [3.7, 0.7]), Sight::Hazard);
+    assert_eq!(explorer.plan([0.0; 2]), None);
+}
+
+/// A start among blocked cells is left by the nearest free one.
+#[test]
+fn val_a_blocked_start_is_left() {
+    let mut explorer = explorer([3.0, 0.0]);
+    explorer.see(&rectangle([0.1, -1.0], [0.4, 1.0]), Sight::Hazard);
+    let at_m = [0.06, 0.0];
+    assert!(explorer.is_blocked(at_m));
+    let plan = explorer.plan(at_m).unwrap();
+    assert!(plan[1][0] < 0.0 && plan[1][0] > -0.3 && !explorer.is_blocked(plan[1]), "{plan:?}");
+}
+
+/// After any looks the repaired plan is as long, in steps, as that of an explorer that is told everything at once.
+#[test]
+fn prop_repaired_plans_cost_what_fresh_ones_do() {
+    let mut random = Random(22);
+    let mut compared = 0;
+    for _ in 0..20 {
+        let mut explorer = explorer([2.5, 1.0]);
+        let mut looks = Vec::new();
+        let mut at_m = [0.0; 2];
+        for _ in 0..30 {
+            let [x, y] = [0; 2].map(|_| 4.0 * random.unit() - 1.0);
+            let sight = [Sight::Hazard, Sight::Hazard, Sight::Safe][random.below(3) as usize];
+            let area = rectangle([x, y], [x + 0.4 * random.unit(), y + 0.4 * random.unit()]);
+            explorer.see(&area, sight);
+            looks.push((area, sight));
+            let plan = explorer.plan(at_m);
+            let mut fresh = super::tests::explorer([2.5, 1.0]);
+            looks.iter().for_each(|(area, sight)| fresh.see(area, *sight));
+            if explorer.len() == fresh.len() {
+                let again = fresh.plan(at_m);
+                assert_eq!(plan.is_some(), again.is_some());
+                let cost = |of: &Explorer| of.search.value(of.map.nearest(of.map.point_at(at_m))).to_bits();
+                assert!(explorer.len() != fresh.len() || cost(&explorer) == cost(&fresh) || explorer.is_blocked(at_m));
+                compared += 1;
+            }
+            let Some(plan) = plan else { break };
+            at_m = [0, 1].map(|axis| at_m[axis] + 0.1 * (plan[1][axis] - at_m[axis]));
+        }
+    }
+    assert!(compared > 200, "{compared}");
+}
+
+#[test]
+fn val_wrong_settings_are_refused() {
+    for (settings, words) in [
+        (ExplorerSettings { cell_m: 0.0, ..SETTINGS }, "`cell_m` is 0"),
+        (ExplorerSettings { margin_m: -1.0, ..SETTINGS }, "`margin_m` is -1"),
+        (ExplorerSettings { cell_m: 1e-3, ..SETTINGS }, "more than 1048576"),
+    ] {
+        let said = Explorer::new(settings, [0.0; 2], [3.0, 0.0]).unwrap_err().to_string();
+        assert!(said.contains(words), "{said}");
+    }
+}
