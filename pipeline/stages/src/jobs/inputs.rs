@@ -12,6 +12,7 @@ use sastrugi_schemas::study::TerrainItem;
 use sastrugi_store::atomic;
 use sastrugi_store::dem::{self, Crs, Format, ReadOptions};
 use sastrugi_terrain::{Generator, Holds, Input, MAPS, NamedInput};
+use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -52,6 +53,18 @@ impl Sources {
             None => of_file(builder, (entry, item), named, copies),
         };
         generator.inputs().into_iter().map(one).collect::<Result<_, _>>().map(Self)
+    }
+
+    /// Parameters with files by their places in the release.
+    pub fn as_released(&self, params: &Value) -> Value {
+        let mut params = params.clone();
+        for source in &self.0 {
+            let place = params.pointer_mut(&format!("/{}", source.named.key.replace('.', "/")));
+            if let (Some(name), Some(path)) = (place, &source.release_path) {
+                *name = Value::from(path.as_str());
+            }
+        }
+        params
     }
 
     /// Cells of all.

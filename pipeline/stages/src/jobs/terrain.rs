@@ -54,6 +54,9 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
             builder.claim(&entry, STAGE, &one.id)?;
             let generator = sastrugi_terrain::prepare(&item.kind, &one.params).map_err(|e| entry.refuse(e))?;
             let inputs = Sources::find(builder, (&entry, &item), generator.as_ref(), &mut copies)?;
+            // Parameters name files as the release does, wherever they lie now.
+            let released = inputs.as_released(&one.params);
+            let generator = sastrugi_terrain::prepare(&item.kind, &released).map_err(|e| entry.refuse(e))?;
             let shared = builder.is_paired().then(|| common(one.replicate));
             let streams = builder.streams(STAGE, shared.as_ref().unwrap_or(&one.id), item.seed, one.replicate);
             let field = Heightfield {
