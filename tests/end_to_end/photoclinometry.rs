@@ -62,7 +62,7 @@ fn run(folder: &Path, more: &[&str]) -> BTreeMap<String, String> {
 }
 
 /// Files, rows and figures. Without errors the shading of the recovered surface correlates as that of the averaged truth does, to 0.02, and slopes are
-/// right to a quarter of their rms; long waves are recovered coherently; an exposure wrong by 5 % tilts the surface, and the coarse DEM
+/// as far from the true ones as those of the averaged truth, to 15 %; long waves are recovered coherently; an exposure wrong by 5 % tilts the surface, and the coarse DEM
 /// holds it. A fit of the recovered surface follows in the same study.
 #[test]
 fn val_a_study_recovers_a_measured_surface() {
@@ -90,7 +90,7 @@ fn val_a_study_recovers_a_measured_surface() {
     }
     let gap = number(plain, "shaded_correlation_ceiling") - number(plain, "shaded_correlation");
     assert!(gap.abs() < 0.02, "{gap}");
-    assert!(number(plain, "slope_error_rms") < 0.25 * number(plain, "slope_rms"));
+    assert!(number(plain, "slope_error_rms") < 1.15 * number(plain, "slope_error_rms_ceiling"));
     assert!(number(plain, "height_error_rms_detrended_m") < 0.2 * number(plain, "height_rms_m"));
     assert!(number(wrong, "height_error_rms_m") > 3.0 * number(plain, "height_error_rms_m"));
     assert!(number(of("held"), "height_error_rms_m") < number(plain, "height_error_rms_m"));
