@@ -112,14 +112,18 @@ fn ranking(rows: &[&RoverEffectRow]) -> String {
     let more = efficiency.len().saturating_sub(RANKED);
     let rest = if more > 0 { format!("\n  and {more} with smaller effects (all with --json)") } else { String::new() };
     format!(
-        "{}: change for {} % of each parameter, {} trajectories, {} worlds, {} rovers each\n{}{rest}",
+        "{}: change for {} % of each parameter, {}, {}, {} in each\n{}{rest}",
         [&first.stage_id, &first.group, &first.variant].map(String::as_str).join(" ").trim_end(),
         significant(100.0 * first.share).trim_end_matches('0').trim_end_matches('.'),
-        first.trajectories,
-        first.worlds,
-        first.rovers,
+        counted(first.trajectories, "trajectory", "trajectories"),
+        counted(first.worlds, "world", "worlds"),
+        counted(first.rovers, "rover", "rovers"),
         columns(&lines)
     )
+}
+
+fn counted(count: i64, one: &str, many: &str) -> String {
+    format!("{count} {}", if count == 1 { one } else { many })
 }
 
 fn base(row: &RoverEffectRow) -> String {
