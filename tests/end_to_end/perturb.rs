@@ -21,7 +21,7 @@ count = 3
 size_m = [16.0, 16.0]
 cell_m = 0.16
 basic_spacing_m = 0.02
-origin_m = [-7.92, -7.92]
+origin_m = [-8.0, -8.0]
 processes = [{ kind = "rocks", coverage = 0.176, diameter_min_m = 0.04, diameter_max_m = 4.0 }]
 
 [[terrain]]
@@ -85,7 +85,7 @@ fn val_designs_and_effects_fit_together() {
     // One list of elementary effects by parameter and trajectory, averaged over the worlds.
     let factors = |row: &Row| -> BTreeMap<String, f64> { serde_json::from_str(text(row, "factors")).unwrap() };
     let mut found: BTreeMap<(String, i64), Vec<f64>> = BTreeMap::new();
-    for pair in designs.windows(2).filter(|pair| pair[1]["step"] != Value::from(0)) {
+    for pair in designs.windows(2).filter(|pair| pair[1]["step"] != 0) {
         let moved = text(&pair[1], "parameter");
         let (before, after) = (factors(&pair[0]), factors(&pair[1]));
         let changed: Vec<&str> = MOVED.into_iter().filter(|name| before[*name] != after[*name]).collect();
@@ -106,7 +106,7 @@ fn val_designs_and_effects_fit_together() {
     // Nothing depends on a clearance that this navigator does not use, to the last bit.
     for row in effects.iter().filter(|row| text(row, "parameter") == "clearance_m") {
         let columns = ["mu", "mu_star", "sigma", "mu_star_noise", "mu_low", "mu_star_high"];
-        assert!(columns.iter().all(|column| row[*column] == Value::from(0.0)), "{row:?}");
+        assert!(columns.iter().all(|column| row[*column] == 0.0), "{row:?}");
     }
     assert_eq!(sastrugi_in(folder.path(), &["verify", "release", "--recompute", "3", "--quiet"]).code, 0);
 }
@@ -195,7 +195,7 @@ fn val_wrong_perturbations_are_refused() {
     told(STUDY, &["--trajectories", "0"], "`perturb.trajectories` is 0; it must be 1 to 999");
     told(&STUDY.replace("\"turn_deg\"", "\"turn_dg\""), &[], "did you mean `turn_deg`?");
     told(&STUDY.replace("trajectories = 2", "trajectries = 2"), &[], "trajectries");
-    told(&STUDY.replace("\"turn_deg\"", "\"radius_m\""), &[], "which is no number of `sojourner_like` or its noise");
+    told(&STUDY.replace("\"turn_deg\"", "\"radius_m\""), &[], "which is not a number of `sojourner_like` or its noise");
     let steep = STUDY.replace("sample_m = 1.0", "tilt_max_deg = 85.0").replace("\"turn_deg\"", "\"tilt_max_deg\"");
     told(&steep, &["--perturb", "50%"], "a design that is refused: `tilt_max_deg` is");
     told(STUDY.split("[[rover]]").next().unwrap(), &[], "the study has no rovers");

@@ -309,7 +309,7 @@ count = 2
 size_m = [16.0, 16.0]
 cell_m = 0.16
 basic_spacing_m = 0.02
-origin_m = [-7.92, -7.92]
+origin_m = [-8.0, -8.0]
 processes = [{ kind = "rocks", coverage = 0.176, diameter_min_m = 0.04, diameter_max_m = 4.0 }]
 
 [[rover]]

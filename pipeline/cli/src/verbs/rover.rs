@@ -88,9 +88,10 @@ fn ranking(rows: &[&RoverEffectRow]) -> String {
     let (efficiency, arrival) = (of("efficiency"), of("arrival"));
     let heads = ["  parameter", "value", "e: mu*", "(95 %)", "mu", "sigma", "noise", "arrival: mu*", "(95 %)", "mu"];
     let mut lines = vec![heads.map(str::to_owned).to_vec()];
-    for row in efficiency.iter().take(RANKED) {
+    let (some, none): (Vec<&RoverEffectRow>, Vec<_>) = efficiency.iter().partition(|row| row.mu_star > 0.0);
+    for row in some.iter().take(RANKED) {
         let Some(arrives) = arrival.iter().find(|other| other.parameter == row.parameter) else { continue };
-        let per = |value: f64| if value.is_nan() { "-".to_owned() } else { format!("{:.4}", value * row.share) };
+        let per = |value: f64| per_share(value, row.share);
         let star = |row: &RoverEffectRow| match row.mu_star_low.is_nan() {
             true => "-".to_owned(),
             false => format!("{} to {}", per(row.mu_star_low), per(row.mu_star_high)),
@@ -109,17 +110,36 @@ fn ranking(rows: &[&RoverEffectRow]) -> String {
         ]);
     }
     let Some(first) = efficiency.first() else { return String::new() };
-    let more = efficiency.len().saturating_sub(RANKED);
-    let rest = if more > 0 { format!("\n  and {more} with smaller effects (all with --json)") } else { String::new() };
+    let mut rest = String::new();
+    if some.len() > RANKED {
+        rest.push_str(&format!("\n  and {} with smaller effects (all with --json)", some.len() - RANKED));
+    }
+    if !none.is_empty() {
+        let names: Vec<&str> = none.iter().map(|row| row.parameter.as_str()).collect();
+        rest.push_str(&format!("\n  without any effect on e: {}", names.join(", ")));
+    }
     format!(
-        "{}: change for {} % of each parameter, {} trajectories, {} worlds, {} rovers each\n{}{rest}",
+        "{}: change for {} % of each parameter, {}, {}, {} in each\n{}{rest}",
         [&first.stage_id, &first.group, &first.variant].map(String::as_str).join(" ").trim_end(),
         significant(100.0 * first.share).trim_end_matches('0').trim_end_matches('.'),
-        first.trajectories,
-        first.worlds,
-        first.rovers,
+        counted(first.trajectories, "trajectory", "trajectories"),
+        counted(first.worlds, "world", "worlds"),
+        counted(first.rovers, "rover", "rovers"),
         columns(&lines)
     )
+}
+
+/// A change for one share of a parameter.
+fn per_share(value: f64, share: f64) -> String {
+    if value.is_nan() {
+        return "-".to_owned();
+    }
+    let text = format!("{:.4}", value * share);
+    if text == "-0.0000" { "0.0000".to_owned() } else { text }
+}
+
+fn counted(count: i64, one: &str, many: &str) -> String {
+    format!("{count} {}", if count == 1 { one } else { many })
 }
 
 fn base(row: &RoverEffectRow) -> String {

@@ -140,7 +140,7 @@ fn chosen(
     let one = |(k, name): (usize, &String)| match all.get(name) {
         Some(value) => Ok((name.clone(), value.clone())),
         None => {
-            let of = format!("names `{name}`, which is no number of `{}` or its noise", navigator.kind());
+            let of = format!("names `{name}`, which is not a number of `{}` or its noise", navigator.kind());
             let help = match nearest(name, all.keys().map(String::as_str)) {
                 Some(near) => format!("did you mean `{near}`?"),
                 None => format!("there are {}", all.keys().cloned().collect::<Vec<_>>().join(", ")),
@@ -303,7 +303,7 @@ mod tests {
         told(json!({"levels": 5}), "`perturb.levels` is 5; it must be even");
         told(json!({"rovers": 0}), "`perturb.rovers` is 0");
         told(json!({"parameters": ["hazard_stp_m"]}), "did you mean `hazard_step_m`?");
-        told(json!({"parameters": ["starts"]}), "which is no number of `sojourner_like`");
+        told(json!({"parameters": ["starts"]}), "which is not a number of `sojourner_like`");
         told(json!({"parameters": ["noise.slip"]}), "leaves nothing to move: `noise.slip` is 0");
         let error = refused(json!({"tilt_max_deg": 88.0}), json!({"share": 0.1}));
         assert!(error.contains("a design that is refused: `tilt_max_deg` is 9"), "{error}");
