@@ -24,6 +24,8 @@ MAPS = {
     "rms-predicted": ("m", "RMS"),
     "rock-potential": ("1", "share of the ground"),
 }
+# Unit and description of rendered images.
+IMAGE = ("1", "brightness")
 
 
 def read(path):
@@ -110,7 +112,8 @@ def check_release(release):
         if found["dtype"] != "float32":
             continue
         expect(found["block"] == [256, 256], f"{path} has blocks of {found['block']}")
-        unit, words = next((MAPS[word] for word in MAPS if path.endswith(f".{word}.tif")), ("m", None))
+        plain = IMAGE if path.startswith("image/") else ("m", None)
+        unit, words = next((MAPS[word] for word in MAPS if path.endswith(f".{word}.tif")), plain)
         expect(found["unit"] == unit, f"{path} has the unit {found['unit']}")
         said = found["description"]
         expect(said is None if words is None else words in (said or ""), f"{path} has the description {said}")

@@ -3,7 +3,7 @@
     python check_images.py RELEASE
 
 Slopes are central differences for images straight down (one ray a pixel, through the cell's centre), and those of the bilinear patch for
-others; brightness, shadows and rays are computed here from the surface and the image's JSON alone. Rays and shadows march in steps of a fortieth
+others; brightness, shadows and rays are computed here from the surface and the image's JSON alone. Rays and shadows march in steps of a twentieth
 of a cell; a pixel whose shadow or first point hangs on less than a step may differ, others may not.
 """
 
@@ -19,8 +19,8 @@ from common import Mismatch, expect, table
 # Heights and brightness are stored in single precision: slopes differ by 1e-7 m over 0.02 m.
 TOLERANCE = 2e-5
 # Pixels that hang on less than a step.
-DOUBTFUL_SHARE = 0.01
-STEPS_PER_CELL = 40
+DOUBTFUL_SHARE = 0.002
+STEPS_PER_CELL = 20
 
 
 class Ground:
