@@ -457,7 +457,7 @@ impl<'a> Arrival<'a> {
         let reach = libm::floor(self.arrive_m / map.step_m(Direction { rows: 0, cols: 1 })) as usize;
         let near = move |at: usize, count: usize| at.saturating_sub(reach)..(at + reach + 1).min(count);
         let nodes = near(row, rows).flat_map(move |r| near(col, cols).map(move |c| map.node(r, c)));
-        nodes.filter(|node| self.arrives(*node) || *node == self.goal && !map.is_blocked(*node))
+        nodes.filter(move |node| self.arrives(*node) || *node == self.goal && !map.is_blocked(*node))
     }
 }
 

@@ -522,6 +522,20 @@ impl PlannerParameters {
         }
     }
 
+    /// Share of the length of an area without a hazard, from its near edge, in which there is none. A ray meets a rock at the hazard height
+    /// only before the point of the ground that it is aimed at: what stands farther is no hazard yet.
+    pub fn safe_share(&self) -> f64 {
+        match &self.eyes {
+            PlannerEyes::Rays(p) => {
+                let sensor = p.sensor();
+                let length_m = sensor.rows_m.last().copied().unwrap_or(0.0);
+                let from_aim_m = (length_m + sensor.behind_nose_m) * sensor.step_m / sensor.height_m;
+                (1.0 - from_aim_m / length_m).clamp(0.0, 1.0)
+            }
+            PlannerEyes::Rectangles(_) => 1.0,
+        }
+    }
+
     /// Turn of a cycle, rad.
     pub fn turn_rad(&self) -> f64 {
         match &self.eyes {

@@ -167,14 +167,14 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
         let Some(schema) = schema(&envelope.kind) else { return Err(unknown(&entry, &envelope.kind).into()) };
         let terrains = terrains(builder, &entry, &envelope.terrains)?;
         let sample_m = envelope.sample_m.unwrap_or(SAMPLE_M);
-        let (record, head) = (envelope.record.unwrap_or(RECORD) as usize, &builder.study.head.clone());
+        let record = envelope.record.unwrap_or(RECORD) as usize;
         ParameterError::not_negative("sample_m", sample_m).map_err(|e| entry.refuse(e))?;
         for one in entry.expand(&envelope.id, None, &envelope.sweep, &params)? {
             entry.check_keys::<RoverItem>(&one.params, &schema)?;
             builder.claim(&entry, STAGE, &one.id)?;
             let (navigator, parameters) = prepare(&envelope.kind, &one.params).map_err(|e| entry.refuse(e))?;
             rover_designs::add(builder, &entry, &envelope, &one, &terrains)?;
-            let (id, variant, head) = (one.id, one.sweep, head.clone());
+            let (id, variant, head) = (one.id, one.sweep, builder.study.head.clone());
             let trial = Arc::new(Trial { id, variant, navigator, parameters, sample_m, record, head });
             terrains.iter().try_for_each(|terrain| add_one(builder, &entry, &envelope, &trial, terrain))?;
         }

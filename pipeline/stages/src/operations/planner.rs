@@ -59,6 +59,8 @@ fn settings(parameters: &PlannerParameters) -> ExplorerSettings {
 /// The planner, and what it remembers.
 struct Planner {
     settings: ExplorerSettings,
+    /// Share of an area without a hazard that is safe, from its near edge.
+    safe_share: f64,
     turn_rad: f64,
     step_m: f64,
     explorer: Option<Explorer>,
@@ -71,6 +73,7 @@ impl Planner {
     fn new(parameters: &PlannerParameters) -> Self {
         Self {
             settings: settings(parameters),
+            safe_share: parameters.safe_share(),
             turn_rad: parameters.turn_rad(),
             step_m: parameters.step_m(),
             explorer: None,
@@ -93,8 +96,11 @@ impl Planner {
     fn see(&mut self, situation: &Situation<'_>) {
         let Some(explorer) = &mut self.explorer else { return };
         for area in &situation.view.areas {
-            let sight = if area.hazard { Sight::Hazard } else { Sight::Safe };
-            explorer.see(&area.corners_m.map(|corner| situation.pose.to_ground(corner)), sight);
+            let (corners_m, sight) = match area.hazard {
+                true => (area.corners_m, Sight::Hazard),
+                false => (near_part(&area.corners_m, self.safe_share), Sight::Safe),
+            };
+            explorer.see(&corners_m.map(|corner| situation.pose.to_ground(corner)), sight);
         }
     }
 
@@ -126,6 +132,12 @@ impl Planner {
         let drive_m = self.step_m.min(situation.pose.distance_m(next_m));
         Command { turn_rad: error_rad, drive_m, stop: None }
     }
+}
+
+/// The part of an area (near right, near left, far left, far right) that begins at its near edge.
+fn near_part(&[near_right, near_left, far_left, far_right]: &[[f64; 2]; 4], share: f64) -> [[f64; 2]; 4] {
+    let between = |near: [f64; 2], far: [f64; 2]| [0, 1].map(|k| near[k] + share * (far[k] - near[k]));
+    [near_right, near_left, between(near_left, far_left), between(near_right, far_right)]
 }
 
 impl Policy for Planner {
