@@ -9,7 +9,7 @@ use sastrugi_terrain::{MAPS, MapKind};
 use serde_json::Value;
 
 /// Folders of a release.
-pub const FOLDERS: [(&str, &str); 13] = [
+pub const FOLDERS: [(&str, &str); 14] = [
     ("dem/", "measured inputs, and the same in metres (`.metric.tif`)"),
     ("mask/", "masks of the fits, obstacles of the routes"),
     ("input/", "rasters and measured points that terrains are made with"),
