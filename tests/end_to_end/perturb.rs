@@ -185,7 +185,7 @@ fn val_wrong_perturbations_are_refused() {
     let told = |study: &str, more: &[&str], words: &str| {
         write(folder.path(), "study.toml", study);
         let call = sastrugi_in(folder.path(), &[&["rover", "study.toml", "-o", "release", "--quiet"], more].concat());
-        let said: String = call.stderr.split_whitespace().collect::<Vec<_>>().join(" ");
+        let said: String = call.stderr.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ");
         assert_eq!(call.code, 2, "{more:?}: {said}");
         assert!(said.contains(words), "{more:?}: {said}");
     };
