@@ -202,6 +202,7 @@ fn rows_of(part: &Path) -> Vec<Row> {
 
 fn value(field: &Field) -> serde_json::Value {
     match field {
+        Field::Bool(flag) => (*flag).into(),
         Field::Str(text) => text.as_str().into(),
         Field::Long(number) => (*number).into(),
         Field::Double(number) => (*number).into(),

@@ -302,7 +302,7 @@ fn on_ground(heights: &Grid, key: &str, [x, y, above]: Vector) -> Result<Vector,
 fn check_above(heights: &Grid, [x, y, z]: Vector) -> Result<(), ParameterError> {
     match heights.height(x, y) {
         Some(ground) if z <= ground => {
-            let message = format!("is at z = {} m; the ground there is at {} m", shown(z), shown(ground));
+            let message = format!("is at z = {} m; the ground there is at {ground:.3} m", shown(z));
             Err(ParameterError::new("position_m", message))
         }
         _ => Ok(()),
