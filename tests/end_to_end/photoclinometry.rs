@@ -162,7 +162,7 @@ fn val_the_verb_recovers_from_files() {
 fn val_wrong_items_are_refused() {
     let folder = area();
     for (before, after, words) in [
-        ("[0.0, 120.0, 240.0]", "[0.0, 120.0]", "at least 3"),
+        ("[0.0, 120.0, 240.0]", "[0.0, 120.0]", "take at least"),
         ("images = [\"suns\"]\nsamples = 16", "images = [\"sun\"]\nsamples = 16", "did you mean"),
         ("coarse_sigma_m = 20.0", "coarse_sigma_m = 0.0", "above 0"),
         ("coarse_sigma_m = 20.0", "", "needs `coarse_sigma_m`"),
