@@ -42,11 +42,7 @@ fn strip(data: &Data, sets: &[Set], figure: &Figure, left_out: usize) -> content
     let printed: Vec<Option<f64>> =
         sets.iter().map(|s| trial(data, s)?.value(figure.id).filter(|_| figure.id != EFFICIENCY.id)).collect();
     let bands = figure.id != ARRIVED.id;
-    let label = |s: &Set| RowLabel {
-        name: s.name.clone(),
-        detail: format!("{}, n = {}", set_number::counted(s.worlds.len(), "world"), s.count()),
-    };
-    let labels: Vec<RowLabel> = sets.iter().map(label).collect();
+    let labels: Vec<RowLabel> = sets.iter().map(Set::label).collect();
     let mut legend: Vec<Entry> = vec![
         (Mark::Symbol(Symbol::Ring, Paint::Muted), "one world".into()),
         (Mark::Line(Stroke::new(Paint::Ink, 2.2)), "all, 95 % interval".into()),
