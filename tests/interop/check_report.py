@@ -3,7 +3,7 @@
     python check_report.py RELEASE REPORT    every query that the report states runs in duckdb and gives its numbers, or rows that they
                                              are computed from: medians, quartiles, shifts and deltas are computed from them once
                                              more; files that it names are there; a mission ends in its recording as in its row.
-                                             Rovers (of one stage): efficiencies, arrival, intraclass correlation and distance budgets of each
+                                             Rovers (one stage for each navigator): efficiencies, arrival, intraclass correlation and distance budgets of each
                                              group are computed from their rows the obvious way
 """
 
@@ -147,9 +147,12 @@ def rovers(report):
     efficiency = document("rover-efficiency")
     names = [column[0] for column in duckdb.sql(efficiency["query"]).description]
     rows = [dict(zip(names, row)) for row in duckdb.sql(efficiency["query"]).fetchall()]
+    plain = [row for row in rows if row["variant"] is None]
+    several = len({row["stage_id"] for row in plain}) > 1
+    word = lambda row: f", {row['navigator'].replace('_', '-').capitalize()}" if several else ""
     groups = {}
-    for row in (row for row in rows if row["variant"] is None):
-        groups.setdefault(row["group"], []).append(row)
+    for row in plain:
+        groups.setdefault(row["group"] + word(row), []).append(row)
     expect(len(groups) == len(efficiency["rows"]), f"{len(efficiency['rows'])} sets of rovers, {len(groups)} groups")
     close = lambda a, b: a is None and b is None or abs(a - b) <= 1e-9 * max(1.0, abs(b))
     for row in efficiency["rows"]:

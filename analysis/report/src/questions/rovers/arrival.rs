@@ -19,6 +19,8 @@ const SHARES: [f64; 4] = [0.5, 0.8, 0.9, 0.95];
 const CURVES_MAX: usize = 6;
 /// Steps of a curve that are drawn and listed.
 const STEPS_MAX: usize = 300;
+/// Axes that span more than this factor are logarithmic.
+const LOG_FROM: f64 = 5.0;
 const HEIGHT: f64 = 300.0;
 const DASHES: [&str; 6] = ["", "7 3", "2 3", "9 3 2 3", "5 2 1 2 1 2", "1 4"];
 /// What curves are computed from.
@@ -74,7 +76,9 @@ fn figure(curves: &[Curve]) -> Figure {
     let longest = rovers().map(|r| r.distance_m).filter(|d| d.is_finite()).fold(straight, f64::max);
     let entry = |(k, c): (usize, &Curve)| (Mark::Line(stroke(k, c.set)), c.set.name.clone());
     let legend: Vec<Entry> = curves.iter().enumerate().map(entry).collect();
-    let x = (Axis::log(0.9 * straight, 1.05 * longest), "distance driven, m");
+    let ends = (0.9 * straight, 1.05 * longest);
+    let axis = if ends.1 > LOG_FROM * ends.0 { Axis::log(ends.0, ends.1) } else { Axis::linear(ends.0, ends.1) };
+    let x = (axis, "distance driven, m");
     let mut plot = Plot::new((WIDTH, HEIGHT), x, (Axis::linear(0.0, 102.0), "arrived, %"), &legend);
     plot.clip(&format!("{id}-clip"));
     curves.iter().for_each(|c| draw_band(&mut plot, c, longest));

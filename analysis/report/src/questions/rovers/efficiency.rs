@@ -42,11 +42,7 @@ fn strip(data: &Data, sets: &[Set], figure: &Figure, left_out: usize) -> content
     let printed: Vec<Option<f64>> =
         sets.iter().map(|s| trial(data, s)?.value(figure.id).filter(|_| figure.id != EFFICIENCY.id)).collect();
     let bands = figure.id != ARRIVED.id;
-    let label = |s: &Set| RowLabel {
-        name: s.name.clone(),
-        detail: format!("{}, n = {}", set_number::counted(s.worlds.len(), "world"), s.count()),
-    };
-    let labels: Vec<RowLabel> = sets.iter().map(label).collect();
+    let labels: Vec<RowLabel> = sets.iter().map(Set::label).collect();
     let mut legend: Vec<Entry> = vec![
         (Mark::Symbol(Symbol::Ring, Paint::Muted), "one world".into()),
         (Mark::Line(Stroke::new(Paint::Ink, 2.2)), "all, 95 % interval".into()),
@@ -170,6 +166,11 @@ pub fn table(sets: &[Set]) -> TableBlock {
     }
 }
 
+/// What rovers of one world may have alike: its name and value.
+struct Alike(&'static str, fn(&RoverRow) -> f64);
+const ALIKE: [Alike; 2] =
+    [Alike("efficiency", |r| r.efficiency), Alike("reached", |r| f64::from(u8::from(reached(r))))];
+
 /// How alike the rovers of one world are.
 pub fn intraclass(sets: &[Set]) -> TableBlock {
     let columns = [
@@ -185,9 +186,7 @@ pub fn intraclass(sets: &[Set]) -> TableBlock {
     ];
     let mut numbers = Numbers::computed(QUERY, &columns).with_mixed_units();
     for set in sets {
-        let kinds: [(&str, fn(&RoverRow) -> f64); 2] =
-            [("efficiency", |r| r.efficiency), ("reached", |r| f64::from(u8::from(reached(r))))];
-        for (name, of) in kinds {
+        for Alike(name, of) in ALIKE {
             let clusters: Vec<Vec<f64>> = set.worlds.iter().map(|w| w.values(of)).collect();
             let Some(i) = Intraclass::of(&clusters, LEVEL) else { continue };
             numbers.row([

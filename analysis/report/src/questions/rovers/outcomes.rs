@@ -52,8 +52,7 @@ pub fn counts(set: &Set) -> [usize; ALL.len()] {
 /// A bar for each set.
 pub fn figure(sets: &[Set]) -> Figure {
     let all: Vec<[usize; ALL.len()]> = sets.iter().map(counts).collect();
-    let label = |s: &Set| RowLabel { name: s.name.clone(), detail: format!("n = {}", s.count()) };
-    let labels: Vec<RowLabel> = sets.iter().map(label).collect();
+    let labels: Vec<RowLabel> = sets.iter().map(Set::label).collect();
     let kinds: Vec<usize> = (0..ALL.len()).filter(|&i| all.iter().any(|c| c[i] > 0)).collect();
     let legend: Vec<Entry> = kinds.iter().map(|&i| (Mark::Fill(paint(i)), ALL[i].name.to_owned())).collect();
     let mut rows = Rows::new(&labels, 46.0, (Axis::linear(0.0, 100.0), "share of the rovers, %"), &legend);

@@ -2,6 +2,7 @@
 
 use crate::data::{Data, Natural, label, natural};
 use crate::questions::sql::quoted;
+use crate::render::chart::RowLabel;
 use sastrugi_numeric::sums;
 use sastrugi_schemas::tables::RoverRow;
 use sastrugi_statistics::{Interval, ratio};
@@ -14,6 +15,8 @@ pub struct Set<'a> {
     pub name: String,
     /// Label of the group.
     pub group: String,
+    /// Navigator or stage where there are several; empty else.
+    pub trial: String,
     /// Number of the group among all: its colour.
     pub index: usize,
     /// Stage that drove them.
@@ -70,8 +73,8 @@ fn sets<'a>(data: &Data, rovers: Vec<&'a RoverRow>) -> Vec<Set<'a>> {
     let navigators: BTreeSet<&str> = stages.iter().map(|s| s.0).collect();
     let trial = |r: &RoverRow| match (stages.len(), navigators.len()) {
         (1, _) => String::new(),
-        (stages, kinds) if stages == kinds => format!(", {}", navigator(&r.navigator)),
-        _ => format!(", {}", r.stage_id),
+        (stages, kinds) if stages == kinds => navigator(&r.navigator),
+        _ => r.stage_id.clone(),
     };
     type Key<'a> = (Natural, Natural, Option<Natural>);
     let mut sets: BTreeMap<Key, Vec<&'a RoverRow>> = BTreeMap::new();
@@ -79,13 +82,19 @@ fn sets<'a>(data: &Data, rovers: Vec<&'a RoverRow>) -> Vec<Set<'a>> {
         let key = (natural(&rover.stage_id), group(rover), rover.variant.as_deref().map(natural));
         sets.entry(key).or_default().push(rover);
     }
-    let set = |((_, group, variant), rows): (Key, Vec<&'a RoverRow>)| Set {
-        name: format!("{}{}{}", group.1, trial(rows[0]), variant.map_or_else(String::new, |v| format!(", {}", v.1))),
-        index: groups.iter().position(|g| *g == group).unwrap_or(0),
-        group: group.1,
-        stage: &rows[0].stage_id,
-        variant: rows[0].variant.as_deref(),
-        worlds: worlds(rows),
+    let set = |((_, group, variant), rows): (Key, Vec<&'a RoverRow>)| {
+        let trial = trial(rows[0]);
+        let parts = [Some(group.1.clone()), Some(trial.clone()), variant.map(|v| v.1)];
+        let name: Vec<String> = parts.into_iter().flatten().filter(|p| !p.is_empty()).collect();
+        Set {
+            name: name.join(", "),
+            index: groups.iter().position(|g| *g == group).unwrap_or(0),
+            group: group.1,
+            trial,
+            stage: &rows[0].stage_id,
+            variant: rows[0].variant.as_deref(),
+            worlds: worlds(rows),
+        }
     };
     sets.into_iter().map(set).collect()
 }
@@ -118,6 +127,14 @@ impl<'a> Set<'a> {
     /// Number of rovers.
     pub fn count(&self) -> usize {
         self.worlds.iter().map(|w| w.rovers.len()).sum()
+    }
+
+    /// Label of a row of a figure: the group, then trial or variant and the number of rovers.
+    pub fn label(&self) -> RowLabel {
+        let rovers = format!("n = {}", self.count());
+        let parts = [self.trial.as_str(), self.variant.unwrap_or_default(), rovers.as_str()];
+        let detail: Vec<&str> = parts.into_iter().filter(|p| !p.is_empty()).collect();
+        RowLabel { name: self.group.clone(), detail: detail.join(", ") }
     }
 
     /// Navigator in words.

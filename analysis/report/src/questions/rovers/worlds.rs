@@ -79,7 +79,9 @@ impl Figure {
     /// Band in which one more world falls; `None` for a single world.
     pub fn one_more(&self, set: &Set) -> Option<Interval> {
         let values: Vec<f64> = self.values(set).into_iter().map(|v| v.1).collect();
-        prediction::one_more_positive(&values, LEVEL)
+        let band = prediction::one_more_positive(&values, LEVEL)?;
+        let bounded = [EFFICIENCY, GREATEST, LEAST].iter().any(|f| f.id == self.id);
+        Some(if bounded { Interval { high: band.high.min(1.0).max(band.estimate), ..band } } else { band })
     }
 }
 
