@@ -17,7 +17,7 @@ super::table! {
         split: Option<String> [""],
         /// Id of the rover stage.
         stage_id: String [""],
-        /// Navigator: `sojourner_like`, `schoppers_like`.
+        /// Navigator: `sojourner_like`, `schoppers_like`, `planner`.
         navigator: String [""],
         /// Start, easting.
         start_x_m: f64 ["m"],

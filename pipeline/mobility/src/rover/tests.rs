@@ -391,12 +391,14 @@ fn val_recordings_hold_every_cycle() {
     };
     let blind =
         Navigator::Sojourner(SojournerParameters { hazard_step_m: 9.0, hazard_span_m: 9.0, ..Default::default() });
-    for (navigator, contacts) in [(sojourner(), 0), (schoppers(), 0), (blind, 2)] {
+    for (navigator, meets_rocks) in [(sojourner(), false), (schoppers(), false), (blind, true)] {
         let (drive, recording) = recorded(&navigator, &ahead(10.0));
         assert_eq!(recording.cycles.len(), drive.cycles as usize + 1, "the last cycle stops");
         let count = |kind: Kind| recording.events.iter().filter(|event| event.kind == kind).count();
+        let contacts = drive.contacts.anywhere as usize;
         assert_eq!([count(Kind::Start), count(Kind::Reached), count(Kind::Contact)], [1, 1, contacts]);
-        assert_eq!(count(Kind::Hazard) > 0, contacts == 0);
+        assert_eq!(contacts > 0, meets_rocks);
+        assert_eq!(count(Kind::Hazard) > 0, !meets_rocks);
         assert!(recording.events.is_sorted_by(|a, b| a.time_s <= b.time_s));
         let last = recording.states.last().unwrap();
         assert!((last.time_s - drive.time_s).abs() <= 1.0 && drive.time_s >= last.time_s);

@@ -193,4 +193,7 @@ fn gold_messages_of_a_rover() {
     let hash = |flavour| encoded(flavour, &recording()).unwrap().1.content_sha256;
     assert_eq!([hash(McapFlavour::Viewer), hash(McapFlavour::Ros2)], GOLD_ROVER);
 }
-const GOLD_ROVER: [&str; 2] = ["", ""];
+const GOLD_ROVER: [&str; 2] = [
+    "deec8bf509d0490bdfbece3cc67c34d8a483cd036713a0a273cac77ceba3b150",
+    "26190aa3924a97f65969a929b3b6aea6e64605e653a0fbf21b5ab9d19064b84e",
+];
