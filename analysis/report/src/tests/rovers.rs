@@ -149,7 +149,7 @@ fn val_effects() {
     let (files, summary) = report(&driven(2));
     let figures: Vec<&String> = summary.figures.iter().filter(|f| f.starts_with("rover-effects-")).collect();
     assert_eq!(figures.len(), 3, "{figures:?}");
-    assert_eq!(rows(&files, "rover-effects").len(), 9);
+    assert_eq!(rows(&files, "rover-effects").len(), 4 * 3);
     let page = &files["index.html"];
     assert!(page.contains(
         "circle, 2.30: efficiency most by hazard_step_m, arrival most by hazard_step_m, distance most by hazard_step_m."
@@ -157,6 +157,10 @@ fn val_effects() {
     let svg = &files["figures/rover-effects-circle-2.30--efficiency.svg"];
     let at = |word: &str| svg.find(word).unwrap_or_else(|| panic!("{word}"));
     assert!(at(">hazard step<") < at(">turn deg<") && at(">turn deg<") < at(">goal tolerance<"), "order");
+    assert!(
+        !svg.contains("cycle limit")
+            && files["index.html"].contains("3 of 4 parameters (1 without any effect), 8 trajectories on 3 worlds")
+    );
     assert!(["raises", "lowers", "cannot be told"].iter().all(|w| svg.contains(w)));
 }
 

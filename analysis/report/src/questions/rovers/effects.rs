@@ -67,7 +67,7 @@ fn figures_of(trial: &[RoverEffectRow]) -> Vec<Figure> {
 
 fn figure(trial: &[RoverEffectRow], (measure, title, factor): (&str, &str, f64)) -> Option<Figure> {
     let mut rows: Vec<&RoverEffectRow> =
-        trial.iter().filter(|r| r.measure == measure && r.mu_star.is_finite()).collect();
+        trial.iter().filter(|r| r.measure == measure && r.mu_star > 0.0 && r.mu_star.is_finite()).collect();
     rows.sort_by(|a, b| a.rank.cmp(&b.rank).then_with(|| a.parameter.cmp(&b.parameter)));
     let first = *rows.first()?;
     rows.truncate(DRAWN_MAX);
@@ -123,11 +123,15 @@ fn figure(trial: &[RoverEffectRow], (measure, title, factor): (&str, &str, f64))
         "share",
     ];
     let all = trial.iter().filter(|r| r.measure == measure);
+    let none = match all.clone().filter(|r| r.mu_star == 0.0).count() {
+        0 => String::new(),
+        n => format!(" ({} without any effect)", set_number::count(n)),
+    };
     Some(Figure {
         id,
         title: format!("{}, {}{variant}.", first.stage_id, first.group),
         caption: format!(
-            "{} of {}, {} on {}.",
+            "{} of {}{none}, {} on {}.",
             set_number::count(rows.len()),
             set_number::counted(all.clone().count(), "parameter"),
             if first.trajectories == 1 {

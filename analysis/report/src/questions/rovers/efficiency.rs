@@ -62,7 +62,7 @@ fn strip(data: &Data, sets: &[Set], figure: &Figure, left_out: usize) -> content
     content::Figure {
         id: content::slug(&format!("rover-{}", figure.id.replace('_', "-"))),
         title: format!("{}.", capital(figure.name)),
-        caption: format!("n counts rovers.{more}"),
+        caption: format!("Numbers at the rows count rovers.{more}"),
         description: describe(sets, figure),
         svg: rows.svg,
         numbers: numbers(sets, figure),

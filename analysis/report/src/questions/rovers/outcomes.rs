@@ -69,7 +69,7 @@ pub fn figure(sets: &[Set]) -> Figure {
     Figure {
         id: "rover-outcomes".into(),
         title: "How rovers end.".into(),
-        caption: "Numbers in the bars count rovers.".into(),
+        caption: "Numbers count rovers.".into(),
         description: describe(sets, &all),
         svg: rows.svg,
         numbers,

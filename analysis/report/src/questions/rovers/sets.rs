@@ -131,7 +131,7 @@ impl<'a> Set<'a> {
 
     /// Label of a row of a figure: the group, then trial or variant and the number of rovers.
     pub fn label(&self) -> RowLabel {
-        let rovers = format!("n = {}", self.count());
+        let rovers = self.count().to_string();
         let parts = [self.trial.as_str(), self.variant.unwrap_or_default(), rovers.as_str()];
         let detail: Vec<&str> = parts.into_iter().filter(|p| !p.is_empty()).collect();
         RowLabel { name: self.group.clone(), detail: detail.join(", ") }

@@ -47,7 +47,9 @@ pub fn add(data: &mut Data, shelf: &mut Shelf) {
     }
     data.rovers.sort_by(|a, b| (&a.terrain_id, &a.rover_id).cmp(&(&b.terrain_id, &b.rover_id)));
     for (rank, (parameter, mu)) in
-        [("hazard_step_m", 0.9), ("turn_deg", -0.2), ("goal_tolerance_m", 0.0)].into_iter().enumerate()
+        [("hazard_step_m", 0.9), ("turn_deg", -0.2), ("goal_tolerance_m", 0.02), ("cycle_limit", 0.0)]
+            .into_iter()
+            .enumerate()
     {
         for measure in ["efficiency", "arrival", "distance_m"] {
             data.rover_effects.push(effect(rank as i64 + 1, parameter, measure, mu));
