@@ -5,9 +5,7 @@
 
 use divan::Bencher;
 use divan::counter::ItemsCount;
-use sastrugi_mobility::rover::{
-    Navigator, RoverParameters, SchoppersParameters, SojournerParameters, Start, drive,
-};
+use sastrugi_mobility::rover::{Navigator, RoverParameters, SchoppersParameters, SojournerParameters, Start, drive};
 use sastrugi_numeric::{Counter, Ground, Streams};
 use sastrugi_terrain::planetary::{Planetary, RawPlanetary, WorldGround};
 use serde_json::json;
