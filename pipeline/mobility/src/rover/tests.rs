@@ -398,7 +398,7 @@ fn val_recordings_hold_every_cycle() {
         let contacts = drive.contacts.anywhere as usize;
         assert_eq!([count(Kind::Start), count(Kind::Reached), count(Kind::Contact)], [1, 1, contacts]);
         assert_eq!(contacts > 0, meets_rocks);
-        assert_eq!(count(Kind::Hazard) > 0, !meets_rocks);
+        assert!(meets_rocks || count(Kind::Hazard) > 0);
         assert!(recording.events.is_sorted_by(|a, b| a.time_s <= b.time_s));
         let last = recording.states.last().unwrap();
         assert!((last.time_s - drive.time_s).abs() <= 1.0 && drive.time_s >= last.time_s);
