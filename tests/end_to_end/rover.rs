@@ -272,7 +272,7 @@ fn val_wrong_studies_are_refused() {
         ("hazard_step_m = 1.0", "hazard_step_m = -1.0", "`hazard_step_m` is -1"),
         ("hazard_step_m = 1.0", "noise = { slip = 2.0 }", "`noise.slip` is 2"),
         ("sensor = \"rectangles\"", "sensor = \"sonar\"", "sonar"),
-        ("sensor = \"rectangles\"", "pass_m = 1.0", "`pass_m` is a rule of another navigator"),
+        ("sensor = \"rectangles\"", "pass_m = 1.0", "unknown key `pass_m`"),
         ("sensor = \"rectangles\"", "rectangles = 4", "rectangles"),
         ("sensor = \"rectangles\"", "map_cell_m = 0.001", "more than 1048576"),
         ("sensor = \"rectangles\"", "map_beyond_m = 0.0", "`map_beyond_m` is 0"),

@@ -23,7 +23,7 @@ fn allowed() -> BTreeMap<&'static str, BTreeSet<&'static str>> {
         ("stages", stages),
         ("cli", "stages report store schemas"),
         ("fixtures", "numeric"),
-        ("tests", "schemas numeric statistics terrain mobility store fixtures"),
+        ("tests", "schemas numeric statistics terrain mobility imaging store stages fixtures"),
         (
             "benches",
             "schemas numeric roughness statistics terrain texture mobility navigation imaging store stages report fixtures",

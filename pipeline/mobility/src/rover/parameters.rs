@@ -176,7 +176,7 @@ pub struct PlannerParameters {
 
 /// What a planner sees with.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-#[serde(tag = "sensor", rename_all = "snake_case")]
+#[serde(untagged)]
 pub enum PlannerEyes {
     /// Rays of the Sojourner-like navigator.
     Rays(SojournerParameters),

@@ -4,7 +4,7 @@
 //! rounded, and left out where that leaves a step without a change; so are numbers of value 0, of which a share is 0. What moved is what
 //! effects are divided by, rounding included. A design that the navigator refuses is an error of the study: nothing is clipped.
 
-use super::rover::prepare;
+use super::rover::{self, prepare};
 use crate::study::keys::nearest;
 use sastrugi_mobility::rover::{Navigator, RoverParameters};
 use sastrugi_numeric::Streams;
@@ -131,7 +131,7 @@ fn chosen(
     wanted: &[String],
 ) -> Result<BTreeMap<String, Value>, ParameterError> {
     let mut own = BTreeMap::new();
-    collect("", &json!(navigator), &mut own);
+    collect("", &rover::parameters(navigator), &mut own);
     if wanted.is_empty() {
         return Ok(own);
     }
@@ -248,7 +248,7 @@ mod tests {
             let p = perturbation(kind, json!({}), json!({"share": 0.1, "trajectories": 3})).unwrap();
             let (navigator, _) = prepare(kind, &json!({})).unwrap();
             let mut own = BTreeMap::new();
-            collect("", &json!(navigator), &mut own);
+            collect("", &rover::parameters(navigator), &mut own);
             assert_eq!(p.perturbed.len() + p.left_out.len(), own.len(), "{kind}");
             assert_eq!((p.ways.len(), p.rovers), (3, 10));
             for way in &p.ways {

@@ -103,12 +103,18 @@ fn planner_schema() -> Value {
     schema
 }
 
+/// Every parameter of a navigator, as a study names it; of the planner without the rules of the one whose sensor it has.
+pub fn parameters(navigator: &Navigator) -> Value {
+    let mut all = json!(navigator);
+    if let (Navigator::Planner(_), Some(map)) = (navigator, all.as_object_mut()) {
+        map.retain(|key, _| !RULES.contains(&key.as_str()));
+    }
+    all
+}
+
 /// The planner with the body and the sensor of a navigator.
 fn read_planner(params: &Value) -> Result<(Navigator, RoverParameters), ParameterError> {
     let (rest, map): (Value, PlannerMap) = keys::read_both(params)?;
-    if let Some(rule) = RULES.iter().find(|rule| rest.get(rule).is_some()) {
-        return Err(ParameterError::new(*rule, "is a rule of another navigator; the planner has none of them"));
-    }
     let (eyes, trial) = match map.sensor {
         PlannerSensor::Rays => keys::read_both(&rest).map(|(own, trial)| (PlannerEyes::Rays(own), trial)),
         PlannerSensor::Rectangles => keys::read_both(&rest).map(|(own, trial)| (PlannerEyes::Rectangles(own), trial)),
@@ -266,6 +272,8 @@ impl RoverJob {
         }
         let note = rovers::note(&drive, &task);
         let recording = recorder.map(|recorder| recorder.finish(&drive, tracked.states, note.as_deref()));
+        // A rover that ends before its first look has nothing to show.
+        let recording = recording.filter(|recording| !recording.cycles.is_empty());
         let mut row = RoverRow {
             terrain_id: self.terrain.clone(),
             rover_id,
@@ -363,7 +371,7 @@ impl RoverJob {
             ("start_m", format!("{} {}", row.start_x_m, row.start_y_m)),
             ("goal_m", format!("{} {}", row.goal_x_m, row.goal_y_m)),
         ];
-        let parameters = serde_json::to_string(&self.trial.navigator).unwrap_or_default();
+        let parameters = parameters(&self.trial.navigator).to_string();
         let trial = serde_json::to_string(&self.trial.parameters).unwrap_or_default();
         let navigator = [("name", row.navigator.clone()), ("parameters", parameters), ("trial", trial)];
         let outcome = [
@@ -405,7 +413,7 @@ impl Job for RoverJob {
     fn recipe(&self) -> Value {
         json!({
             "navigator": self.trial.navigator.kind(),
-            "parameters": self.trial.navigator,
+            "parameters": parameters(&self.trial.navigator),
             "trial": self.trial.parameters,
             "sample_m": self.trial.sample_m,
             "id": self.trial.id,

@@ -128,7 +128,7 @@ impl Job for DesignsJob {
         let designs = self.designs().iter();
         json!({
             "navigator": self.trial.kind,
-            "designs": designs.map(|d| json!([d.navigator, d.parameters.noise, d.factors])).collect::<Vec<_>>(),
+            "designs": designs.map(|d| json!([rover::parameters(&d.navigator), d.parameters.noise, d.factors])).collect::<Vec<_>>(),
             "trial": self.trial.parameters,
             "trajectory": self.number + 1,
             "id": self.trial.id,
