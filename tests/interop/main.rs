@@ -547,13 +547,13 @@ fn val_numpy_renders_the_same_images() {
     let Some(python) = python() else { return };
     let folder = area();
     let study = "[study]\nname = \"images\"\nseed = 6\ndate = \"2026-01-01\"\n\n\
-        [[terrain]]\nid = \"planetary\"\nkind = \"planetary\"\nsize_px = [120, 100]\n\n\
+        [[terrain]]\nid = \"planetary\"\nkind = \"planetary\"\nsize_px = [160, 130]\n\n\
         [[image]]\nid = \"map\"\nsurface = \"planetary\"\nsamples = 1\nexposure = 1.3\nhaze = 0.01\n\
         sun = { azimuth_deg = 110.0, elevation_deg = 18.0 }\n\n\
         [[image]]\nid = \"orbit\"\nsurface = \"planetary\"\nsamples = 1\nsun = { azimuth_deg = 250.0, elevation_deg = 30.0 }\n\
         camera = { kind = \"parallel\", azimuth_deg = 20.0, elevation_deg = 45.0 }\n\n\
         [[image]]\nid = \"rover\"\nsurface = \"planetary\"\nsamples = 1\nsun = { azimuth_deg = 80.0, elevation_deg = 25.0 }\n\
-        camera = { kind = \"pinhole\", position_m = [1.2, 0.2, 0.3], target_m = [1.3, 1.2, 0.0], size_px = [100, 70] }\n";
+        camera = { kind = \"pinhole\", position_m = [1.5, 0.2, 0.3], target_m = [1.7, 1.5, 0.0], size_px = [120, 80] }\n";
     write(folder.path(), "study.toml", study);
     let call = sastrugi_in(folder.path(), &["run", "study.toml", "-o", "release", "--quiet"]);
     assert_eq!(call.code, 0, "{}", call.stderr);
