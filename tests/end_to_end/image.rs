@@ -101,7 +101,10 @@ fn val_images_have_files_and_rows() {
     let suns = ["suns-0", "suns-120"].map(|id| json(&release.join(format!("image/{id}.json"))));
     assert_ne!(suns[0]["rendered"]["noise_stream"], suns[1]["rendered"]["noise_stream"]);
     let page = fs::read_to_string(release.join("report/index.html")).unwrap();
-    assert!(page.contains("What do cameras see?") && page.contains("sun from 315 degrees (north-west), 25 above the horizon"));
+    assert!(
+        page.contains("What do cameras see?")
+            && page.contains("sun from 315 degrees (north-west), 25 above the horizon")
+    );
 }
 
 /// Share of 2 x 2 rays a pixel that fall between the outer cell centres, whose pixels are cells.
@@ -144,7 +147,8 @@ fn val_the_verb_has_the_bytes_of_the_study() {
     assert_eq!(read("sun.tif"), read("release/image/suns-0.tif"));
     assert_eq!(json(&folder.path().join("sun.json"))["sun"]["elevation_deg"], 45.0);
     // The albedo map beside a DEM counts.
-    let call = sastrugi_in(folder.path(), &["render", "release/terrain/mars-0001.tif", "--sun", "100,20", "-o", "map.tif"]);
+    let call =
+        sastrugi_in(folder.path(), &["render", "release/terrain/mars-0001.tif", "--sun", "100,20", "-o", "map.tif"]);
     assert_eq!(call.code, 0, "{}", call.stderr);
     assert_eq!(read("map.tif"), read("release/image/map-mars-0001.tif"));
 }
@@ -154,7 +158,11 @@ fn val_the_verb_has_the_bytes_of_the_study() {
 fn val_wrong_images_are_refused() {
     let folder = area();
     for (from, to, words) in [
-        ("elevation_deg = 20.0", "elevation_deg = -2.0", "image \"map\": `sun.elevation_deg` is -2; it must be above 0"),
+        (
+            "elevation_deg = 20.0",
+            "elevation_deg = -2.0",
+            "image \"map\": `sun.elevation_deg` is -2; it must be above 0",
+        ),
         ("samples = 1\n", "samples = 0\n", "`samples` is 0; it must lie between 1 and 64"),
         ("samples = 1\n", "sample = 1\n", "did you mean `samples`"),
         ("exposure = 1.5", "exposure = 0.0", "`exposure` is 0"),
@@ -196,9 +204,16 @@ fn val_the_verb_refuses_and_draws() {
     let drawn = render(&[&planet[..], &["--sun", "90,15", "--json", "-o", "mars.png"]].concat());
     assert_eq!(drawn.code, 0, "{}", drawn.stderr);
     let result: Value = serde_json::from_str(&drawn.stdout).unwrap();
-    assert_eq!((result["pixels"][0].as_u64(), result["description"]["rendered"]["albedo_map"].as_str()), (Some(60), Some("albedo")));
+    assert_eq!(
+        (result["pixels"][0].as_u64(), result["description"]["rendered"]["albedo_map"].as_str()),
+        (Some(60), Some("albedo"))
+    );
     let bytes = fs::read(path.join("mars.png")).unwrap();
-    assert!(bytes.starts_with(b"\x89PNG") && bytes[16..24] == [0, 0, 0, 60, 0, 0, 0, 40] && !path.join("mars.json").exists());
+    assert!(
+        bytes.starts_with(b"\x89PNG")
+            && bytes[16..24] == [0, 0, 0, 60, 0, 0, 0, 40]
+            && !path.join("mars.json").exists()
+    );
     for (arguments, code, words) in [
         (&["planetary", "-o", "x.jpg"][..], 2, "name it .tif or .png"),
         (&["planetary", "--sun", "0,-1", "-o", "x.tif"], 2, "`sun.elevation_deg` is -1"),

@@ -1,9 +1,9 @@
 //! What comes back from images of a known world.
 
 use super::scene::{Scene, height_rms, noisy, rms, slope_rms};
+use crate::camera::{Camera, PinholeCamera};
 use crate::description::Noise;
 use crate::direction::direction;
-use crate::camera::{Camera, PinholeCamera};
 use crate::photoclinometry::uncertainty::coverage;
 use crate::photoclinometry::*;
 use crate::photometry::Photometry;
