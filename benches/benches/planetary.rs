@@ -7,6 +7,7 @@
 use divan::Bencher;
 use divan::counter::ItemsCount;
 use sastrugi_numeric::{Counter, Geometry, Grid, Streams};
+use sastrugi_terrain::Input;
 use serde_json::{Value, json};
 
 const SIDE: u32 = 256;
@@ -19,7 +20,7 @@ fn streams() -> Streams {
     Streams::for_seed(1, "terrain")
 }
 
-fn bench_kind(bencher: Bencher, kind: &str, params: &Value, inputs: &[Grid]) {
+fn bench_kind(bencher: Bencher, kind: &str, params: &Value, inputs: &[Input]) {
     let generator = sastrugi_terrain::prepare(kind, params).expect("the bench's own parameters are valid");
     let samples = generator.geometry().len();
     bencher.counter(ItemsCount::new(samples)).bench(|| generator.generate(&streams(), inputs));
@@ -97,5 +98,5 @@ fn elaborate_1000(bencher: Bencher) {
     let dem = dem.expect("the bench's own DEM").heights;
     let dem = Grid { geometry: Geometry::square(200, 200, 90.0), ..dem };
     let params = json!({"dem": "hills", "origin_m": [5000.0, 5000.0], "size_m": [50.0, 50.0], "cell_m": 0.05});
-    bench_kind(bencher, "elaborate", &params, &[dem]);
+    bench_kind(bencher, "elaborate", &params, &[dem.into()]);
 }
