@@ -105,7 +105,7 @@ fn prepare(folder: &Path) -> (String, [f64; 2]) {
     raster("halves.tif", halves, &Crs::default(), &|k| if k % 16 < 8 { 0.02 } else { 0.3 });
     let point = |k: usize| {
         let [x, y] = [origin[0] + 1.37 + 2.11 * k as f64, origin[1] + 3.41 + 1.3 * k as f64];
-        format!("{x},{y},{}\n", site.grid.height(x, y).unwrap() + if k % 2 == 0 { 0.6 } else { -0.4 })
+        format!("{x},{y},{}\n", site.grid.height(x, y).unwrap() + if k.is_multiple_of(2) { 0.6 } else { -0.4 })
     };
     write(folder, "laser.csv", &format!("x,y,z\n{}", (0..5).map(point).collect::<String>()));
     let study = STUDY.replace("[231000.0, 3766000.0]", &format!("{origin:?}"));

@@ -54,7 +54,7 @@ fn val_rover_pages_follow_from_their_rows() {
     let world = |id: &str, group: &str, coverage: f64| {
         format!(
             "[[terrain]]\nid = \"{id}\"\nkind = \"planetary\"\ngroup = \"{group}\"\ncount = 3\nsize_m = [12.0, 12.0]\ncell_m = 0.16\n\
-             basic_spacing_m = 0.01\norigin_m = [-6.0, -6.0]\n\
+             basic_spacing_m = 0.01\norigin_m = [-6.08, -6.08]\n\
              processes = [{{ kind = \"rocks\", coverage = {coverage}, diameter_min_m = 0.04, diameter_max_m = 1.0 }}]\n"
         )
     };

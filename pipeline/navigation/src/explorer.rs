@@ -379,7 +379,8 @@ impl ExplorerSettings {
         let cell = self.cell_m;
         let first = [0, 1].map(|axis| libm::floor((a_m[axis].min(b_m[axis]) - beyond_m) / cell));
         let count = [0, 1].map(|axis| libm::ceil((a_m[axis].max(b_m[axis]) + beyond_m) / cell) - first[axis]);
-        if !(count[0] * count[1] <= CELLS_MAX as f64) {
+        let cells = count[0] * count[1];
+        if cells.is_nan() || cells > CELLS_MAX as f64 {
             let message =
                 format!("is {cell} m: the map would have {} x {} cells, more than {CELLS_MAX}", count[1], count[0]);
             return Err(ParameterError::new("cell_m", message));

@@ -45,10 +45,10 @@ pub(super) fn messages(rover: &RoverMcap, out: &mut Timeline) -> Result<(), Mcap
         out.add(&rover_view::TOPIC, cycle.time_s, |t| Ok(view(rover, cycle, timestamp(t)?).encode_to_vec()))?;
         out.add(&rover_state::TOPIC, cycle.time_s, |t| Ok(protobuf::encode(&timestamp(t)?, &state_values(cycle))))?;
     }
-    let events = recording.events.iter();
-    events
-        .map(|event| out.add(&rover_events::TOPIC, event.time_s, |t| Ok(log(event, timestamp(t)?).encode_to_vec())))
-        .collect()
+    for event in &recording.events {
+        out.add(&rover_events::TOPIC, event.time_s, |t| Ok(log(event, timestamp(t)?).encode_to_vec()))?;
+    }
+    Ok(())
 }
 
 fn shape(rover: &RoverMcap, time: Timestamp) -> fox::SceneUpdate {
