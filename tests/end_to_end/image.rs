@@ -103,7 +103,7 @@ fn val_images_have_files_and_rows() {
     let page = fs::read_to_string(release.join("report/index.html")).unwrap();
     assert!(
         page.contains("What do cameras see?")
-            && page.contains("sun from 315 degrees (north-west), 25 above the horizon")
+            && page.contains("sun from 315 degrees (north-west), 25 degrees above the horizon")
     );
 }
 

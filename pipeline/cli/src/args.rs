@@ -597,7 +597,7 @@ pub struct Render {
     /// Azimuth that the light comes from, clockwise from north, and elevation above the horizon, deg.
     #[arg(long, value_name = "AZ,EL", default_value = "315,45", allow_hyphen_values = true)]
     pub sun: String,
-    /// Camera: nadir[:PIXEL_M], parallel:AZ,EL[,PIXEL_M] or pinhole:X,Y,Z,TO_X,TO_Y,TO_Z[,FOV_DEG].
+    /// Camera: `nadir[:PIXEL_M]`, `parallel:AZ,EL[,PIXEL_M]` or `pinhole:X,Y,Z,TO_X,TO_Y,TO_Z[,FOV_DEG]`.
     #[arg(long, value_name = "CAMERA", default_value = "nadir")]
     pub camera: String,
     /// Columns and rows of a parallel or pinhole image.

@@ -1,10 +1,10 @@
 //! Images of surfaces, and surfaces from images: arrays in, arrays out.
 //!
-//! * [`photometry`] tells how bright a facet is under a light and a view, [`direction`] where these are, [`camera`] which pixel a
+//! * [`photometry`] tells how bright a facet is under a light and a view, [`mod@direction`] where these are, [`camera`] which pixel a
 //!   point of the ground falls on.
 //! * [`photoclinometry`] finds heights and albedo from three or more images.
 //! * [`sun`] and [`pose`] are the light and the camera as a study says them, [`description`] is the file beside an image.
-//! * [`render`] makes images; [`hillshade`] shades relief as maps do, [`display`] turns an image into levels of grey.
+//! * [`mod@render`] makes images; [`hillshade`] shades relief as maps do, [`display`] turns an image into levels of grey.
 //!
 //! # Conventions
 //! Vectors are `[east, north, up]`. Slopes are `p = dz/dx` (east) and `q = dz/dy` (north), and the unit normal of a facet is

@@ -6,7 +6,7 @@
 //! 3. It plans.
 //! 4. It turns in place towards the next way point, by at most the turn of a cycle, and looks again; facing it, it drives by a step, at most
 //!    as far as the way point.
-//! 5. Without a way it forgets its map, which may be wrong, but for what it sees now, and backs up by a step; after [`FORGETS`] times it stops.
+//! 5. Without a way it forgets its map, which may be wrong, but for what it sees now, and backs up by a step; after the third time it stops.
 //! 6. Where the rover itself leans too much it backs up by a step.
 //!
 //! The map is all that it remembers. Its cells are blocked within half of the body's width of what may be a hazard; how looks that disagree are

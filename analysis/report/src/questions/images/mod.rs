@@ -76,7 +76,7 @@ fn caption(image: &ImageRow) -> String {
         String::new()
     };
     format!(
-        "{}, {} camera{pixel}, {albedo}; sun from {} degrees (clockwise from north), {} above the horizon.",
+        "{}, {} camera{pixel}, {albedo}; sun from {} degrees (clockwise from north), {} degrees above the horizon.",
         image.surface_id,
         image.camera,
         set::plain(image.sun_azimuth_deg, 4),

@@ -56,7 +56,7 @@ fn figure(data: &Data, terrain: &TerrainRow) -> Result<Option<Figure>, ReportErr
         id: slug(&format!("rendered-{}", terrain.terrain_id)),
         title: "Under the sun.".into(),
         caption: format!(
-            "{} from above with {albedo_words} and cast shadows{}; sun from {} degrees (north-west), {} above the horizon.",
+            "{} from above with {albedo_words} and cast shadows{}; sun from {} degrees (north-west), {} degrees above the horizon.",
             terrain.terrain_id,
             if step > 1 { format!(", drawn from means over {step} × {step} cells") } else { String::new() },
             set::plain(SUN.azimuth_deg, 3),
