@@ -1,8 +1,7 @@
 //! Studies of images: files, tables, refusals, the same bytes however they are made.
 
-use sastrugi_tests::{Row, area, differing, rows, sastrugi_in, sums, write};
+use sastrugi_tests::{Row, area, differing, rows, run_in_shards, run_study, sastrugi_in, write};
 use serde_json::Value;
-use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
@@ -57,14 +56,6 @@ fn number(row: &Row, column: &str) -> f64 {
     row[column].as_f64().or(row[column].as_i64().map(|n| n as f64)).unwrap_or(f64::NAN)
 }
 
-fn run(folder: &Path, study: &str, more: &[&str]) -> BTreeMap<String, String> {
-    write(folder, "study.toml", study);
-    let arguments = ["run", "study.toml", "-o", "release", "--quiet"].into_iter().chain(more.iter().copied());
-    let call = sastrugi_in(folder, &arguments.collect::<Vec<_>>());
-    assert_eq!(call.code, 0, "{}", call.stderr);
-    sums(&folder.join("release"))
-}
-
 fn json(path: &Path) -> Value {
     serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap()
 }
@@ -73,7 +64,7 @@ fn json(path: &Path) -> Value {
 #[test]
 fn val_images_have_files_and_rows() {
     let folder = area();
-    let sums = run(folder.path(), STUDY, &[]);
+    let sums = run_study(folder.path(), STUDY, &[]);
     let release = folder.path().join("release");
     let images = rows(&release, "images");
     let ids: Vec<&str> = images.iter().filter_map(|row| row["image_id"].as_str()).collect();
@@ -116,18 +107,11 @@ fn covered(cols: u32, rows: u32) -> f64 {
 fn prop_a_release_of_images_has_the_same_bytes() {
     let (one, two) = (area(), area());
     let [first, second] =
-        [(&one, "1"), (&two, "2")].map(|(folder, threads)| run(folder.path(), STUDY, &["--threads", threads]));
+        [(&one, "1"), (&two, "2")].map(|(folder, threads)| run_study(folder.path(), STUDY, &["--threads", threads]));
     assert_eq!(differing(&first, &second), Vec::<String>::new());
     let shards = area();
     write(shards.path(), "study.toml", STUDY);
-    for shard in ["1/2", "2/2"] {
-        let name = format!("part-{}", &shard[..1]);
-        let call = sastrugi_in(shards.path(), &["run", "study.toml", "-o", &name, "--shard", shard, "--quiet"]);
-        assert_eq!(call.code, 0, "{}", call.stderr);
-    }
-    let call = sastrugi_in(shards.path(), &["merge", "part-1", "part-2", "-o", "release", "--quiet"]);
-    assert_eq!(call.code, 0, "{}", call.stderr);
-    assert_eq!(differing(&first, &sums(&shards.path().join("release"))), Vec::<String>::new());
+    assert_eq!(differing(&first, &run_in_shards(shards.path(), "study.toml")), Vec::<String>::new());
     let call = sastrugi_in(one.path(), &["verify", "release", "--recompute", "all", "--quiet"]);
     assert_eq!(call.code, 0, "{}", call.stderr);
 }
@@ -137,7 +121,7 @@ fn prop_a_release_of_images_has_the_same_bytes() {
 fn val_the_verb_has_the_bytes_of_the_study() {
     let folder = area();
     let study = STUDY.replace("id = \"suns\"", "id = \"suns\"\nseed = 9");
-    run(folder.path(), &study, &[]);
+    run_study(folder.path(), &study, &[]);
     let set = ["samples=1", "noise.relative=0.01", "noise.absolute=1e-4", "exposure=1.5", "haze=0.02"];
     let set: Vec<&str> = set.iter().flat_map(|pair| ["--set", pair]).collect();
     let call = ["render", "release/terrain/plate.tif", "--sun", "0,45", "--seed", "9", "-o", "sun.tif", "--quiet"];

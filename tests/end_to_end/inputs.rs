@@ -4,7 +4,7 @@ use sastrugi_numeric::{Geometry, Grid, Streams, Surface, resample};
 use sastrugi_store::dem::{self, Crs, WriteOptions};
 use sastrugi_terrain::elaborate::{self, TextureFit};
 use sastrugi_terrain::{Input, Terrain};
-use sastrugi_tests::{area, differing, rows, sastrugi_in, sums, write};
+use sastrugi_tests::{area, differing, rows, run_in_shards, sastrugi_in, sums, write};
 use serde_json::{Value, json};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -148,13 +148,7 @@ fn val_inputs_go_with_the_release() {
     assert_eq!(differing(&made, &sums_of("rerun")), [""; 0]);
     let call = sastrugi_in(folder.path(), &["verify", "release", "--recompute", "all", "--quiet"]);
     assert_eq!(call.code, 0, "{}{}", call.stdout, call.stderr);
-    for shard in ["1/2", "2/2"] {
-        let to = format!("shard-{}", &shard[..1]);
-        run("study.toml", &to, &["--shard", shard, "--work", &format!("{to}.work")]);
-    }
-    let call = sastrugi_in(folder.path(), &["merge", "shard-1", "shard-2", "-o", "merged", "--quiet"]);
-    assert_eq!(call.code, 0, "{}", call.stderr);
-    assert_eq!(differing(&made, &sums_of("merged")), [""; 0]);
+    assert_eq!(differing(&made, &run_in_shards(folder.path(), "study.toml")), [""; 0]);
 
     // The same from the verb, which takes files.
     let heights = |path: &str| dem::read(&folder.path().join(path)).unwrap().grid;

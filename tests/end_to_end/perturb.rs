@@ -1,6 +1,6 @@
 //! `sastrugi rover`: trials of rovers alone, perturbed designs, what matters most.
 
-use sastrugi_tests::{Row, area, differing, rows, sastrugi_in, sums, write};
+use sastrugi_tests::{Row, area, differing, rows, run_in_shards, sastrugi_in, sums, write};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -150,14 +150,7 @@ fn prop_a_perturbed_release_has_the_same_bytes() {
     assert_eq!(differing(&first, &second), Vec::<String>::new());
     let shards = area();
     let released = folders[0].path().join("release/study.toml").display().to_string();
-    for shard in ["1/2", "2/2"] {
-        let name = format!("part-{}", &shard[..1]);
-        let call = sastrugi_in(shards.path(), &["run", &released, "-o", &name, "--shard", shard, "--quiet"]);
-        assert_eq!(call.code, 0, "{}", call.stderr);
-    }
-    let call = sastrugi_in(shards.path(), &["merge", "part-1", "part-2", "-o", "release", "--quiet"]);
-    assert_eq!(call.code, 0, "{}", call.stderr);
-    assert_eq!(differing(&first, &sums(&shards.path().join("release"))), Vec::<String>::new());
+    assert_eq!(differing(&first, &run_in_shards(shards.path(), &released)), Vec::<String>::new());
 }
 
 /// On one world there are effects without intervals, and a note says why.

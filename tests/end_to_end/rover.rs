@@ -1,8 +1,7 @@
 //! Studies of rovers: tables, refusals, the same bytes however they are made.
 
-use sastrugi_tests::{Row, area, differing, rows, sastrugi_in, sums, write};
-use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
+use sastrugi_tests::{Row, area, differing, rows, run_in_shards, run_study, sastrugi_in, write};
+use std::collections::BTreeSet;
 
 const STUDY: &str = r#"
 [study]
@@ -86,18 +85,10 @@ fn text<'a>(row: &'a Row, column: &str) -> &'a str {
     row[column].as_str().unwrap_or_default()
 }
 
-fn run(folder: &Path, study: &str, more: &[&str]) -> BTreeMap<String, String> {
-    write(folder, "study.toml", study);
-    let arguments = ["run", "study.toml", "-o", "release", "--quiet"].into_iter().chain(more.iter().copied());
-    let call = sastrugi_in(folder, &arguments.collect::<Vec<_>>());
-    assert_eq!(call.code, 0, "{}", call.stderr);
-    sums(&folder.join("release"))
-}
-
 #[test]
 fn val_rovers_have_rows_and_samples() {
     let folder = area();
-    run(folder.path(), STUDY, &[]);
+    run_study(folder.path(), STUDY, &[]);
     let release = folder.path().join("release");
     let (rovers, samples) = (rows(&release, "rovers"), rows(&release, "rover_samples"));
     assert_eq!(rovers.len(), 2 * 2 * 6 + 2 * 2 * 3 + 2 * 3 + 4);
@@ -156,18 +147,11 @@ fn val_worlds_go_on_and_grids_end() {
 fn prop_a_release_of_rovers_has_the_same_bytes() {
     let (one, two) = (area(), area());
     let [first, second] =
-        [(&one, "1"), (&two, "2")].map(|(folder, threads)| run(folder.path(), STUDY, &["--threads", threads]));
+        [(&one, "1"), (&two, "2")].map(|(folder, threads)| run_study(folder.path(), STUDY, &["--threads", threads]));
     assert_eq!(differing(&first, &second), Vec::<String>::new());
     let shards = area();
     write(shards.path(), "study.toml", STUDY);
-    for shard in ["1/2", "2/2"] {
-        let name = format!("part-{}", &shard[..1]);
-        let call = sastrugi_in(shards.path(), &["run", "study.toml", "-o", &name, "--shard", shard, "--quiet"]);
-        assert_eq!(call.code, 0, "{}", call.stderr);
-    }
-    let call = sastrugi_in(shards.path(), &["merge", "part-1", "part-2", "-o", "release", "--quiet"]);
-    assert_eq!(call.code, 0, "{}", call.stderr);
-    assert_eq!(differing(&first, &sums(&shards.path().join("release"))), Vec::<String>::new());
+    assert_eq!(differing(&first, &run_in_shards(shards.path(), "study.toml")), Vec::<String>::new());
     assert!(first.keys().filter(|path| path.ends_with(".mcap")).count() == 4 + 4 + 1, "recordings are among them");
     // Killed on the way, and started again.
     let killed = area();
@@ -182,14 +166,14 @@ fn prop_a_release_of_rovers_has_the_same_bytes() {
         child.kill().unwrap();
         child.wait().unwrap();
     }
-    assert_eq!(differing(&first, &run(killed.path(), STUDY, &[])), Vec::<String>::new());
+    assert_eq!(differing(&first, &run_study(killed.path(), STUDY, &[])), Vec::<String>::new());
 }
 
 /// The first rovers of each terrain are recorded, and `analyze` finds in a recording the metrics of the table: the same code judges the same poses.
 #[test]
 fn val_recordings_have_the_metrics_of_the_table() {
     let folder = area();
-    run(folder.path(), &STUDY.replace("sample_m = 1.0", "record = 2"), &[]);
+    run_study(folder.path(), &STUDY.replace("sample_m = 1.0", "record = 2"), &[]);
     let release = folder.path().join("release");
     let rovers = rows(&release, "rovers");
     let recorded: Vec<&Row> = rovers.iter().filter(|row| !row["path"].is_null()).collect();
@@ -222,7 +206,7 @@ fn val_pairs_without_a_way_are_marked() {
         let folder = area();
         let study = STUDY
             .replace("sweep.clearance_m = [0.13, 0.2]", &format!("clearance_m = {clearance_m}\ncycle_limit = 300"));
-        run(folder.path(), &study, &[]);
+        run_study(folder.path(), &study, &[]);
         let rovers = rows(&folder.path().join("release"), "rovers");
         rovers.into_iter().filter(|row| text(row, "stage_id") == "boxes").collect::<Vec<Row>>()
     };

@@ -1,6 +1,6 @@
 //! Studies of teams: runs along routes, their tables and recordings, losses and obstacles, the same bytes however they are made.
 
-use sastrugi_tests::{Row, area, differing, rows, sastrugi_in, sums, write};
+use sastrugi_tests::{Row, area, differing, rows, run_study, sastrugi_in, write};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
@@ -59,20 +59,11 @@ fn text<'a>(row: &'a Row, column: &str) -> &'a str {
     row[column].as_str().unwrap_or_default()
 }
 
-fn run(folder: &Path, study: &str, more: &[&str]) -> BTreeMap<String, String> {
-    write(folder, "study.toml", study);
-    let arguments: Vec<&str> =
-        ["run", "study.toml", "-o", "release", "--quiet"].into_iter().chain(more.iter().copied()).collect();
-    let call = sastrugi_in(folder, &arguments);
-    assert_eq!(call.code, 0, "{}", call.stderr);
-    sums(&folder.join("release"))
-}
-
 #[test]
 fn val_runs_have_rows_samples_events_and_recordings() {
     let folder = area();
     let release = folder.path().join("release");
-    let sums = run(folder.path(), STUDY, &[]);
+    let sums = run_study(folder.path(), STUDY, &[]);
     let runs = rows(&release, "formations");
     // Two terrains with two routes: two runs with losses, two formations, one nested team.
     assert_eq!(runs.len(), 2 * 2 * (2 + 2 + 1));
@@ -114,7 +105,7 @@ fn val_teams_plan_on_what_they_see() {
     let (head, _) = STUDY.split_once("[[navigate]]").unwrap();
     let team = "[[navigate]]\nid = \"team\"\nroute = \"ways\"\nformation = \"wedge\"\nspacing_m = 4.0\n";
     let seeing = team.replace("\"team\"", "\"seeing\"") + "sweep.sensing_radius_m = [8.0, 500.0]\n";
-    let sums = run(folder.path(), &[head, team, &seeing].concat(), &[]);
+    let sums = run_study(folder.path(), &[head, team, &seeing].concat(), &[]);
     let release = folder.path().join("release");
     let (runs, events) = (rows(&release, "formations"), rows(&release, "formation_events"));
     assert_eq!(runs.len(), 2 * 2 * 3);
@@ -139,7 +130,7 @@ fn val_teams_plan_on_what_they_see() {
 #[test]
 fn val_draws_differ_from_run_to_run_and_stay() {
     let folder = area();
-    run(folder.path(), STUDY, &[]);
+    run_study(folder.path(), STUDY, &[]);
     let lost = |folder: &Path| -> BTreeMap<String, (String, f64)> {
         let events = rows(&folder.join("release"), "formation_events");
         let lost = events.iter().filter(|row| text(row, "kind") == "lost" && text(row, "run_id").starts_with("lossy"));
@@ -157,7 +148,7 @@ fn val_draws_differ_from_run_to_run_and_stay() {
     assert!(times.len() > 4, "{times:?}");
     // More runs change none of those before.
     let more = area();
-    run(more.path(), &STUDY.replace("count = 2\ndrawn", "count = 3\ndrawn"), &[]);
+    run_study(more.path(), &STUDY.replace("count = 2\ndrawn", "count = 3\ndrawn"), &[]);
     let more = lost(more.path());
     assert_eq!(more.len(), 12);
     assert!(first.iter().all(|(id, one)| more.get(id) == Some(one)));
@@ -167,14 +158,14 @@ fn val_draws_differ_from_run_to_run_and_stay() {
 fn prop_a_release_of_teams_has_the_same_bytes() {
     let (one, two) = (area(), area());
     let [first, second] =
-        [(&one, "1"), (&two, "2")].map(|(folder, threads)| run(folder.path(), STUDY, &["--threads", threads]));
+        [(&one, "1"), (&two, "2")].map(|(folder, threads)| run_study(folder.path(), STUDY, &["--threads", threads]));
     assert_eq!(differing(&first, &second), Vec::<String>::new());
 }
 
 #[test]
 fn val_bags_open_as_folders() {
     let folder = area();
-    let sums = run(folder.path(), &STUDY.replace("date =", "mcap = \"ros2\"\ndate ="), &[]);
+    let sums = run_study(folder.path(), &STUDY.replace("date =", "mcap = \"ros2\"\ndate ="), &[]);
     for file in ["plain-column-0001-01.mcap", "metadata.yaml"] {
         let path = format!("mcap/hills-0001/plain-column-0001-01/{file}");
         assert!(sums.contains_key(&path), "{path}");
@@ -187,7 +178,7 @@ fn val_a_team_without_room_has_a_row() {
     // Twenty discs of 50 m do not fit onto the map.
     let losses = "spacing_m = 5.0\ncount = 2\ndrawn_losses = 1\ndrawn_obstacles = 2";
     let study = STUDY.replace(losses, "spacing_m = 60.0\nradius_m = 25.0\nmembers = 20");
-    run(folder.path(), &study, &[]);
+    run_study(folder.path(), &study, &[]);
     let runs = rows(&folder.path().join("release"), "formations");
     let crowded: Vec<&Row> = runs.iter().filter(|row| text(row, "stage_id") == "lossy").collect();
     assert!(!crowded.is_empty());

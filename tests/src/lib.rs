@@ -69,6 +69,31 @@ pub fn sums(release: &Path) -> BTreeMap<String, String> {
     text.lines().filter_map(|l| l.split_once("  ")).map(|(sum, path)| (path.to_owned(), sum.to_owned())).collect()
 }
 
+/// Writes a study and runs it to the folder's `release`; the checksums of that.
+///
+/// # Panics
+/// When the run fails.
+pub fn run_study(folder: &Path, study: &str, more: &[&str]) -> BTreeMap<String, String> {
+    write(folder, "study.toml", study);
+    let call = sastrugi_in(folder, &[&["run", "study.toml", "-o", "release", "--quiet"], more].concat());
+    assert_eq!(call.code, 0, "{}", call.stderr);
+    sums(&folder.join("release"))
+}
+
+/// Runs a study file in two shards beside it and merges them; the checksums of what comes out.
+///
+/// # Panics
+/// When a shard fails or they do not merge.
+pub fn run_in_shards(folder: &Path, study: &str) -> BTreeMap<String, String> {
+    for (shard, name) in [("1/2", "part-1"), ("2/2", "part-2")] {
+        let call = sastrugi_in(folder, &["run", study, "-o", name, "--shard", shard, "--quiet"]);
+        assert_eq!(call.code, 0, "{}", call.stderr);
+    }
+    let call = sastrugi_in(folder, &["merge", "part-1", "part-2", "-o", "merged", "--quiet"]);
+    assert_eq!(call.code, 0, "{}", call.stderr);
+    sums(&folder.join("merged"))
+}
+
 /// Paths whose sums differ, or that only one side has.
 pub fn differing(a: &BTreeMap<String, String>, b: &BTreeMap<String, String>) -> Vec<String> {
     let paths: std::collections::BTreeSet<&String> = a.keys().chain(b.keys()).collect();
