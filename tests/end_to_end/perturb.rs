@@ -183,7 +183,7 @@ fn val_wrong_perturbations_are_refused() {
         assert!(said.contains(words), "{more:?}: {said}");
     };
     for share in ["0%", "100%", "-10%", "10", "much"] {
-        told(STUDY, &["--perturb", share], "it takes a share above 0 and below 100%, as 10% or 0.1");
+        told(STUDY, &["--perturb", share], "it must be a share above 0 and below 100%, such as 10% or 0.1");
     }
     told(STUDY, &["--trajectories", "0"], "`perturb.trajectories` is 0; it must be 1 to 999");
     told(&STUDY.replace("\"turn_deg\"", "\"turn_dg\""), &[], "did you mean `turn_deg`?");

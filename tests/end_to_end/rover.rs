@@ -131,7 +131,7 @@ fn val_rovers_have_rows_and_samples() {
 #[test]
 fn val_worlds_go_on_and_grids_end() {
     let folder = area();
-    let study = STUDY.replace("radius_m = 8.0", "radius_m = 14.0").replace("radius_m = 5.0", "radius_m = 6.0");
+    let study = STUDY.replace("radius_m = 8.0", "radius_m = 14.0").replace("radius_m = 5.0", "radius_m = 5.7");
     write(folder.path(), "study.toml", &study);
     let call = sastrugi_in(folder.path(), &["run", "study.toml", "-o", "release", "--quiet"]);
     assert_eq!(call.code, 0, "{}", call.stderr);
@@ -141,6 +141,19 @@ fn val_worlds_go_on_and_grids_end() {
     let off: Vec<&str> =
         of("plates").iter().filter(|row| text(row, "outcome") == "off_ground").map(|row| text(row, "note")).collect();
     assert!(!off.is_empty() && off.iter().all(|note| note.starts_with("there is no ground at x = ")), "{off:?}");
+}
+
+/// Rovers that would start, or have their goal, off the terrain are refused (section 8): their item fails, and says where.
+#[test]
+fn val_places_off_the_terrain_are_refused() {
+    let folder = area();
+    for (from, to) in [("centre_m = [6.0, 6.0]", "centre_m = [60.0, 6.0]"), ("radius_m = 5.0", "radius_m = 50.0")] {
+        write(folder.path(), "study.toml", &STUDY.replace(from, to));
+        let call = sastrugi_in(folder.path(), &["run", "study.toml", "-o", "release", "--replace", "--quiet"]);
+        assert_eq!(call.code, 3, "{}", call.stderr);
+        let failed = std::fs::read_to_string(folder.path().join("release/manifest.json")).unwrap();
+        assert!(failed.contains("lies off the terrain: there is no ground at x = "), "{to}");
+    }
 }
 
 #[test]
@@ -255,6 +268,7 @@ fn val_wrong_studies_are_refused() {
         ("terrains = [\"plate\"]", "terrains = [\"plait\"]", "names \"plait\""),
         ("hazard_step_m = 1.0", "hazard_step_m = -1.0", "`hazard_step_m` is -1"),
         ("hazard_step_m = 1.0", "noise = { slip = 2.0 }", "`noise.slip` is 2"),
+        ("radius_m = 8.0", "radius_m = 0.3", "`radius_m` is 0.3 m; it must exceed the 0.5 m"),
         ("sensor = \"rectangles\"", "sensor = \"sonar\"", "sonar"),
         ("sensor = \"rectangles\"", "pass_m = 1.0", "unknown key `pass_m`"),
         ("sensor = \"rectangles\"", "rectangles = 4", "rectangles"),

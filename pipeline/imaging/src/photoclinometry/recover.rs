@@ -103,12 +103,15 @@ pub enum RecoverError {
     TooFewImages(usize),
     /// Lights lie in one plane.
     #[error(
-        "the lights lie in one plane (singular values {ratio:.1e} of the greatest): slopes across it cannot be told from albedo"
+        "the lights lie in one plane (smallest over largest singular value: {ratio:.1e}), so the slope across it cannot be separated from albedo"
     )]
     CoplanarLights {
         /// Least over greatest singular value of the unit vectors to the lights.
         ratio: f64,
     },
+    /// A sun that lights nothing.
+    #[error("the sun of image {0} is not above the horizon")]
+    SunBelowHorizon(usize),
     /// The wrong number of pixels.
     #[error("image {image} has {found} pixels, its camera {expected}")]
     Size {
@@ -178,6 +181,9 @@ fn check(images: &[Image], start: &Grid, known: &Known) -> Result<(), RecoverErr
         }
         if image.brightness.iter().any(|v| v.is_infinite()) || image.median().is_nan() {
             return Err(RecoverError::NotFinite(format!("brightness of image {}", k + 1)));
+        }
+        if image.light[2] <= 0.0 {
+            return Err(RecoverError::SunBelowHorizon(k + 1));
         }
         normal.add(image.light, 1.0);
     }

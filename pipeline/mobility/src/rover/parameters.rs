@@ -311,6 +311,25 @@ impl RoverParameters {
         }
     }
 
+    /// Starts and goals must be farther apart than the tolerance within which a rover has arrived.
+    ///
+    /// # Errors
+    /// A radius or distance that is not.
+    pub fn check_apart(&self, goal_tolerance_m: f64) -> Result<(), ParameterError> {
+        let straight_m = self.straight_m();
+        if straight_m > goal_tolerance_m {
+            return Ok(());
+        }
+        let key = match self.starts {
+            Starts::Circle => "radius_m",
+            Starts::Drawn => "distance_m",
+        };
+        let message = format!(
+            "is {straight_m} m; it must exceed the {goal_tolerance_m} m within which a rover has arrived (`goal_tolerance_m`)"
+        );
+        Err(ParameterError::new(key, message))
+    }
+
     /// Distance from starts to goals, m.
     pub fn straight_m(&self) -> f64 {
         match self.starts {

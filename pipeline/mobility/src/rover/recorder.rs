@@ -73,7 +73,7 @@ impl<'a> Recorder<'a> {
         if now[0] && !self.before[0] {
             let areas = cycle.view.areas.iter().filter(|area| area.hazard).count();
             let text = match cycle.view.tilted {
-                true => format!("leans by {:.1} deg, more than it may", cycle.body.tilt_rad().to_degrees()),
+                true => format!("tilts by {:.1} deg, over its limit", cycle.body.tilt_rad().to_degrees()),
                 false => format!("sees a hazard in {areas} of {} areas", cycle.view.areas.len()),
             };
             self.event(cycle.time_s, RoverEventKind::Hazard, text);
@@ -106,7 +106,7 @@ impl<'a> Recorder<'a> {
     pub fn finish(mut self, drive: &Drive, states: Vec<StateSample>, note: Option<&str>) -> RoverRecording {
         self.add_contacts(drive.time_s, drive.contacts.anywhere, drive.last.position_m);
         let arrived =
-            format!("is at the goal after {:.2} m, {:.2} m from its centre", drive.distance_m, drive.residual_m);
+            format!("reached the goal after {:.2} m, {:.2} m from its centre", drive.distance_m, drive.residual_m);
         self.event(drive.time_s, kind(&drive.ending), note.map_or(arrived, str::to_owned));
         self.recording.states = states;
         self.recording

@@ -138,6 +138,7 @@ pub fn prepare(kind: &str, params: &Value) -> Result<(Navigator, RoverParameters
     }?;
     navigator.check()?;
     RoverParameters::check(&trial)?;
+    trial.check_apart(navigator.task(&trial).goal_tolerance_m)?;
     Ok((navigator, trial))
 }
 
@@ -397,10 +398,10 @@ impl RoverJob {
 fn notes(rows: &[Driven]) -> Vec<String> {
     let endings = [
         ("lost", "stopped where they wrongly believed the goal to be"),
-        ("no_way", "knew of no way on"),
-        ("distance_limit", "drove as far as they may"),
-        ("cycle_limit", "took as many cycles as they may"),
-        ("off_ground", "came to the end of the ground that is known"),
+        ("no_way", "found no way on"),
+        ("distance_limit", "reached the distance limit"),
+        ("cycle_limit", "reached the cycle limit"),
+        ("off_ground", "came to the end of the known ground"),
     ];
     let note = |(name, words): (&str, &str)| {
         let count = rows.iter().filter(|d| d.row.outcome == name).count();
@@ -454,6 +455,7 @@ impl Job for RoverJob {
         let starts = parameters.starts(&self.streams);
         let noise = Counter::new(&mut self.streams.stream("noise"));
         let grounds = Grounds::new(&self.field, &work.parent(&self.field.item, HEIGHTS)?, parameters, &starts)?;
+        grounds.check_places(&starts)?;
         let oracles = rovers::oracles(&grounds, &self.trial.navigator.task(parameters), &starts)?;
         let one = |(k, start): (usize, &Start)| match &grounds {
             Grounds::World(world) => self.drive(work, &world.view(), k, (start, oracles[k]), noise),

@@ -158,6 +158,7 @@ impl Job for DesignsJob {
         let starts = parameters.starts(&self.streams);
         let noise = Counter::new(&mut self.streams.stream("noise"));
         let grounds = Grounds::new(&self.field, &work.parent(&self.field.item, HEIGHTS)?, parameters, &starts)?;
+        grounds.check_places(&starts)?;
         let drives = match &grounds {
             Grounds::World(world) => self.drives(|| world.view(), &starts, noise),
             Grounds::Grid(grid) => self.drives(|| grid, &starts, noise),

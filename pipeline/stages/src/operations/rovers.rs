@@ -11,7 +11,7 @@ use sastrugi_mobility::rover::{Drive, Ending, RoverParameters, Start, Surroundin
 use sastrugi_navigation::map::Neighbourhood;
 use sastrugi_navigation::obstacles::block_cells;
 use sastrugi_navigation::{CostModel, Method, RouteError, RouteSettings, SlopeCost, SlopeLimits, TravelMap, line};
-use sastrugi_numeric::{Grid, GroundClass, GroundGrid};
+use sastrugi_numeric::{Grid, Ground, GroundClass, GroundGrid};
 use sastrugi_schemas::{ParameterError, RoughnessClass};
 use sastrugi_store::dem;
 use sastrugi_store::mcap::{ROCK, SAND};
@@ -45,6 +45,17 @@ impl Grounds {
         match planetary(field)? {
             Some(world) => world.check_samples(parameters.cell_m),
             None => Ok(()),
+        }
+    }
+
+    /// Refuses starts and goals that lie off the ground.
+    ///
+    /// # Errors
+    /// The first of them.
+    pub fn check_places(&self, starts: &[Start]) -> Result<(), JobError> {
+        match self {
+            Self::World(world) => places_on(&world.view(), starts),
+            Self::Grid(grid) => places_on(grid, starts),
         }
     }
 
@@ -171,13 +182,24 @@ pub fn ground_codes(around: &Surroundings) -> Grid<u8> {
     Grid { geometry: around.classes.geometry, values: around.classes.values.iter().map(code).collect() }
 }
 
+/// Refuses starts and goals without ground.
+fn places_on(ground: &impl Ground, starts: &[Start]) -> Result<(), JobError> {
+    for (what, [x, y]) in starts.iter().flat_map(|s| [("start", s.start_m), ("goal", s.goal_m)]) {
+        ground.at(x, y).map_err(|nowhere| {
+            let advice = "choose another centre or a smaller radius";
+            JobError::input(format!("a {what} lies off the terrain: {nowhere}; {advice}"))
+        })?;
+    }
+    Ok(())
+}
+
 /// Why a rover went no farther, in words.
 pub fn note(drive: &Drive, task: &Task) -> Option<String> {
     let Drive { residual_m, .. } = drive;
     match drive.ending {
         Ending::Reached => None,
         Ending::Lost => Some(format!("believed to be at the goal, which was {residual_m:.2} m away")),
-        Ending::NoWay => Some("knew of no way to the goal".to_owned()),
+        Ending::NoWay => Some("found no way to the goal".to_owned()),
         Ending::DistanceLimit => {
             Some(format!("drove {} m, the limit, and was {residual_m:.2} m from the goal", task.distance_limit_m))
         }

@@ -52,7 +52,9 @@ pub fn share(text: &str) -> Result<f64, Error> {
     };
     match share {
         Some(share) if Perturb { share, ..Perturb::default() }.check().is_ok() => Ok(share),
-        _ => Err(Error::Usage(format!("`--perturb {text}`: it takes a share above 0 and below 100%, as 10% or 0.1"))),
+        _ => Err(Error::Usage(format!(
+            "`--perturb {text}`: it must be a share above 0 and below 100%, such as 10% or 0.1"
+        ))),
     }
 }
 
