@@ -14,7 +14,7 @@
 //! $$ a = B_A + P - I\left[\, P(\text{cells of } A) \,\right] $$
 //! kept to 0 to 1: that of the measurement at the centres of its cells, as heights are at posts. Without a process `albedo` it is smooth.
 //!
-//! Texture parameters are fitted to the structure function of the DEM over lags of 1 to 8 posts (`fit`), unless given; its coarsest
+//! Texture parameters are fitted to the second differences of the DEM over lags of 1 to 8 posts (`fit`), unless given; its coarsest
 //! points are the lattice spacing nearest to that of the posts.
 //!
 //! # The lattice
@@ -67,8 +67,6 @@ pub const KIND: &str = "elaborate";
 
 /// Fewest posts along a side of the DEM.
 const POSTS_MIN: usize = 4;
-/// A DEM with more of its structure function from its tilt is not one to fit a texture to.
-const TILT_SHARE_MAX: f64 = 0.3;
 /// How far from a window the ground under its craters may reach, posts: ejecta of the widest, and their retained points.
 const CRATER_POSTS: usize = 8;
 
@@ -89,7 +87,7 @@ enum DemError {
     #[error("has no data at x = {x}, y = {y} m, which the window needs; choose another window or fill the hole")]
     NoData { x: f64, y: f64 },
     #[error(
-        "has too few posts with data for a fit of its texture; give `hurst` and `roughness_m`, or `texture = false`"
+        "has too few posts with data for a fit of its texture, which takes at least 7 in a row both ways; give `hurst` and `roughness_m`, or `texture = false`"
     )]
     NoFit,
     #[error(
@@ -199,7 +197,7 @@ impl Elaborate {
             return Ok(None);
         }
         if let (Some(hurst), Some(roughness_m)) = (self.raw.hurst, self.raw.roughness_m) {
-            return Ok(Some(TextureFit { hurst, roughness_m, tilt_share: 0.0 }));
+            return Ok(Some(TextureFit { hurst, roughness_m }));
         }
         let fitted = fit(dem, self.raw.hurst).ok_or(DemError::NoFit)?;
         Ok(Some(TextureFit { roughness_m: self.raw.roughness_m.unwrap_or(fitted.roughness_m), ..fitted }))
@@ -332,7 +330,7 @@ impl Elaborate {
 
     fn texture_notes(&self, texture: &TextureFit, g: &Geometry) -> Vec<String> {
         let given = self.raw.hurst.is_some() && self.raw.roughness_m.is_some();
-        let mut notes = vec![format!(
+        vec![format!(
             "texture below the posts of {:.3} x {:.3} m: H = {:.3}, roughness {:.4} m at 1 m, {:.4} m at the cell ({})",
             g.cell[0],
             g.cell[1],
@@ -340,15 +338,7 @@ impl Elaborate {
             texture.roughness_m,
             texture.roughness_m * libm::pow(self.raw.cell_m, texture.hurst),
             if given { "given" } else { "fitted to lags of 1 to 8 posts" }
-        )];
-        if texture.tilt_share > TILT_SHARE_MAX {
-            let percent = 100.0 * texture.tilt_share;
-            notes.push(format!(
-                "{percent:.0} % of the DEM's differences over the longest lag are its tilt, which the texture takes for roughness; give `hurst` and \
-                 `roughness_m`"
-            ));
-        }
-        notes
+        )]
     }
 
     fn dem(&self) -> NamedInput {

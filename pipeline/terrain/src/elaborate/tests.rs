@@ -72,8 +72,8 @@ fn errors_at_posts(heights: &Grid, dem: &Grid, least: usize) -> f64 {
     all.into_iter().fold(0.0, f64::max)
 }
 
-/// The Hurst exponent of a DEM of known texture comes back within 0.1, and the roughness over three posts, amid
-/// the lags, within 5 %. H of a DEM of 200 x 200 posts scatters by 0.01 (printed); near H = 1 such a DEM is too narrow for its longest waves.
+/// The Hurst exponent of a DEM of known texture comes back within 0.05, and the roughness over three posts, amid
+/// the lags, within 5 %. H of a DEM of 200 x 200 posts scatters by 0.01 (printed).
 #[test]
 fn stat_texture_parameters_come_back() {
     for hurst in [0.5, 0.7, 0.8, 0.9] {
@@ -90,13 +90,14 @@ fn stat_texture_parameters_come_back() {
         let mean =
             |f: &dyn Fn(&TextureFit) -> f64| sastrugi_numeric::sums::mean(&fits.iter().map(f).collect::<Vec<_>>());
         let over_three = |f: &TextureFit| f.roughness_m * libm::pow(3.0 * 10.24, f.hurst);
-        let ratio = mean(&over_three) / over_three(&TextureFit { hurst, roughness_m: 0.03, tilt_share: 0.0 });
+        let ratio = mean(&over_three) / over_three(&TextureFit { hurst, roughness_m: 0.03 });
         eprintln!(
-            "H = {hurst}: {:.3}, roughness {:.4} m, over three posts {ratio:.3}",
+            "H = {hurst}: {:.3} +- {:.3}, roughness {:.4} m, over three posts {ratio:.3}",
             mean(&|f| f.hurst),
+            sastrugi_numeric::sums::variance(&fits.iter().map(|f| f.hurst).collect::<Vec<_>>()).sqrt(),
             mean(&|f| f.roughness_m)
         );
-        assert!(fits.iter().all(|f| (f.hurst - hurst).abs() < 0.1));
+        assert!(fits.iter().all(|f| (f.hurst - hurst).abs() < 0.05));
         assert!((ratio - 1.0).abs() < 0.05, "{ratio}");
     }
 }
@@ -174,17 +175,33 @@ fn val_unusable_dems_are_refused() {
     assert!(refusal(inside.clone(), &holed).contains("no data at"));
 }
 
-/// A plane has no roughness of its own: the fit says so; a flat DEM has none at all.
+/// A slope of any steepness moves no fit: H and roughness are those of the level DEM, to rounding.
 #[test]
-fn val_tilted_dems_are_told_apart() {
+fn prop_slopes_move_no_fit() {
+    let level = site(40, 30, [2.0, 3.0]);
+    let g = level.geometry;
+    let of = |[east, north]: [f64; 2]| {
+        let tilted = (0..g.len()).map(|k| level.values[k] + east * g.x(k % g.cols) + north * g.y(k / g.cols) + 900.0);
+        fit(&Grid::new(g, tilted.collect()), None).unwrap()
+    };
+    let expected = fit(&level, None).unwrap();
+    assert!(expected.roughness_m > 0.001);
+    for slope in [[0.01, 0.0], [0.3, -0.1], [-2.0, 1.0]] {
+        let found = of(slope);
+        assert!((found.hurst - expected.hurst).abs() < 1e-6, "{slope:?}: {found:?}, {expected:?}");
+        assert!((found.roughness_m / expected.roughness_m - 1.0).abs() < 1e-6);
+    }
+}
+
+/// Planes have no roughness; a DEM without data, or narrower than three lags, has no fit.
+#[test]
+fn val_planes_have_no_roughness() {
     let g = Geometry::square(20, 20, 2.0);
     let plane = Grid::new(g, (0..400).map(|k| 0.3 * g.x(k % 20) - 0.1 * g.y(k / 20)).collect());
-    let tilted = fit(&plane, None).unwrap();
-    assert!((tilted.tilt_share - 1.0).abs() < 1e-9 && tilted.hurst > 0.99);
-    let notes = refined(json!({"origin_m": [5.0, 5.0], "size_px": [40, 40]}), &plane).notes;
-    assert!(notes.len() == 2 && notes[1].contains("100 %"), "{notes:?}");
+    assert_eq!(fit(&plane, None).unwrap().roughness_m, 0.0);
     assert_eq!(fit(&Grid::filled(g, 4.0), None).unwrap().roughness_m, 0.0);
     assert!(fit(&Grid::filled(g, f64::NAN), None).is_none());
+    assert!(fit(&site(6, 20, [1.0, 1.0]), None).is_none() && fit(&site(7, 7, [1.0, 1.0]), None).is_some());
 }
 
 #[test]
