@@ -2,11 +2,10 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may end where it stands")]
 
-use sastrugi_tests::{area, called, differing, program, routed_study, sastrugi_in, sums, write};
+use sastrugi_tests::{area, called, differing, program, routed_study, run_with_kills, sastrugi_in, sums, write};
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::process::{Command, Stdio};
-use std::time::Duration;
+use std::process::Command;
 
 fn run(folder: &Path, arguments: &[&str]) -> BTreeMap<String, String> {
     let mut all = vec!["run", "study.toml", "-o", "release", "--quiet"];
@@ -57,34 +56,13 @@ fn gold_shards_change_nothing() {
     }
 }
 
-/// Runs `study.toml` of a folder, killed with SIGKILL after each of the pauses and started again, and lets it finish.
-fn run_with_kills(folder: &Path, whole: &BTreeMap<String, String>, pauses: &[Duration]) -> BTreeMap<String, String> {
-    for pause in pauses {
-        let mut child = Command::new(program())
-            .args(["run", "study.toml", "-o", "release", "--quiet"])
-            .current_dir(folder)
-            .stdout(Stdio::null())
-            .stderr(Stdio::null())
-            .spawn()
-            .unwrap();
-        std::thread::sleep(*pause);
-        child.kill().unwrap();
-        child.wait().unwrap();
-        if folder.join("release").exists() {
-            assert_same(whole, &sums(&folder.join("release")), "a release that exists is whole");
-        }
-    }
-    run(folder, &[])
-}
-
 /// Kills at moments spread over the run's time (the moments need no seed: any of them must do).
 #[test]
 fn gold_kills_change_nothing() {
     let whole = run_fresh(&routed_study(), &[]);
     let folder = area();
-    write(folder.path(), "study.toml", &routed_study());
-    let pauses = [5, 40, 80, 120, 170, 230, 300, 380, 470, 570, 700, 900].map(Duration::from_millis);
-    assert_same(&whole, &run_with_kills(folder.path(), &whole, &pauses), "after kills");
+    let pauses_ms = [5, 40, 80, 120, 170, 230, 300, 380, 470, 570, 700, 900];
+    assert_same(&whole, &run_with_kills(folder.path(), &routed_study(), &whole, &pauses_ms), "after kills");
     let left: Vec<String> = std::fs::read_dir(folder.path())
         .unwrap()
         .map(|e| e.unwrap().file_name().to_string_lossy().into_owned())
@@ -103,10 +81,7 @@ fn gold_the_traversal_study_is_the_same_everywhere() {
     for threads in ["2", "8"] {
         assert_same(&one, &run_fresh(&study, &["--threads", threads]), threads);
     }
-    let folder = area();
-    write(folder.path(), "study.toml", &study);
-    let killed = run_with_kills(folder.path(), &one, &[10, 20, 22].map(Duration::from_secs));
-    assert_same(&one, &killed, "after kills");
+    assert_same(&one, &run_with_kills(area().path(), &study, &one, &[10_000, 20_000, 22_000]), "after kills");
 }
 
 /// glibc is told that the CPU has neither FMA nor AVX2: its mathematical functions then change bits, ours must not.

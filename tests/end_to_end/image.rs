@@ -1,6 +1,6 @@
 //! Studies of images: files, tables, refusals, the same bytes however they are made.
 
-use sastrugi_tests::{Row, area, differing, rows, run_in_shards, run_study, sastrugi_in, write};
+use sastrugi_tests::{Row, area, differing, rows, run_in_shards, run_study, run_with_kills, sastrugi_in, write};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
@@ -103,6 +103,7 @@ fn covered(cols: u32, rows: u32) -> f64 {
     f64::from((2 * cols - 2) * (2 * rows - 2)) / f64::from(4 * cols * rows)
 }
 
+/// One thread, two, two shards, after kills: the same bytes, and `verify` makes them again.
 #[test]
 fn prop_a_release_of_images_has_the_same_bytes() {
     let (one, two) = (area(), area());
@@ -112,6 +113,8 @@ fn prop_a_release_of_images_has_the_same_bytes() {
     let shards = area();
     write(shards.path(), "study.toml", STUDY);
     assert_eq!(differing(&first, &run_in_shards(shards.path(), "study.toml")), Vec::<String>::new());
+    let killed = run_with_kills(area().path(), STUDY, &first, &[30, 100, 200, 400]);
+    assert_eq!(differing(&first, &killed), Vec::<String>::new());
     let call = sastrugi_in(one.path(), &["verify", "release", "--recompute", "all", "--quiet"]);
     assert_eq!(call.code, 0, "{}", call.stderr);
 }

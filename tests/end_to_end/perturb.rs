@@ -1,6 +1,6 @@
 //! `sastrugi rover`: trials of rovers alone, perturbed designs, what matters most.
 
-use sastrugi_tests::{Row, area, differing, rows, run_in_shards, sastrugi_in, sums, write};
+use sastrugi_tests::{Row, area, differing, rows, run_in_shards, run_with_kills, sastrugi_in, sums, write};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -138,7 +138,7 @@ fn val_the_hazard_height_matters_most() {
     assert!(first["mu_low"].as_f64().unwrap() > 0.0, "{first}");
 }
 
-/// One thread, two, two shards of the released study: the same bytes.
+/// One thread, two, two shards of the released study, after kills: the same bytes.
 #[test]
 fn prop_a_perturbed_release_has_the_same_bytes() {
     let study = STUDY.replace("count = 3", "count = 2").replace("distance_limit_m = 60.0", "distance_limit_m = 20.0");
@@ -149,8 +149,12 @@ fn prop_a_perturbed_release_has_the_same_bytes() {
     let [first, second] = folders.each_ref().map(|folder| sums(&folder.path().join("release")));
     assert_eq!(differing(&first, &second), Vec::<String>::new());
     let shards = area();
-    let released = folders[0].path().join("release/study.toml").display().to_string();
-    assert_eq!(differing(&first, &run_in_shards(shards.path(), &released)), Vec::<String>::new());
+    let released = folders[0].path().join("release/study.toml");
+    let merged = run_in_shards(shards.path(), &released.display().to_string());
+    assert_eq!(differing(&first, &merged), Vec::<String>::new());
+    let study = std::fs::read_to_string(released).unwrap();
+    let killed = run_with_kills(area().path(), &study, &first, &[50, 300, 700, 1500]);
+    assert_eq!(differing(&first, &killed), Vec::<String>::new());
 }
 
 /// On one world there are effects without intervals, and a note says why.

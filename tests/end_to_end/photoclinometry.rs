@@ -1,8 +1,6 @@
 //! Studies that take heights from images: a measured DEM under three suns, its surface recovered, compared and fitted.
 
-use sastrugi_tests::{Row, area, differing, rows, sastrugi_in, sums, write};
-use std::collections::BTreeMap;
-use std::path::Path;
+use sastrugi_tests::{Row, area, differing, rows, run_in_shards, run_study, run_with_kills, sastrugi_in, sums, write};
 
 /// Jacksboro, its cells four times finer than the pixels; the Sun stands above its slopes.
 fn study() -> String {
@@ -53,21 +51,13 @@ fn number(row: &Row, column: &str) -> f64 {
     row[column].as_f64().or(row[column].as_i64().map(|n| n as f64)).unwrap_or(f64::NAN)
 }
 
-fn run(folder: &Path, more: &[&str]) -> BTreeMap<String, String> {
-    write(folder, "study.toml", &study());
-    let arguments = ["run", "study.toml", "-o", "release", "--quiet"].into_iter().chain(more.iter().copied());
-    let call = sastrugi_in(folder, &arguments.collect::<Vec<_>>());
-    assert_eq!(call.code, 0, "{}", call.stderr);
-    sums(&folder.join("release"))
-}
-
 /// Files, rows and figures. Without errors the shading of the recovered surface correlates as that of the averaged truth does, to 0.02, and slopes are
 /// as far from the true ones as those of the averaged truth, to 15 %; long waves are recovered coherently; an exposure wrong by 5 % tilts the surface, and the coarse DEM
 /// holds it. A fit of the recovered surface follows in the same study.
 #[test]
 fn val_a_study_recovers_a_measured_surface() {
     let folder = area();
-    let files = run(folder.path(), &[]);
+    let files = run_study(folder.path(), &study(), &[]);
     let release = folder.path().join("release");
     let table = rows(&release, "photoclinometry");
     let of = |id: &str| table.iter().find(|row| row["photoclinometry_id"] == id).unwrap();
@@ -105,21 +95,23 @@ fn val_a_study_recovers_a_measured_surface() {
     assert_eq!(call.code, 0, "{}{}", call.stdout, call.stderr);
 }
 
-/// The same bytes on one thread and on three.
+/// The same bytes on one thread and on three, in two shards and after kills.
 #[test]
-fn prop_threads_change_no_byte_of_a_recovered_surface() {
-    let [one, three] = ["1", "3"].map(|threads| {
-        let folder = area();
-        run(folder.path(), &["--threads", threads])
-    });
+fn prop_a_recovered_surface_has_the_same_bytes() {
+    let [one, three] = ["1", "3"].map(|threads| run_study(area().path(), &study(), &["--threads", threads]));
     assert_eq!(differing(&one, &three), Vec::<String>::new());
+    let shards = area();
+    write(shards.path(), "study.toml", &study());
+    assert_eq!(differing(&one, &run_in_shards(shards.path(), "study.toml")), Vec::<String>::new());
+    let killed = run_with_kills(area().path(), &study(), &one, &[100, 400, 900, 1500]);
+    assert_eq!(differing(&one, &killed), Vec::<String>::new());
 }
 
 /// The verb takes the images of a release, prints every round, and writes heights with their maps; wrong files are refused in words.
 #[test]
 fn val_the_verb_recovers_from_files() {
     let folder = area();
-    run(folder.path(), &[]);
+    run_study(folder.path(), &study(), &[]);
     let mut images: Vec<String> = sums(&folder.path().join("release"))
         .into_keys()
         .filter(|path| path.starts_with("image/") && path.ends_with(".json"))

@@ -1,6 +1,6 @@
 //! Studies of rovers: tables, refusals, the same bytes however they are made.
 
-use sastrugi_tests::{Row, area, differing, rows, run_in_shards, run_study, sastrugi_in, write};
+use sastrugi_tests::{Row, area, differing, rows, run_in_shards, run_study, run_with_kills, sastrugi_in, write};
 use std::collections::BTreeSet;
 
 const STUDY: &str = r#"
@@ -167,19 +167,8 @@ fn prop_a_release_of_rovers_has_the_same_bytes() {
     assert_eq!(differing(&first, &run_in_shards(shards.path(), "study.toml")), Vec::<String>::new());
     assert!(first.keys().filter(|path| path.ends_with(".mcap")).count() == 4 + 4 + 1, "recordings are among them");
     // Killed on the way, and started again.
-    let killed = area();
-    write(killed.path(), "study.toml", STUDY);
-    for pause_ms in [50, 400, 1200, 2500] {
-        let mut child = std::process::Command::new(sastrugi_tests::program())
-            .args(["run", "study.toml", "-o", "release", "--quiet"])
-            .current_dir(killed.path())
-            .spawn()
-            .unwrap();
-        std::thread::sleep(std::time::Duration::from_millis(pause_ms));
-        child.kill().unwrap();
-        child.wait().unwrap();
-    }
-    assert_eq!(differing(&first, &run_study(killed.path(), STUDY, &[])), Vec::<String>::new());
+    let killed = run_with_kills(area().path(), STUDY, &first, &[50, 400, 1200, 2500]);
+    assert_eq!(differing(&first, &killed), Vec::<String>::new());
 }
 
 /// The first rovers of each terrain are recorded, and `analyze` finds in a recording the metrics of the table: the same code judges the same poses.

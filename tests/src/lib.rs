@@ -7,7 +7,8 @@ use parquet::file::serialized_reader::SerializedFileReader;
 use parquet::record::Field;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::{Command, Output, Stdio};
+use std::time::Duration;
 
 /// The program built beside this test.
 ///
@@ -92,6 +93,35 @@ pub fn run_in_shards(folder: &Path, study: &str) -> BTreeMap<String, String> {
     let call = sastrugi_in(folder, &["merge", "part-1", "part-2", "-o", "merged", "--quiet"]);
     assert_eq!(call.code, 0, "{}", call.stderr);
     sums(&folder.join("merged"))
+}
+
+/// Runs a study to the folder's `release`, killed with SIGKILL after each of the pauses and started again, and lets it finish; the checksums
+/// of what comes out. A release that is there after a kill must be the `whole` one.
+///
+/// # Panics
+/// When half of a release is there, or the last run fails.
+pub fn run_with_kills(
+    folder: &Path,
+    study: &str,
+    whole: &BTreeMap<String, String>,
+    pauses_ms: &[u64],
+) -> BTreeMap<String, String> {
+    write(folder, "study.toml", study);
+    for pause_ms in pauses_ms {
+        let mut child = Command::new(program())
+            .args(["run", "study.toml", "-o", "release", "--quiet"])
+            .current_dir(folder)
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("the program starts");
+        std::thread::sleep(Duration::from_millis(*pause_ms));
+        child.kill().and_then(|()| child.wait()).expect("the program ends");
+        if folder.join("release").exists() {
+            assert_eq!(differing(whole, &sums(&folder.join("release"))), Vec::<String>::new(), "half of a release");
+        }
+    }
+    run_study(folder, study, &[])
 }
 
 /// Paths whose sums differ, or that only one side has.
