@@ -259,8 +259,8 @@ fn val_wrong_studies_are_refused() {
         ("hazard_step_m = 1.0", "noise = { slip = 2.0 }", "`noise.slip` is 2"),
         ("radius_m = 8.0", "radius_m = 0.3", "`radius_m` is 0.3 m; it must exceed the 0.5 m"),
         ("sensor = \"rectangles\"", "sensor = \"sonar\"", "sonar"),
-        ("sensor = \"rectangles\"", "pass_m = 1.0", "unknown key `pass_m`"),
-        ("sensor = \"rectangles\"", "rectangles = 4", "rectangles"),
+        ("sensor = \"rectangles\"", "pass_m = 1.0", "`pass_m` is a rule of the navigators"),
+        ("sensor = \"rectangles\"", "rectangles = 4", "`rectangles` is a parameter of `schoppers_like`"),
         ("sensor = \"rectangles\"", "map_cell_m = 0.001", "more than 1048576"),
         ("sensor = \"rectangles\"", "map_beyond_m = 0.0", "`map_beyond_m` is 0"),
     ] {

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use sastrugi_mobility::rover::{
     Cycle, Drive, Navigator, RoverParameters, SchoppersParameters, SojournerParameters, Start, drive,
 };
-use sastrugi_numeric::{Counter, Streams};
+use sastrugi_numeric::{Counter, Ground, GroundClass, GroundPoint, NoGround, Streams};
 use sastrugi_terrain::planetary::{Clearing, Planetary, RawPlanetary};
 use serde_json::{Value, json};
 
@@ -101,9 +101,11 @@ fn planner(parameters: &Value) -> (Navigator, RoverParameters) {
     sastrugi_stages::jobs::rover::prepare(Navigator::PLANNER, parameters).unwrap()
 }
 
-/// Every navigator on one world at four densities, 100 rovers of 25 m, and the planner that sees rectangles: up to 8.8 % rocks at least 95 % arrive,
-/// with d0 over the mean distance of at least 0.93 (25 rovers on another world: all, 0.994 and 0.978). The other figures are printed:
-/// mind that rovers that stop early have short ways.
+/// Every navigator on one world at four densities, 25 rovers of 25 m (the table of docs/rovers.md). The planner that sees rectangles: up to 8.8 % rocks
+/// at least 24 arrive, with d0 over the mean distance of at least 0.93 (here 25, 0.994 and 0.986). The planner on rays, up to 8.8 %: at
+/// least 22 arrive, and it meets no more rocks than the rules on the same rays. While it put a hazard anywhere in its strip, 18 arrived at 8.8 %, with
+/// 3 contacts each where the rules have 0.9. Everything is fixed by the seed, so that false alarms come from a change of the code alone; were
+/// each of the 50 rays' drives to fail with a chance of 2 %, a count below 22 of 25 had one of 0.2 %.
 #[test]
 #[ignore = "slow: ./test --full"]
 fn stat_planners_beside_navigators() {
@@ -113,8 +115,10 @@ fn stat_planners_beside_navigators() {
         ("rays, plans", planner(&json!({"sensor": "rays"}))),
         ("rectangles, rules", (Navigator::Schoppers(SchoppersParameters::default()), default())),
         ("rectangles, plans", planner(&json!({"sensor": "rectangles"}))),
-    ];
+    ]
+    .map(|(name, (navigator, parameters))| (name, (navigator, RoverParameters { rovers: 25, ..parameters })));
     for coverage in [0.069, 0.088, 0.118, 0.176] {
+        let mut by_rules = f64::NAN;
         for (name, (navigator, parameters)) in &navigators {
             let drives = trial(navigator, parameters, coverage, 1);
             let [distance_m, ratio, e, least, most, reached] = summary(&drives);
@@ -124,9 +128,60 @@ fn stat_planners_beside_navigators() {
                 "{coverage} {name}: {distance_m:.1} m, {ratio:.3}, e {e:.3} ({least:.3} to {most:.3}), {reached:.2} arrived, {no_way} no way, {contacts:.2} contacts"
             );
             assert!(drives.iter().all(|d| !d.reached() || d.residual_m <= 0.5));
-            if *name == "rectangles, plans" && coverage < 0.1 {
-                assert!(reached >= 0.95 && ratio >= 0.93, "{coverage}: {reached} {ratio}");
+            match *name {
+                "rays, rules" => by_rules = contacts,
+                "rays, plans" if coverage < 0.1 => {
+                    assert!(reached >= 0.88 && contacts <= by_rules, "{coverage}: {reached} {contacts} {by_rules}");
+                }
+                "rectangles, plans" if coverage < 0.1 => {
+                    assert!(reached >= 0.95 && ratio >= 0.93, "{coverage}: {reached} {ratio}");
+                }
+                _ => {}
             }
+        }
+    }
+}
+
+/// Level sand with hemispheres: centres and radii, m.
+struct Hemispheres(Vec<([f64; 2], f64)>);
+
+impl Ground for Hemispheres {
+    fn at(&self, x: f64, y: f64) -> Result<GroundPoint, NoGround> {
+        let squared_m2 = |(c, r): &([f64; 2], f64)| r * r - (x - c[0]) * (x - c[0]) - (y - c[1]) * (y - c[1]);
+        let height_m = self.0.iter().map(|rock| squared_m2(rock).max(0.0).sqrt()).fold(0.0, f64::max);
+        let class = if height_m > 0.0 { GroundClass::Rock } else { GroundClass::Sand };
+        Ok(GroundPoint { height_m, class, albedo: 0.2 })
+    }
+
+    fn cell_m(&self) -> f64 {
+        0.02
+    }
+}
+
+/// Five rows of rocks of 0.3 m across the way, 2.5 m apart, each with a gate of 1.4 m: by turns 1 m to the left and to the right of the straight way.
+fn slalom(first_side: f64) -> Hemispheres {
+    let radius_m = 0.3;
+    let row = |n: i32| {
+        let (along_m, gate_m) = (2.5 * f64::from(n + 1), first_side * f64::from(1 - 2 * (n % 2)));
+        let offsets = (0..14).map(|k| 0.7 + radius_m + 0.5 * f64::from(k));
+        offsets.flat_map(move |at| [gate_m + at, gate_m - at]).map(move |across_m| ([along_m, across_m], radius_m))
+    };
+    Hemispheres((0..5).flat_map(row).collect())
+}
+
+/// Both planners pass a slalom and touch no rock. Of a planner that put a hazard anywhere in its strip, the one on rays met rocks 20 times, and gave up.
+#[test]
+fn val_planners_pass_a_slalom() {
+    for sensor in ["rays", "rectangles"] {
+        let (navigator, parameters) = planner(&json!({"sensor": sensor}));
+        for first_side in [1.0, -1.0] {
+            let start = Start::facing([0.0; 2], [15.0, 0.0]);
+            let noise = Counter::new(&mut Streams::for_seed(1, "rover").stream("noise"));
+            let task = navigator.task(&parameters);
+            let drive = drive(&slalom(first_side), &task, navigator.policy().as_mut(), &start, noise, |_| {});
+            assert!(drive.reached() && drive.contacts.anywhere == 0, "{sensor} {first_side}: {drive:?}");
+            // Through all gates: around the ends of the rows it would be 26 m. To rectangles of half a metre some gates may look closed.
+            assert!(sensor == "rectangles" || drive.distance_m < 20.0, "{first_side}: {}", drive.distance_m);
         }
     }
 }

@@ -7,7 +7,8 @@
 //! * What a cell is known to be only ever rises: unseen, suspect (in an area with a hazard, which lies anywhere in it), safe, fixed
 //!   hazard. A suspect cell is freed by a look that finds it safe; a safe one stays so, and is no longer where a hazard of an area may
 //!   lie. An area with a hazard for which no cell near it is left becomes a fixed hazard as a whole: an earlier look has missed
-//!   something. So there is an end to what can be learnt, and with it to changes of the plan.
+//!   something. A hazard that is seen at a place, not in an area, fixes its cell at once. So there is an end to what can be learnt, and with it
+//!   to changes of the plan.
 //! * Suspect cells and fixed hazards block all cells nearer than a margin, so that the body is kept clear of them.
 //! * Where no way is left, what is known may be wrong; it can be forgotten ([`Explorer::forget`]).
 //! * Every free cell within the tolerance of the goal leads to it: the goal itself may be blocked.
@@ -173,6 +174,13 @@ impl Explorer {
         // What lies there was taken for safe.
         if sight == Sight::Hazard && !nodes.iter().any(|node| self.map.is_blocked(*node)) {
             nodes.iter().for_each(|node| self.learn(*node, Cell::Fixed));
+        }
+    }
+
+    /// Takes a look that found a hazard at a place: its cell is one for good. What lies beyond the map is not remembered.
+    pub fn see_hazard_at(&mut self, at_m: [f64; 2]) {
+        if let Some(node) = self.node_at(at_m) {
+            self.learn(node, Cell::Fixed);
         }
     }
 

@@ -48,8 +48,10 @@ fn trials(summary: &Summary) -> String {
         "(95 %)",
         "mean e",
         "(95 %)",
+        "e of arrived",
         "d0/mean d",
         "at limit",
+        "off ground",
     ];
     let mut rows = vec![heads.map(str::to_owned).to_vec()];
     for trial in &summary.trials {
@@ -64,11 +66,13 @@ fn trials(summary: &Summary) -> String {
             range(&trial.arrival),
             format!("{:.3}", trial.efficiency.estimate),
             range(&trial.efficiency),
+            if trial.arrived == 0 { "-".to_owned() } else { format!("{:.3}", trial.efficiency_of_arrivals) },
             format!("{:.3}", trial.straight_over_mean_distance),
             trial.at_limit.to_string(),
+            trial.off_ground.to_string(),
         ]);
     }
-    let note = "Intervals count worlds, not rovers. Distances of rovers at a limit are censored: d0/mean d depends on the limit.";
+    let note = "Intervals count worlds, not rovers. Distances of rovers at a limit are censored: d0/mean d depends on the limit. Rovers that ended off the ground count as e = 0.";
     format!("{}\n{note}", columns(&rows))
 }
 

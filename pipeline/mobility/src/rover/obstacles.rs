@@ -32,8 +32,9 @@ impl Task {
         ObstacleLimits { height_m: self.clearance_m, slope_max }
     }
 
-    /// How far from a blocked cell of `cell_m` the centre of the rover must stay, m: half of its track less a cell, since the rock lies
-    /// anywhere in its cell and the centre anywhere in its own.
+    /// Least distance between a blocked cell of `cell_m` and a cell of the rover's centre, m: half of its track less a cell, since rock and centre lie
+    /// half a cell inside their own on average. A way may so pass rocks at half of the track less a cell, and gaps that are narrower
+    /// than the body by up to two cells: it is a bound of how short ways can be, not a way to drive.
     pub fn obstacle_margin_m(&self, cell_m: f64) -> f64 {
         (self.chassis.track_m - cell_m).max(0.0)
     }

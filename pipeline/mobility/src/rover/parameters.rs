@@ -20,7 +20,8 @@ const PARTS_MAX: usize = 64;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct SojournerParameters {
-    /// Factor of all lengths of body, sensor and drives; not of the hazard heights and the clearance.
+    /// Factor of all lengths of body, sensor and drives; not of the hazard heights and the clearance, nor of the task: tolerance of the goal and limit of the
+    /// distance.
     pub scale: f64,
     /// Axles ahead of and behind the centre, m (our choice, about the flight rover's).
     pub axle_m: f64,
@@ -50,7 +51,7 @@ pub struct SojournerParameters {
     pub step_m: f64,
     /// Error of the bearing to the goal that is let be, rad (our choice).
     pub bearing_tolerance_rad: f64,
-    /// Distance from the goal at which a rover has arrived, m (our choice).
+    /// Distance from the goal at which a rover of any `scale` has arrived, m (our choice).
     pub goal_tolerance_m: f64,
     /// Rocks that stand higher above the sand count as contacts when they come under the rover, m (our choice: the diameter of a wheel).
     pub clearance_m: f64,
@@ -90,7 +91,8 @@ impl Default for SojournerParameters {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct SchoppersParameters {
-    /// Factor of all lengths of body, sensor and drives; not of the clearance.
+    /// Factor of all lengths of body, sensor and drives, `progress_m` among them; not of the clearance, nor of the task: tolerance of the goal and limit of
+    /// the distance.
     pub scale: f64,
     /// Axles ahead of and behind the centre, m (our choice).
     pub axle_m: f64,
@@ -125,7 +127,7 @@ pub struct SchoppersParameters {
     pub commit_max_m: f64,
     /// Nearer to the goal by this, the drive is the first one again, m (our choice).
     pub progress_m: f64,
-    /// Distance from the goal at which a rover has arrived, m (our choice).
+    /// Distance from the goal at which a rover of any `scale` has arrived, m (our choice).
     pub goal_tolerance_m: f64,
     /// Farthest drive, m (our choice).
     pub distance_limit_m: f64,
@@ -471,7 +473,7 @@ impl SchoppersParameters {
             commit_m: self.commit_m * self.scale,
             commit_growth: self.commit_growth,
             commit_max_m: self.commit_max_m * self.scale,
-            progress_m: self.progress_m,
+            progress_m: self.progress_m * self.scale,
         }
     }
 }
@@ -538,20 +540,6 @@ impl PlannerParameters {
         match &self.eyes {
             PlannerEyes::Rays(p) => p.task(trial),
             PlannerEyes::Rectangles(p) => p.task(trial),
-        }
-    }
-
-    /// Share of the length of an area without a hazard, from its near edge, in which there is none. A ray meets a rock at the hazard height
-    /// only before the point of the ground that it is aimed at: what stands farther is no hazard yet.
-    pub fn safe_share(&self) -> f64 {
-        match &self.eyes {
-            PlannerEyes::Rays(p) => {
-                let sensor = p.sensor();
-                let length_m = sensor.rows_m.last().copied().unwrap_or(0.0);
-                let from_aim_m = (length_m + sensor.behind_nose_m) * sensor.step_m / sensor.height_m;
-                (1.0 - from_aim_m / length_m).clamp(0.0, 1.0)
-            }
-            PlannerEyes::Rectangles(_) => 1.0,
         }
     }
 

@@ -2,8 +2,9 @@
 
 /// Largest step of heights that rovers can be asked to drive on, m.
 pub const HEIGHT_STEP_MAX_M: f64 = 1e-3;
-/// Fewest different heights that tell steps of a file from ground that is made of terraces.
-const LEVELS_MIN: usize = 64;
+/// Fewest different heights that tell steps of a file from ground that is made of a few terraces. Eight heights of any other ground lie whole steps apart with a
+/// chance below one in a million: each of the gaps but the least one would have to be near a whole step, to 4 %.
+const LEVELS_MIN: usize = 8;
 /// How near to whole steps heights must lie, in steps.
 const NEAR: f64 = 0.02;
 

@@ -112,6 +112,23 @@ fn val_rays_meet_a_plane_where_they_are_aimed() {
         let aim = pose.to_ground([p.nose_m + p.rows_m[k % 4], p.columns_m[k / 4]]);
         assert!((0..2).all(|a| (ray.to_m[a] - aim[a]).abs() < 1e-9), "{k}");
     }
+    // A rock is a hazard where its front is, wherever in its column; a drop-off where the ray was aimed.
+    let hazards = |ground: &Made| -> Vec<(usize, Ray)> {
+        let seen = view(ground, &sojourner(), &ahead(1.0).pose());
+        seen.rays.into_iter().enumerate().filter(|(_, ray)| ray.hazard).collect()
+    };
+    let fronts = hazards(&Made::flat(&[([0.60, 0.0], 0.1, 0.3)]));
+    assert!(!fronts.is_empty());
+    for (k, Ray { place_m: [ahead, left], .. }) in fronts {
+        let from_axis = ((ahead - 0.6) * (ahead - 0.6) + left * left).sqrt();
+        assert!((from_axis - 0.1).abs() < 0.012 && ahead < 0.6, "{k}: {ahead} {left}");
+    }
+    let over_the_edge = hazards(&Made::flat(&[([0.0; 2], 0.45, 5.0)]));
+    assert!(over_the_edge.len() >= 15);
+    for (k, ray) in over_the_edge {
+        let aim = [p.nose_m + p.rows_m[k % 4], p.columns_m[k / 4]];
+        assert!(ray.height_m.is_none() && (0..2).all(|a| (ray.place_m[a] - aim[a]).abs() < 1e-12), "{k}");
+    }
     let steep = Made { slopes: [0.6, 0.0], ..Made::flat(&[]) };
     assert!(view(&steep, &sojourner(), &ahead(1.0).pose()).tilted);
 }
@@ -135,7 +152,7 @@ fn val_drop_offs_and_unknown_ground_differ() {
     let edge = Made { known_m: 0.5, ..Made::flat(&[]) };
     let drive = run(&edge, &sojourner(), &ahead(5.0));
     assert!(matches!(drive.ending, Ending::OffGround(nowhere) if nowhere.x_m > 0.5), "{:?}", drive.ending);
-    assert_eq!(drive.distance_m, 0.0);
+    assert_eq!((drive.distance_m, drive.efficiency(), drive.counted_efficiency()), (0.0, 1.0, 0.0));
 }
 
 /// Each rule of the columns by itself.
@@ -147,7 +164,8 @@ fn val_rules_of_the_columns() {
         let mut heights = vec![Some(0.0); 20];
         changes.iter().for_each(|(k, v)| heights[*k] = *v);
         let flags = sensor.hazards(&heights);
-        (0..5).filter(|k| flags[*k]).collect::<Vec<_>>()
+        let columns = flags.chunks(4).enumerate().filter(|(_, rays)| rays.contains(&true));
+        columns.map(|(k, _)| k).collect::<Vec<_>>()
     };
     assert_eq!(flags(&sensor, &[]), NONE);
     // Missing, too high, too low.
@@ -371,6 +389,9 @@ fn val_steps_of_heights_are_found() {
         );
     }
     assert_eq!(height_step_m(&drawn.iter().map(|z| *z as f32).collect::<Vec<_>>()), None);
+    // 29 levels of little relief, one of them missing; and a few terraces.
+    let few: Vec<f32> = (0..30).filter(|k| *k != 7).map(|k| (0.061 * f64::from(k)) as f32).collect();
+    assert!((height_step_m(&few).unwrap() - 0.061).abs() < 1e-6);
     assert_eq!(height_step_m(&[0.0, 0.5, 1.0, 1.5].repeat(100)), None);
     assert_eq!(height_step_m(&[]), None);
 }

@@ -50,6 +50,9 @@ pub enum Ending {
 }
 
 impl Ending {
+    /// Name of the ending off the ground in tables.
+    pub const OFF_GROUND: &str = "off_ground";
+
     /// Name in tables.
     pub fn name(&self) -> &'static str {
         match self {
@@ -58,7 +61,7 @@ impl Ending {
             Self::NoWay => "no_way",
             Self::DistanceLimit => "distance_limit",
             Self::CycleLimit => "cycle_limit",
-            Self::OffGround(_) => "off_ground",
+            Self::OffGround(_) => Self::OFF_GROUND,
         }
     }
 }
@@ -182,6 +185,12 @@ impl Drive {
     /// Efficiency (see [`super::efficiency()`]).
     pub fn efficiency(&self) -> f64 {
         super::efficiency(self.straight_m, self.distance_m, self.residual_m)
+    }
+
+    /// Efficiency in means over rovers: 0 for one that ended off the ground. It has shown none, and must not lift a mean, as the 1 of a rover
+    /// that looked off the ground at its start would.
+    pub fn counted_efficiency(&self) -> f64 {
+        if matches!(self.ending, Ending::OffGround(_)) { 0.0 } else { self.efficiency() }
     }
 
     /// The same had the distance limit been half of `distance_limit_m`.

@@ -63,6 +63,26 @@ fn val_knowledge_only_rises() {
     assert!(blocked(&[(-0.2, 0.2, Safe), (-0.2, 0.2, Hazard), (-0.2, 0.2, Safe)]));
 }
 
+/// A hazard at a place is one whatever areas around it were, or will be, seen safe; it blocks what is nearer than the margin of 0.2 m, each anywhere
+/// in its cell, and nothing else. Beyond the map it is let be.
+#[test]
+fn val_a_hazard_at_a_place_stays() {
+    let mut explorer = explorer([3.0, 0.0]);
+    let around = rectangle([0.5, -0.5], [1.5, 0.5]);
+    explorer.see(&around, Sight::Safe);
+    explorer.see_hazard_at([1.03, 0.07]);
+    explorer.see(&around, Sight::Safe);
+    for (row, col) in (-6..=6).flat_map(|row| (-6..=6).map(move |col| (row, col))) {
+        let at_m = [1.05 + 0.1 * f64::from(col), 0.05 + 0.1 * f64::from(row)];
+        let gap = |cells: i32| f64::from((cells.abs() - 1).max(0));
+        let near = gap(row) * gap(row) + gap(col) * gap(col) < 4.0;
+        assert_eq!(explorer.is_blocked(at_m), near, "{at_m:?}");
+    }
+    let before = explorer.len();
+    explorer.see_hazard_at([1e6, 0.0]);
+    assert_eq!(explorer.len(), before);
+}
+
 /// What was forgotten is free again, and planned over as if it had never been seen.
 #[test]
 fn val_what_is_forgotten_is_free() {

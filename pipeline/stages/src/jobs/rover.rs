@@ -112,6 +112,29 @@ pub fn parameters(navigator: &Navigator) -> Value {
     all
 }
 
+/// Refuses keys of the navigators that a planner does not have: rules, and what belongs to the other sensor.
+fn check_planner_keys(params: &Value) -> Result<(), ParameterError> {
+    let [rays, rectangles] = [schema_of::<SojournerParameters>(), schema_of::<SchoppersParameters>()]
+        .map(|schema| keys::properties(&schema));
+    let sees_rectangles = params["sensor"] == json!(PlannerSensor::Rectangles);
+    let (own, other, kind, sensor) = match sees_rectangles {
+        true => (&rectangles, &rays, Navigator::SOJOURNER, "rectangles"),
+        false => (&rays, &rectangles, Navigator::SCHOPPERS, "rays"),
+    };
+    for key in params.as_object().into_iter().flat_map(|map| map.keys()) {
+        if RULES.contains(&key.as_str()) {
+            let message = "is a rule of the navigators to compare with; `planner` has none, it searches its way";
+            return Err(ParameterError::new(key, message));
+        }
+        if other.contains(key) && !own.contains(key) {
+            let message =
+                format!("is a parameter of `{kind}`, which a `planner` with sensor = \"{sensor}\" does not have");
+            return Err(ParameterError::new(key, message));
+        }
+    }
+    Ok(())
+}
+
 /// The planner with the body and the sensor of a navigator.
 fn read_planner(params: &Value) -> Result<(Navigator, RoverParameters), ParameterError> {
     let (rest, map): (Value, PlannerMap) = keys::read_both(params)?;
@@ -177,6 +200,9 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
         let record = envelope.record.unwrap_or(RECORD) as usize;
         ParameterError::not_negative("sample_m", sample_m).map_err(|e| entry.refuse(e))?;
         for one in entry.expand(&envelope.id, None, &envelope.sweep, &params)? {
+            if envelope.kind == Navigator::PLANNER {
+                check_planner_keys(&one.params).map_err(|e| entry.refuse(e))?;
+            }
             entry.check_keys::<RoverItem>(&one.params, &schema)?;
             builder.claim(&entry, STAGE, &one.id)?;
             let (navigator, parameters) = prepare(&envelope.kind, &one.params).map_err(|e| entry.refuse(e))?;

@@ -116,7 +116,7 @@ impl DesignsJob {
             factors: perturbation.factors_json(design),
             rovers: drives.len() as i64,
             arrived: count(Drive::reached),
-            efficiency: mean(Drive::efficiency),
+            efficiency: mean(Drive::counted_efficiency),
             distance_m: mean(|d| d.distance_m),
             at_limit: count(|d| matches!(d.ending, Ending::DistanceLimit | Ending::CycleLimit)),
         }

@@ -2,7 +2,8 @@
 //!
 //! Each cycle, in this order:
 //! 1. Within the tolerance of the goal it stops.
-//! 2. It marks what it sees on its map, at the place where it believes to be.
+//! 2. It marks what it sees on its map, at the place where it believes to be: where a ray shows a hazard the cell there, of rectangles all their
+//!    cells.
 //! 3. It plans.
 //! 4. It turns in place towards the next way point, by at most the turn of a cycle, and looks again; facing it, it drives by a step, at most
 //!    as far as the way point.
@@ -11,8 +12,12 @@
 //!
 //! The map is all that it remembers. Its cells are blocked within half of the body's width of what may be a hazard; how looks that disagree are
 //! joined stands in [`sastrugi_navigation::explorer`].
+//!
+//! It comes to an end whatever it sees: between two of the three times that it forgets, knowledge of a cell rises three times at most, and cells are
+//! limited. Once nothing is new the plan stays, each cycle turns or drives along it, and it leads to the goal. The limits of distance and
+//! cycles hold all the same.
 
-use sastrugi_mobility::rover::{Command, PlannerParameters, Policy, RoverParameters, Situation, Stop};
+use sastrugi_mobility::rover::{Command, PlannerParameters, Policy, RoverParameters, Situation, Stop, View};
 use sastrugi_navigation::explorer::{CELLS_MAX, Explorer, ExplorerSettings, Sight};
 use sastrugi_schemas::ParameterError;
 
@@ -59,8 +64,6 @@ fn settings(parameters: &PlannerParameters) -> ExplorerSettings {
 /// The planner, and what it remembers.
 struct Planner {
     settings: ExplorerSettings,
-    /// Share of an area without a hazard that is safe, from its near edge.
-    safe_share: f64,
     turn_rad: f64,
     step_m: f64,
     explorer: Option<Explorer>,
@@ -73,7 +76,6 @@ impl Planner {
     fn new(parameters: &PlannerParameters) -> Self {
         Self {
             settings: settings(parameters),
-            safe_share: parameters.safe_share(),
             turn_rad: parameters.turn_rad(),
             step_m: parameters.step_m(),
             explorer: None,
@@ -95,12 +97,13 @@ impl Planner {
     /// Marks what the rover sees.
     fn see(&mut self, situation: &Situation<'_>) {
         let Some(explorer) = &mut self.explorer else { return };
-        for area in &situation.view.areas {
-            let (corners_m, sight) = match area.hazard {
-                true => (area.corners_m, Sight::Hazard),
-                false => (near_part(&area.corners_m, self.safe_share), Sight::Safe),
-            };
-            explorer.see(&corners_m.map(|corner| situation.pose.to_ground(corner)), sight);
+        let View { areas, rays, .. } = situation.view;
+        let places_m = rays.iter().filter(|ray| ray.hazard).map(|ray| situation.pose.to_ground(ray.place_m));
+        places_m.for_each(|at_m| explorer.see_hazard_at(at_m));
+        // Rays tell of places: a strip is a hazard as a whole, wherever in it the rock stands, and safe though rays pass beside most of it.
+        for area in areas.iter().filter(|_| rays.is_empty()) {
+            let sight = if area.hazard { Sight::Hazard } else { Sight::Safe };
+            explorer.see(&area.corners_m.map(|corner| situation.pose.to_ground(corner)), sight);
         }
     }
 
@@ -132,12 +135,6 @@ impl Planner {
         let drive_m = self.step_m.min(situation.pose.distance_m(next_m));
         Command { turn_rad: error_rad, drive_m, stop: None }
     }
-}
-
-/// The part of an area (near right, near left, far left, far right) that begins at its near edge.
-fn near_part(&[near_right, near_left, far_left, far_right]: &[[f64; 2]; 4], share: f64) -> [[f64; 2]; 4] {
-    let between = |near: [f64; 2], far: [f64; 2]| [0, 1].map(|k| near[k] + share * (far[k] - near[k]));
-    [near_right, near_left, between(near_left, far_left), between(near_right, far_right)]
 }
 
 impl Policy for Planner {

@@ -83,7 +83,7 @@ impl Grounds {
         if let Some(step_m) = height_step_m(&heights_m.values).filter(|step_m| *step_m > HEIGHT_STEP_MAX_M) {
             return Err(JobError::input(format!(
                 "heights come in steps of {:.1} mm, which rovers would take for rocks; they need steps of at most {:.0} mm: \
-                 floating-point heights, or less relief in one file",
+                 floating-point heights, or less relief in one file; terraces made on purpose need fewer than 8 levels",
                 1e3 * step_m,
                 1e3 * HEIGHT_STEP_MAX_M
             )));
@@ -130,7 +130,8 @@ impl Oracle {
     }
 }
 
-/// For each start the shortest way that keeps the wheels clear of rocks above the clearance and off steep sand: lines at any angle over a map of 0.1 m cells, which reaches beyond all starts and goals.
+/// For each start the shortest way over ground that is free of rocks above the clearance and of steep sand, with margin [`Task::obstacle_margin_m`]: lines at
+/// any angle over a map of 0.1 m cells, which reaches beyond all starts and goals.
 ///
 /// # Errors
 /// A map that cannot be planned on.

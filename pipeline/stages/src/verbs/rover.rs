@@ -6,6 +6,7 @@
 use crate::error::Error;
 use crate::jobs::{rover, rover_designs, rover_effects};
 use crate::loaded::{Loaded, load_text, read};
+use sastrugi_mobility::rover::Ending;
 use sastrugi_numeric::{Stream, Streams, sums};
 use sastrugi_schemas::Record;
 use sastrugi_schemas::study::Perturb;
@@ -183,6 +184,10 @@ pub struct TrialSummary {
     pub straight_over_mean_distance: f64,
     /// Mean distance driven, m; rovers that stopped short of the goal count with what they drove.
     pub mean_distance_m: f64,
+    /// Mean efficiency of those that arrived; NaN where none did.
+    pub efficiency_of_arrivals: f64,
+    /// Rovers that ended off the ground: they count as an efficiency of 0.
+    pub off_ground: usize,
     /// Rovers that stopped at their distance or cycle limit: their distances are censored.
     pub at_limit: usize,
 }
@@ -232,7 +237,10 @@ fn of_trial(rows: &[RoverRow], stream: &mut Stream) -> TrialSummary {
         |rows: &[&RoverRow], of: fn(&RoverRow) -> f64| sums::mean(&rows.iter().map(|row| of(row)).collect::<Vec<_>>());
     let by_world = |of: fn(&RoverRow) -> f64| worlds.values().map(|rows| mean_of(rows, of)).collect::<Vec<f64>>();
     let reached = |row: &RoverRow| if row.outcome == "reached" { 1.0 } else { 0.0 };
-    let efficiencies = by_world(|row| row.efficiency);
+    let is_off = |row: &RoverRow| row.outcome == Ending::OFF_GROUND;
+    // As `Drive::counted_efficiency`.
+    let efficiencies = by_world(|row| if row.outcome == Ending::OFF_GROUND { 0.0 } else { row.efficiency });
+    let arrivals: Vec<f64> = rows.iter().filter(|row| reached(row) > 0.0).map(|row| row.efficiency).collect();
     // Worlds have the same number of rovers, so that the mean of their means is that of all.
     let of_worlds = |drawn: &[Vec<usize>]| sums::mean(&drawn[0].iter().map(|&w| efficiencies[w]).collect::<Vec<_>>());
     let arrival = by_world(reached);
@@ -253,6 +261,8 @@ fn of_trial(rows: &[RoverRow], stream: &mut Stream) -> TrialSummary {
         ),
         straight_over_mean_distance: mean_of(&all, |row| row.straight_m) / mean_distance_m,
         mean_distance_m,
+        efficiency_of_arrivals: if arrivals.is_empty() { f64::NAN } else { sums::mean(&arrivals) },
+        off_ground: rows.iter().filter(|row| is_off(row)).count(),
         at_limit: rows.iter().filter(|row| ["distance_limit", "cycle_limit"].contains(&row.outcome.as_str())).count(),
     }
 }

@@ -40,6 +40,10 @@ pub struct Ray {
     pub to_m: [f64; 3],
     /// Height of the hit above the plane of the body, m; `None` where nothing was hit.
     pub height_m: Option<f64>,
+    /// The ground that it tells of, in the rover's own axes (ahead, left), m: where it met it, or, where it met none, where it was aimed.
+    pub place_m: [f64; 2],
+    /// Whether it shows a hazard there.
+    pub hazard: bool,
 }
 
 /// What a rover sees in one cycle.

@@ -1,12 +1,12 @@
 //! Ranges along rays: columns of rays ahead, each column a strip of ground.
 //!
 //! A ray leaves the front of the rover and aims at a point of the plane of the body ahead; it is followed to twice that range. What
-//! it hits has the height v above that plane. A column is a hazard where
+//! it hits has the height v above that plane. A column is a hazard where one of its rays is, and a ray is one where
 //!
-//! * a ray hits nothing (a drop-off),
+//! * it hits nothing (a drop-off),
 //! * |v| exceeds the hazard height,
-//! * v differs by more than that from one row to the next, or from the next column, of which the higher is the hazard,
-//! * it holds the highest of all hits, and these differ by more than the span.
+//! * v exceeds that of the ray before, behind or beside it by more than the hazard height,
+//! * v is the highest of all, and exceeds the lowest by more than the span.
 //!
 //! The paper gives 20 ranges and a tilt; the flight rover avoided rocks, slopes and drop-offs (Mishkin et al., 1998). Their geometry and
 //! their rules are ours. Distances are in plan.
@@ -66,8 +66,9 @@ impl RaySensor {
             }
         }
         let heights: Vec<Option<f64>> = rays.iter().map(|ray| ray.height_m).collect();
-        let hazards = self.hazards(&heights);
-        let areas = (0..hazards.len()).map(|k| self.strip(k, hazards[k])).collect();
+        rays.iter_mut().zip(self.hazards(&heights)).for_each(|(ray, hazard)| ray.hazard = hazard);
+        let columns = rays.chunks_exact(self.rows_m.len()).enumerate();
+        let areas = columns.map(|(k, rays)| self.strip(k, rays.iter().any(|ray| ray.hazard))).collect();
         Ok(View { areas, rays, tilted: body.tilt_rad() > self.tilt_max_rad })
     }
 
@@ -109,28 +110,26 @@ impl RaySensor {
                 let back = if last.is_finite() { gap / (gap - last) } else { 0.0 };
                 let hit = t - back * REACH / f64::from(steps);
                 let to_m = space(hit, body.height_at_m(point(hit)) + above(hit));
-                return Ok(Ray { from_m, to_m, height_m: Some(above(hit)) });
+                return Ok(Ray { from_m, to_m, height_m: Some(above(hit)), place_m: point(hit), hazard: false });
             }
             last = gap;
         }
-        Ok(Ray { from_m, to_m: space(REACH, body.height_at_m(point(REACH)) + above(REACH)), height_m: None })
+        let to_m = space(REACH, body.height_at_m(point(REACH)) + above(REACH));
+        Ok(Ray { from_m, to_m, height_m: None, place_m: point(1.0), hazard: false })
     }
 
-    /// Hazard of each column, from the heights column by column.
+    /// Hazard of each ray, from the heights column by column.
     pub(crate) fn hazards(&self, heights: &[Option<f64>]) -> Vec<bool> {
         let rows = self.rows_m.len();
-        let columns: Vec<&[Option<f64>]> = heights.chunks_exact(rows).collect();
-        let alone = |column: &&[Option<f64>]| {
-            let too_high = column.iter().any(|v| v.is_none_or(|v| v.abs() > self.step_m));
-            let step = |w: &[Option<f64>]| w[0].zip(w[1]).is_some_and(|(a, b)| (a - b).abs() > self.step_m);
-            too_high || column.windows(2).any(step)
-        };
-        let mut hazards: Vec<bool> = columns.iter().map(alone).collect();
-        for k in 1..columns.len() {
-            for (left, right) in columns[k - 1].iter().zip(columns[k]) {
-                let Some((left, right)) = left.zip(*right) else { continue };
-                hazards[k - 1] |= left - right > self.step_m;
-                hazards[k] |= right - left > self.step_m;
+        let too_high = |v: &Option<f64>| v.is_none_or(|v| v.abs() > self.step_m);
+        let mut hazards: Vec<bool> = heights.iter().map(too_high).collect();
+        for k in 0..heights.len() {
+            let behind = (k % rows + 1 < rows).then_some(k + 1);
+            let beside = Some(k + rows).filter(|next| *next < heights.len());
+            for next in behind.into_iter().chain(beside) {
+                let Some((one, other)) = heights[k].zip(heights[next]) else { continue };
+                hazards[k] |= one - other > self.step_m;
+                hazards[next] |= other - one > self.step_m;
             }
         }
         let hits = heights.iter().enumerate().filter_map(|(k, v)| v.map(|v| (k, v)));
@@ -138,7 +137,7 @@ impl RaySensor {
         if let Some((highest, v)) = hits.max_by(|a, b| a.1.total_cmp(&b.1))
             && v - lowest > self.span_m
         {
-            hazards[highest / rows] = true;
+            hazards[highest] = true;
         }
         hazards
     }
