@@ -267,6 +267,8 @@ impl PhotoclinometryJob {
             modes: b.modes as i64,
             truth_rms_m: b.truth_rms_m,
             recovered_rms_m: b.recovered_rms_m,
+            truth_slope_rms: b.truth_slope_rms,
+            recovered_slope_rms: b.recovered_slope_rms,
             covariance_m2: b.covariance_m2,
             coherence: b.coherence,
         };
