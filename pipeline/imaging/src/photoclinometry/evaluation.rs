@@ -226,18 +226,19 @@ pub fn bands(truth: &Grid, recovered: &Grid) -> Vec<Band> {
             *modes += 1;
         }
     }
-    let band = |(octave, ([truth, result, product, truth_steep, result_steep], modes)): (usize, ([f64; 5], usize))| Band {
-        octave,
-        wavelength_min_m: shortest * (1u64 << octave) as f64,
-        wavelength_max_m: shortest * (2u64 << octave) as f64,
-        modes,
-        truth_rms_m: truth.sqrt(),
-        recovered_rms_m: result.sqrt(),
-        truth_slope_rms: truth_steep.sqrt(),
-        recovered_slope_rms: result_steep.sqrt(),
-        covariance_m2: product,
-        coherence: if truth * result > 0.0 { product * product / (truth * result) } else { 0.0 },
-    };
+    let band =
+        |(octave, ([truth, result, product, truth_steep, result_steep], modes)): (usize, ([f64; 5], usize))| Band {
+            octave,
+            wavelength_min_m: shortest * (1u64 << octave) as f64,
+            wavelength_max_m: shortest * (2u64 << octave) as f64,
+            modes,
+            truth_rms_m: truth.sqrt(),
+            recovered_rms_m: result.sqrt(),
+            truth_slope_rms: truth_steep.sqrt(),
+            recovered_slope_rms: result_steep.sqrt(),
+            covariance_m2: product,
+            coherence: if truth * result > 0.0 { product * product / (truth * result) } else { 0.0 },
+        };
     totals.into_iter().enumerate().filter(|(_, (_, modes))| *modes > 0).map(band).collect()
 }
 
