@@ -158,7 +158,9 @@ pub fn evaluate(
 /// Slopes of every cell from the heights beside it; NaN beside missing heights.
 fn slopes(heights: &Grid) -> [Vec<f64>; 2] {
     let relief = Relief { geometry: &heights.geometry, heights_m: &heights.values };
-    let all: Vec<[f64; 2]> = (0..heights.values.len()).map(|k| relief.slopes(k)).collect();
+    let known = |k: usize| relief.edges(k).iter().flatten().all(|slope| slope.is_finite());
+    let of = |k: usize| if known(k) { relief.slopes(k) } else { [f64::NAN; 2] };
+    let all: Vec<[f64; 2]> = (0..heights.values.len()).map(of).collect();
     [0, 1].map(|axis| all.iter().map(|s| s[axis]).collect())
 }
 
