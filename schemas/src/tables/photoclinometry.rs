@@ -65,7 +65,7 @@ super::table! {
         height_error_rms_detrended_m: f64 ["m"],
         /// Rms height of the true surface.
         height_rms_m: f64 ["m"],
-        /// Recovered heights in the release, GeoTIFF; `.albedo.tif`, `.uncertainty.tif` and `.lit.tif` beside it have its name.
+        /// Recovered heights in the release, GeoTIFF; its maps (`.albedo.tif` and others) have its name.
         path: String [""],
     }
 }
