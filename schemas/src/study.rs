@@ -568,6 +568,10 @@ pub struct PhotoclinometryItem {
     /// Standard deviation of the heights of its cells, m.
     #[serde(default)]
     pub coarse_sigma_m: Option<f64>,
+    /// File of measured points (columns `x`, `y`, `z`, `sigma`, m), each a soft constraint with its sigma, above 0. Beside `free_exposure` three or more
+    /// points settle the tilt.
+    #[serde(default)]
+    pub altimetry: Option<String>,
     /// Label for statistics.
     #[serde(default)]
     pub group: Option<String>,

@@ -204,7 +204,13 @@ fn val_the_verb_refuses_and_draws() {
     for (arguments, code, words) in [
         (&["planetary", "-o", "x.jpg"][..], 2, "name it .tif or .png"),
         (&["planetary", "--sun", "0,-1", "-o", "x.tif"], 2, "`sun.elevation_deg` is -1"),
-        (&["planetary", "--sun", "0", "-o", "x.tif"], 2, "it takes 2 numbers"),
+        (&["planetary", "--sun", "0", "-o", "x.tif"], 2, "azimuth and elevation in degrees, as `--sun 120,20`"),
+        (&["planetary", "--camera", "nadir:900", "-o", "x.tif"], 2, "does not fill a pixel"),
+        (
+            &["planetary", "--set", "photometry={lambert=0,lommel_seeliger=0}", "-o", "x.tif"],
+            2,
+            "would reflect nothing",
+        ),
         (&["planetary", "--camera", "fisheye", "-o", "x.tif"], 2, "it takes nadir[:PIXEL_M]"),
         (&["planetary", "--size", "9x9", "-o", "x.tif"], 2, "nadir covers the surface"),
         (&["planetary", "--set", "samples=99", "-o", "x.tif"], 2, "`samples` is 99"),

@@ -1,5 +1,6 @@
 //! Studies that take heights from images: a measured DEM under three suns, its surface recovered, compared and fitted.
 
+use sastrugi_stages::verbs::{self, Reading};
 use sastrugi_tests::{Row, area, differing, rows, run_in_shards, run_study, run_with_kills, sastrugi_in, sums, write};
 
 /// Jacksboro, its cells four times finer than the pixels; the Sun stands above its slopes.
@@ -37,6 +38,14 @@ samples = 0
 coarse = "site"
 coarse_sigma_m = 20.0
 
+[[photoclinometry]]
+id = "misled"
+images = ["suns"]
+samples = 0
+altimetry = "laser.csv"
+photometry = {{ lambert = 1.0, lommel_seeliger = 0.0 }}
+first_image_errors = {{ sun_azimuth_deg = 20.0, sun_elevation_deg = 5.0 }}
+
 [[fit]]
 id = "of-recovered"
 dem = "held"
@@ -47,8 +56,28 @@ bootstrap = 0
     )
 }
 
+/// Four heights of the site within its middle, by bilinear interpolation; sigma 1 m.
+fn laser() -> String {
+    let heights = verbs::read(&sastrugi_fixtures::jacksboro(), &Reading::default()).unwrap().dem.grid;
+    let g = heights.geometry;
+    let line = |(u, v): (f64, f64)| {
+        let (x, y) = (g.origin[0] + u * g.size()[0], g.origin[1] + v * g.size()[1]);
+        let z = sastrugi_numeric::Surface::height(&heights, x, y).unwrap();
+        format!("{x},{y},{z},1.0\n")
+    };
+    let lines: String = [(0.3, 0.3), (0.7, 0.35), (0.4, 0.7), (0.6, 0.6)].into_iter().map(line).collect();
+    format!("x,y,z,sigma\n{lines}")
+}
+
 fn number(row: &Row, column: &str) -> f64 {
     row[column].as_f64().or(row[column].as_i64().map(|n| n as f64)).unwrap_or(f64::NAN)
+}
+
+/// A folder with the points of the study.
+fn area_with_points() -> tempfile::TempDir {
+    let folder = area();
+    write(folder.path(), "laser.csv", &laser());
+    folder
 }
 
 /// Files, rows and figures. Without errors the shading of the recovered surface correlates as that of the averaged truth does, to 0.02, and slopes are
@@ -56,7 +85,7 @@ fn number(row: &Row, column: &str) -> f64 {
 /// holds it. A fit of the recovered surface follows in the same study.
 #[test]
 fn val_a_study_recovers_a_measured_surface() {
-    let folder = area();
+    let folder = area_with_points();
     let files = run_study(folder.path(), &study(), &[]);
     let release = folder.path().join("release");
     let table = rows(&release, "photoclinometry");
@@ -70,7 +99,9 @@ fn val_a_study_recovers_a_measured_surface() {
     for row in &table {
         println!("{row:?}");
         let id = row["photoclinometry_id"].as_str().unwrap();
-        for ending in ["tif", "albedo.tif", "lit.tif"] {
+        for ending in
+            ["tif", "albedo.tif", "lit.tif", "slope-sigma.tif", "albedo-sigma.tif", "condition.tif", "leaning.tif"]
+        {
             assert!(files.contains_key(&format!("photoclinometry/{id}.{ending}")), "{id}.{ending}");
         }
         let sampled = row["item_id"] == "recovered";
@@ -83,6 +114,12 @@ fn val_a_study_recovers_a_measured_surface() {
     assert!(number(plain, "slope_error_rms") < 1.15 * number(plain, "slope_error_rms_ceiling"));
     assert!(number(plain, "height_error_rms_detrended_m") < 0.2 * number(plain, "height_rms_m"));
     assert!(number(wrong, "height_error_rms_m") > 3.0 * number(plain, "height_error_rms_m"));
+    // The ceiling is the truth's own, whatever sun and law the inversion believes.
+    for column in ["shaded_correlation_ceiling", "slope_error_rms_ceiling"] {
+        assert_eq!(number(of("misled"), column), number(plain, column), "{column}");
+    }
+    assert!(number(of("misled"), "slope_error_rms") > 1.05 * number(plain, "slope_error_rms"));
+    assert!(files.contains_key("input/misled-altimetry.csv"));
     assert!(number(of("held"), "height_error_rms_m") < number(plain, "height_error_rms_m"));
     let bands = rows(&release, "photoclinometry_bands");
     let own: Vec<&Row> = bands.iter().filter(|r| r["photoclinometry_id"] == "held").collect();
@@ -98,19 +135,19 @@ fn val_a_study_recovers_a_measured_surface() {
 /// The same bytes on one thread and on three, in two shards and after kills.
 #[test]
 fn prop_a_recovered_surface_has_the_same_bytes() {
-    let [one, three] = ["1", "3"].map(|threads| run_study(area().path(), &study(), &["--threads", threads]));
+    let [one, three] = ["1", "3"].map(|threads| run_study(area_with_points().path(), &study(), &["--threads", threads]));
     assert_eq!(differing(&one, &three), Vec::<String>::new());
-    let shards = area();
+    let shards = area_with_points();
     write(shards.path(), "study.toml", &study());
     assert_eq!(differing(&one, &run_in_shards(shards.path(), "study.toml")), Vec::<String>::new());
-    let killed = run_with_kills(area().path(), &study(), &one, &[100, 400, 900, 1500]);
+    let killed = run_with_kills(area_with_points().path(), &study(), &one, &[100, 400, 900, 1500]);
     assert_eq!(differing(&one, &killed), Vec::<String>::new());
 }
 
 /// The verb takes the images of a release, prints every round, and writes heights with their maps; wrong files are refused in words.
 #[test]
 fn val_the_verb_recovers_from_files() {
-    let folder = area();
+    let folder = area_with_points();
     run_study(folder.path(), &study(), &[]);
     let mut images: Vec<String> = sums(&folder.path().join("release"))
         .into_keys()
@@ -144,6 +181,13 @@ fn val_the_verb_recovers_from_files() {
     assert!(code == 2 && words.contains("rounds"), "{code} {words}");
     let (code, words) = refused(&["images.toml", "--set", "roundz=9"]);
     assert!(code == 2 && words.contains("rounds"), "{code} {words}");
+    let with = |line: &str| format!("{line}\n{}", list(&images));
+    write(folder.path(), "exact.csv", "x,y,z\n1,2,3\n");
+    write(folder.path(), "exact.toml", &with("altimetry = \"exact.csv\""));
+    let (code, words) = refused(&["exact.toml"]);
+    assert!(code == 65 && words.contains("exact.csv") && words.contains("`sigma` above 0"), "{code} {words}");
+    let (code, words) = refused(&["images.toml", "--set", "condition_max=1.5"]);
+    assert!(code == 65 && words.contains("condition number below 1.5"), "{code} {words}");
     write(folder.path(), "missing.toml", "images = [\"a.json\", \"b.json\", \"c.json\"]\n");
     let (code, words) = refused(&["missing.toml"]);
     assert!(code == 65 && words.contains("a.json"), "{code} {words}");
@@ -152,11 +196,14 @@ fn val_the_verb_recovers_from_files() {
 /// Items that cannot be are refused before anything runs, at their line.
 #[test]
 fn val_wrong_items_are_refused() {
-    let folder = area();
+    let folder = area_with_points();
     for (before, after, words) in [
         ("[0.0, 120.0, 240.0]", "[0.0, 120.0]", "take at least"),
         ("images = [\"suns\"]\nsamples = 16", "images = [\"sun\"]\nsamples = 16", "did you mean"),
         ("coarse_sigma_m = 20.0", "coarse_sigma_m = 0.0", "above 0"),
+        ("[0.0, 120.0, 240.0]", "[0.0, 0.01, 180.0]", "the suns lie in one plane"),
+        ("sun_azimuth_deg = 20.0, sun_elevation_deg = 5.0", "sun_azimuth_deg = 120.0", "the suns lie in one plane"),
+        ("altimetry = \"laser.csv\"", "altimetry = \"lazer.csv\"", "lazer.csv"),
         ("coarse_sigma_m = 20.0", "", "needs `coarse_sigma_m`"),
         ("samples = 0", "sample = 0", "samples"),
         ("dem = \"held\"", "dem = \"hold\"", "did you mean"),
@@ -165,6 +212,10 @@ fn val_wrong_items_are_refused() {
         assert_ne!(changed, study());
         write(folder.path(), "study.toml", &changed);
         let call = sastrugi_in(folder.path(), &["run", "study.toml", "-o", "release", "--quiet"]);
-        assert!(call.code == 2 && call.stderr.contains(words), "{after}: {} {}", call.code, call.stderr);
+        let told: String = call.stderr.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ");
+        let code = if words == "lazer.csv" { 65 } else { 2 };
+        assert!(call.code == code && told.contains(words), "{after}: {} {}", call.code, call.stderr);
+        let call = sastrugi_in(folder.path(), &["plan", "study.toml", "-o", "release"]);
+        assert_eq!(call.code, code, "{after}: {}", call.stderr);
     }
 }

@@ -165,7 +165,7 @@ pub enum Verb {
         after_help = "Cameras: nadir (straight down on all of it), nadir:PIXEL_M, parallel:AZIMUTH,ELEVATION[,PIXEL_M] (parallel rays from\n\
         there), pinhole:X,Y,Z,TO_X,TO_Y,TO_Z[,FIELD_OF_VIEW_DEG] (z above the ground; `--set camera.above_ground=false`: heights).\n\
         The albedo is that of DEM.albedo.tif beside the DEM, or of the generator's map, where there is one; else 0.25.\n\
-        A GeoTIFF holds the brightness (I/F), with sun and camera in a .json beside it; a PNG is to look at.\n\n\
+        A GeoTIFF holds the brightness (I/F), with sun and camera in a .json beside it; a PNG shows it in 8-bit grey.\n\n\
         Examples:\n  sastrugi render site.tif --sun 120,20 -o site-morning.tif\n  \
         sastrugi render planetary --set-surface size_m='[20, 20]' --seed 3 --sun 90,15 -o mars.png\n  \
         sastrugi render mars.tif --camera parallel:200,40,0.05 --set noise.relative=0.01 -o oblique.tif\n  \
@@ -175,9 +175,10 @@ pub enum Verb {
     /// Recover heights and albedo from three or more registered images of one surface under different suns.
     #[command(
         after_help = "IMAGES.toml lists the JSON files beside the images that `render` writes, `images = [\"a.json\", ...]`, or describes\n\
-        images with the same keys in [[image]]; `coarse` and `coarse_sigma_m` add a coarse DEM, `truth` a surface to compare with,\n\
-        [settings] anything of `sastrugi kinds photoclinometry`. Beside DEM.tif stand DEM.albedo.tif, DEM.uncertainty.tif\n\
-        (standard deviation of heights) and DEM.lit.tif (images that show a cell lit).\n\n\
+        images with the same keys in [[image]]; `coarse` and `coarse_sigma_m` add a coarse DEM, `altimetry` measured points\n\
+        (CSV: x, y, z, sigma), `truth` a surface to compare with, [settings] anything of `sastrugi kinds photoclinometry`. Beside\n\
+        DEM.tif stand DEM.albedo.tif, standard deviations (.uncertainty.tif of heights, .slope-sigma.tif, .albedo-sigma.tif),\n\
+        DEM.condition.tif, DEM.lit.tif (images that show a cell lit) and DEM.leaning.tif.\n\n\
         Examples:\n  sastrugi photoclinometry images.toml -o dem.tif\n  \
         sastrugi photoclinometry images.toml --set cell_m=2 --set free_exposure=true --set stereo='{}' -o dem.tif"
     )]

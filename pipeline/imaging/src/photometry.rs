@@ -49,7 +49,12 @@ impl Photometry {
     pub fn check(&self) -> Result<(), ParameterError> {
         ParameterError::not_negative("lambert", self.lambert)?;
         ParameterError::not_negative("lommel_seeliger", self.lommel_seeliger)?;
-        ParameterError::positive("lambert", self.lambert + self.lommel_seeliger).map(|_| ())
+        if self.lambert + self.lommel_seeliger == 0.0 {
+            let message =
+                "is 0, and so is `lommel_seeliger`: the ground would reflect nothing; one weight must be above 0";
+            return Err(ParameterError::new("lambert", message));
+        }
+        Ok(())
     }
 
     /// Brightness of a facet of albedo 1 by its two cosines; 0 where it is turned away from light or view.

@@ -169,7 +169,11 @@ impl CameraParameters {
     pub fn pose(&self, heights: &Grid) -> Result<CameraPose, ParameterError> {
         self.check()?;
         let pose = match *self {
-            Self::Nadir { pixel_m } => nadir(heights, pixel_m.unwrap_or(heights.geometry.mean_cell())),
+            Self::Nadir { pixel_m } => {
+                let pixel_m = pixel_m.unwrap_or(heights.geometry.mean_cell());
+                check_fits(heights, pixel_m)?;
+                nadir(heights, pixel_m)
+            }
             Self::Parallel { azimuth_deg, elevation_deg, pixel_m, size_px, target_m } => {
                 let pixel_m = pixel_m.unwrap_or(heights.geometry.mean_cell());
                 let target_m = target_m.map(|at| on_ground(heights, "target_m", [at[0], at[1], 0.0])).transpose()?;
@@ -307,6 +311,17 @@ fn check_above(heights: &Grid, [x, y, z]: Vector) -> Result<(), ParameterError> 
         }
         _ => Ok(()),
     }
+}
+
+/// Refuses pixels that a surface does not fill.
+fn check_fits(heights: &Grid, pixel_m: f64) -> Result<(), ParameterError> {
+    let [east, north] = heights.geometry.size();
+    if pixel_m <= east.min(north) * (1.0 + PIXEL_TOLERANCE) {
+        return Ok(());
+    }
+    let message =
+        format!("is {} m; the surface, {} x {} m, does not fill a pixel", shown(pixel_m), shown(east), shown(north));
+    Err(ParameterError::new("pixel_m", message))
 }
 
 fn check_pixel(pixel_m: Option<f64>) -> Result<(), ParameterError> {

@@ -4,6 +4,7 @@ use crate::job::ItemRef;
 use crate::operations::drawn::{Drawn, Routes};
 use crate::runner::graph::{Graph, InputFile, Node};
 use crate::study::{Entry, Study, StudyError};
+use sastrugi_imaging::Sun;
 use sastrugi_numeric::{Geometry, Streams};
 use sastrugi_schemas::fit::Source;
 use sastrugi_schemas::study::Pairing;
@@ -12,7 +13,19 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 /// Suffixes that files of the release add to an id.
-const RESERVED: [&str; 7] = ["raw", "metric", "background", "residual", "mask", "uncertainty", "lit"];
+const RESERVED: [&str; 11] = [
+    "raw",
+    "metric",
+    "background",
+    "residual",
+    "mask",
+    "uncertainty",
+    "lit",
+    "slope-sigma",
+    "albedo-sigma",
+    "condition",
+    "leaning",
+];
 
 /// Why a study has no graph.
 #[derive(Debug, thiserror::Error)]
@@ -63,7 +76,7 @@ impl Heightfield {
 }
 
 /// An image that other items can refer to.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Image {
     /// Its id.
     pub id: String,
@@ -71,6 +84,8 @@ pub struct Image {
     pub item: ItemRef,
     /// Id of the surface that it shows.
     pub surface: String,
+    /// Sun that lights it.
+    pub sun: Sun,
 }
 
 /// A graph under construction, with what later sections refer to.

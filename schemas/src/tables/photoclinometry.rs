@@ -65,7 +65,7 @@ super::table! {
         height_error_rms_detrended_m: f64 ["m"],
         /// Rms height of the true surface.
         height_rms_m: f64 ["m"],
-        /// Recovered heights in the release, GeoTIFF; `.albedo.tif`, `.uncertainty.tif` and `.lit.tif` beside it have its name.
+        /// Recovered heights in the release, GeoTIFF; its maps (`.albedo.tif` and others) have its name.
         path: String [""],
     }
 }
@@ -89,6 +89,10 @@ super::table! {
         truth_rms_m: f64 ["m"],
         /// Rms height of the recovered surface in the band.
         recovered_rms_m: f64 ["m"],
+        /// Rms slope of the true surface in the band: length of the gradient, from squared heights times the squared angular wavenumber.
+        truth_slope_rms: f64 ["1"],
+        /// Rms slope of the recovered surface in the band.
+        recovered_slope_rms: f64 ["1"],
         /// Covariance of both in the band.
         covariance_m2: f64 ["m2"],
         /// Squared coherence of both in the band, 0 to 1.

@@ -12,7 +12,12 @@ use std::path::Path;
 
 /// `render`.
 pub fn render(args: &Render, common: &Common) -> Verdict {
-    let [azimuth_deg, elevation_deg] = numbers::<2>("--sun", &args.sun)?;
+    let [azimuth_deg, elevation_deg] = numbers::<2>("--sun", &args.sun).map_err(|_| {
+        Error::Usage(format!(
+            "`--sun {}`: it takes azimuth and elevation in degrees, as `--sun 120,20` for a sun in the south-east, 20 degrees above the horizon",
+            args.sun
+        ))
+    })?;
     let mut params = json!({
         "sun": { "azimuth_deg": azimuth_deg, "elevation_deg": elevation_deg },
         "camera": camera(&args.camera, args.size.as_deref())?,

@@ -3,26 +3,34 @@
 //! What an image should show of the integrated surface, `m`, and what it shows, `I`, are joined by `I = E m + H`: a weighted regression over lit
 //! cells. Slopes of single cells would fit any exposure; those of one surface do not, for most of their errors are no gradient.
 //! What is left undetermined is held: the common factor of all exposures (it is the albedo's), and the mean plane of the surface, which exposures
-//! of differently lit images imitate, unless constraints on heights tell it.
+//! of differently lit images imitate. Constraints on heights tell it: the plane through what they have above or below the surface of the
+//! slopes alone is added to it.
 
 use super::observation::{Calibration, Relief, Stack};
 use crate::photometry::Photometry;
 use rayon::prelude::*;
 use sastrugi_numeric::{Geometry, sums};
 
-/// Slopes of the least-squares plane through heights on the whole map.
+/// Points nearer to one line than this determine no plane: product of the variances along their axes over the square of their sum.
+const COLLINEAR: f64 = 1e-4;
+
+/// Slopes of the least-squares plane through the known heights of a map; 0 where they determine none.
 pub fn plane(g: &Geometry, heights_m: &[f64]) -> [f64; 2] {
-    let slope = |axis: usize| {
-        let n = [g.cols, g.rows][axis];
-        let centred = |k: usize| {
-            let at = if axis == 0 { k % g.cols } else { g.rows - 1 - k / g.cols };
-            (at as f64 - 0.5 * (n - 1) as f64) * g.cell[axis]
-        };
-        let products: Vec<f64> = heights_m.iter().enumerate().map(|(k, z)| centred(k) * z).collect();
-        let squares: Vec<f64> = (0..g.len()).map(|k| centred(k) * centred(k)).collect();
-        sums::sum(&products) / sums::sum(&squares)
-    };
-    [slope(0), slope(1)]
+    let known = heights_m.iter().enumerate().filter(|(_, z)| z.is_finite());
+    let points: Vec<[f64; 4]> = known.map(|(k, z)| [g.x(k % g.cols), g.y(k / g.cols), *z, 1.0]).collect();
+    plane_through(&points).unwrap_or_default()
+}
+
+/// Slopes of the least-squares plane through points `[x, y, z, weight]`; `None` for fewer than three, or points nearly on a line.
+pub fn plane_through(points: &[[f64; 4]]) -> Option<[f64; 2]> {
+    let total = |f: &dyn Fn(&[f64; 4]) -> f64| sums::sum(&points.iter().map(f).collect::<Vec<_>>());
+    let weight = total(&|p| p[3]);
+    let middle = [0, 1, 2].map(|axis| total(&|p| p[3] * p[axis]) / weight);
+    let product = |a: usize, b: usize| total(&|p| p[3] * (p[a] - middle[a]) * (p[b] - middle[b]));
+    let (xx, xy, yy, xz, yz) = (product(0, 0), product(0, 1), product(1, 1), product(0, 2), product(1, 2));
+    let determinant = xx * yy - xy * xy;
+    let spread = determinant > COLLINEAR * (xx + yy) * (xx + yy);
+    (points.len() >= 3 && spread).then(|| [(yy * xz - xy * yz) / determinant, (xx * yz - xy * xz) / determinant])
 }
 
 /// Brightness that an image with exposure 1 and no haze would show of a cell.

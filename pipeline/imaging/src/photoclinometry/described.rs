@@ -4,8 +4,8 @@ use super::observation::Image;
 use super::params::Settings;
 use crate::camera::Camera;
 use crate::description::ImageDescription;
-use crate::direction::direction;
 use crate::pose::CameraPose;
+use crate::sun::Sun;
 use sastrugi_numeric::Geometry;
 use sastrugi_schemas::{ParameterError, shown};
 use schemars::JsonSchema;
@@ -33,6 +33,14 @@ pub struct FirstImageErrors {
 }
 
 impl FirstImageErrors {
+    /// The sun of the first image with its errors.
+    pub fn sun(&self, sun: Sun) -> Sun {
+        Sun {
+            azimuth_deg: sun.azimuth_deg + self.sun_azimuth_deg,
+            elevation_deg: sun.elevation_deg + self.sun_elevation_deg,
+        }
+    }
+
     /// # Errors
     /// A number that is not finite, or an exposure of 0 or less.
     pub fn check(&self) -> Result<(), ParameterError> {
@@ -55,14 +63,12 @@ pub fn images(described: Vec<(ImageDescription, Vec<f64>)>, errors: &FirstImageE
         let (mut sun, mut pose) = (description.sun, description.camera);
         let (mut exposure, mut haze) = (description.exposure, description.haze);
         if k == 0 {
-            sun.azimuth_deg += errors.sun_azimuth_deg;
-            sun.elevation_deg += errors.sun_elevation_deg;
+            sun = errors.sun(sun);
             exposure *= 1.0 + errors.exposure;
             haze += errors.haze;
             pose = shifted(pose, errors.shift_m);
         }
-        let light = direction(sun.azimuth_deg, sun.elevation_deg);
-        Image { camera: pose.camera(), light, exposure, haze, brightness }
+        Image { camera: pose.camera(), light: sun.direction(), exposure, haze, brightness }
     };
     described.into_iter().enumerate().map(of).collect()
 }
@@ -107,13 +113,29 @@ pub fn map(poses: &[CameraPose], level_m: f64, settings: &Settings) -> Result<Ge
     let count = |low: f64, high: f64| ((high - low) / cell + ROUNDING).floor();
     let (cols, rows) = (count(x0, x1), count(y0, y1));
     if !(cols >= 4.0 && rows >= 4.0) {
-        let what = if settings.window_m.is_some() { "the window" } else { "what all images show" };
-        return Err(ParameterError::new("window_m", format!("{what} is smaller than 4 x 4 cells of {cell} m")));
+        return Err(too_small([x0, y0, x1, y1], cell, settings.window_m.is_some()));
     }
     if cols > SIDE_MAX as f64 || rows > SIDE_MAX as f64 {
         return Err(ParameterError::new("cell_m", format!("is {cell}; the map would have {cols} x {rows} cells")));
     }
     Ok(Geometry { rows: rows as usize, cols: cols as usize, cell: [cell; 2], origin: [x0, y0] })
+}
+
+/// A map, given or common to all images, of fewer than 4 x 4 cells.
+fn too_small([x0, y0, x1, y1]: [f64; 4], cell: f64, given: bool) -> ParameterError {
+    let size = format!("{} x {} m", shown(x1 - x0), shown(y1 - y0));
+    let least = format!("a map has at least 4 x 4 cells of {} m", shown(cell));
+    let overlap = x1 > x0 && y1 > y0;
+    match (given, overlap) {
+        (true, _) => ParameterError::new("window_m", format!("spans {size}; {least}")),
+        (false, true) => ParameterError::new(
+            "cell_m",
+            format!("is too large: the ground that all images show spans {size}; {least}"),
+        ),
+        (false, false) => {
+            ParameterError::new("images", "have no ground in common: no place is in the footprint of all of them")
+        }
+    }
 }
 
 /// Rectangle around what an image shows of level ground; without bounds where a corner looks above the horizon.
@@ -181,7 +203,22 @@ mod tests {
         };
         assert_eq!(map(&[pinhole], 0.0, &Settings::default()).unwrap_err().key, "cell_m");
         let apart = [parallel(90.0, 0.0), parallel(90.0, 500.0)];
-        assert_eq!(map(&apart, 3.0, &Settings::default()).unwrap_err().key, "window_m");
+        let of = |settings: &Settings| map(&apart, 3.0, settings).unwrap_err().to_string();
+        assert_eq!(
+            of(&Settings::default()),
+            "`images` have no ground in common: no place is in the footprint of all of them"
+        );
+        let window_m = Some([0.0, 0.0, 1.5, 20.0]);
+        assert_eq!(
+            of(&Settings { window_m, ..Settings::default() }),
+            "`window_m` spans 1.5 x 20 m; a map has at least 4 x 4 cells of 0.5 m"
+        );
+        let words =
+            map(&apart[..1], 3.0, &Settings { cell_m: Some(9.0), ..Settings::default() }).unwrap_err().to_string();
+        assert_eq!(
+            words,
+            "`cell_m` is too large: the ground that all images show spans 30 x 20 m; a map has at least 4 x 4 cells of 9 m"
+        );
         let huge = Settings { cell_m: Some(1e-6), ..Settings::default() };
         assert_eq!(map(&apart[..1], 3.0, &huge).unwrap_err().key, "cell_m");
     }

@@ -57,6 +57,10 @@ pub struct Band {
     pub truth_rms_m: f64,
     /// Rms height of the result, m.
     pub recovered_rms_m: f64,
+    /// Rms slope of the truth (length of the gradient), 1.
+    pub truth_slope_rms: f64,
+    /// Rms slope of the result, 1.
+    pub recovered_slope_rms: f64,
     /// Covariance of both, m2.
     pub covariance_m2: f64,
     /// Squared coherence: covariance squared over both variances.
@@ -154,7 +158,9 @@ pub fn evaluate(
 /// Slopes of every cell from the heights beside it; NaN beside missing heights.
 fn slopes(heights: &Grid) -> [Vec<f64>; 2] {
     let relief = Relief { geometry: &heights.geometry, heights_m: &heights.values };
-    let all: Vec<[f64; 2]> = (0..heights.values.len()).map(|k| relief.slopes(k)).collect();
+    let known = |k: usize| relief.edges(k).iter().flatten().all(|slope| slope.is_finite());
+    let of = |k: usize| if known(k) { relief.slopes(k) } else { [f64::NAN; 2] };
+    let all: Vec<[f64; 2]> = (0..heights.values.len()).map(of).collect();
     [0, 1].map(|axis| all.iter().map(|s| s[axis]).collect())
 }
 
@@ -177,7 +183,8 @@ fn detrended(g: &Geometry, cells: &[usize], values: &[f64]) -> Vec<f64> {
 }
 
 /// Both surfaces by octave of wavelength, from two cells upwards: heights less the plane of their common cells, missing cells 0, under a Hann window
-/// (its mean square divided out).
+/// (its mean square divided out). The squared slope of a mode of frequency `f` (cycles/m) is its squared height times `(2 pi f)^2`: the length of the
+/// gradient, both axes together. The window spreads every mode over its neighbours, which adds `4 pi^2 / 3` per squared side of the map to that factor.
 pub fn bands(truth: &Grid, recovered: &Grid) -> Vec<Band> {
     let g = &recovered.geometry;
     let (fine, finer) = aligned(truth, g);
@@ -200,7 +207,7 @@ pub fn bands(truth: &Grid, recovered: &Grid) -> Vec<Band> {
     let longest = g.size()[0].max(g.size()[1]);
     let shortest = 2.0 * g.cell[0].max(g.cell[1]);
     let octaves = (libm::log2(longest / shortest).ceil() as usize).max(1);
-    let mut totals = vec![([0.0; 3], 0usize); octaves];
+    let mut totals = vec![([0.0; 5], 0usize); octaves];
     for kx in 0..a.half_cols() {
         for ky in 0..g.rows {
             let fx = kx as f64 / g.size()[0];
@@ -213,21 +220,27 @@ pub fn bands(truth: &Grid, recovered: &Grid) -> Vec<Band> {
             let (u, v) = (a.values[kx * g.rows + ky], b.values[kx * g.rows + ky]);
             let times = norm * a.multiplicity(kx);
             let (sums, modes) = &mut totals[(libm::log2(ratio.max(1.0)) as usize).min(octaves - 1)];
-            let products = [u.norm_sqr(), v.norm_sqr(), (u * v.conj()).re];
+            let wavenumber = 2.0 * std::f64::consts::PI * frequency;
+            let (truth, result) = (u.norm_sqr(), v.norm_sqr());
+            let steep = wavenumber * wavenumber;
+            let products = [truth, result, (u * v.conj()).re, steep * truth, steep * result];
             sums.iter_mut().zip(products).for_each(|(s, p)| *s += times * p);
             *modes += 1;
         }
     }
-    let band = |(octave, ([truth, result, product], modes)): (usize, ([f64; 3], usize))| Band {
-        octave,
-        wavelength_min_m: shortest * (1u64 << octave) as f64,
-        wavelength_max_m: shortest * (2u64 << octave) as f64,
-        modes,
-        truth_rms_m: truth.sqrt(),
-        recovered_rms_m: result.sqrt(),
-        covariance_m2: product,
-        coherence: if truth * result > 0.0 { product * product / (truth * result) } else { 0.0 },
-    };
+    let band =
+        |(octave, ([truth, result, product, truth_steep, result_steep], modes)): (usize, ([f64; 5], usize))| Band {
+            octave,
+            wavelength_min_m: shortest * (1u64 << octave) as f64,
+            wavelength_max_m: shortest * (2u64 << octave) as f64,
+            modes,
+            truth_rms_m: truth.sqrt(),
+            recovered_rms_m: result.sqrt(),
+            truth_slope_rms: truth_steep.sqrt(),
+            recovered_slope_rms: result_steep.sqrt(),
+            covariance_m2: product,
+            coherence: if truth * result > 0.0 { product * product / (truth * result) } else { 0.0 },
+        };
     totals.into_iter().enumerate().filter(|(_, (_, modes))| *modes > 0).map(band).collect()
 }
 

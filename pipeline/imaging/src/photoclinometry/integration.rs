@@ -224,6 +224,23 @@ impl System {
         self.constraints.iter().map(|c| c.sigma_m).collect()
     }
 
+    /// True where constraints hold the heights.
+    pub fn tied(&self) -> bool {
+        !self.constraints.is_empty()
+    }
+
+    /// What each constraint asks for above given heights, as points `[x, y, height, weight]` at the middle of its cells.
+    pub fn residuals(&self, heights_m: &[f64]) -> Vec<[f64; 4]> {
+        let g = &self.geometry;
+        let one = |c: &Constraint| {
+            let total: f64 = c.cells.iter().map(|(_, weight)| weight).sum();
+            let mean = |f: &dyn Fn(usize) -> f64| c.cells.iter().map(|&(k, weight)| weight * f(k)).sum::<f64>() / total;
+            let (x, y) = (mean(&|k| g.x(k % g.cols)), mean(&|k| g.y(k / g.cols)));
+            [x, y, c.height_m - c.of(heights_m), 1.0 / (c.sigma_m * c.sigma_m)]
+        };
+        self.constraints.iter().map(one).collect()
+    }
+
     /// Solves for a right-hand side, from heights given or from 0.
     pub fn solve(&self, right: &[f64], start: Option<&[f64]>, stop: Stop) -> Integrated {
         let mut z = start.map_or_else(|| vec![0.0; right.len()], <[f64]>::to_vec);

@@ -12,8 +12,9 @@
 //!
 //! # What it stands on
 //! * Fewer than three images, or lights in one plane with the ground, are refused; cells that fewer than three images show lit have a prior and are
-//!   marked (raster of lit images).
-//! * A tilt and the exposures trade off, as do relief and haze: free exposures keep the mean plane of the start unless constraints hold it.
+//!   marked (raster of lit images). With more than half of the cells marked nothing is recovered, unless `leaning_max` or a known albedo says so.
+//! * A tilt and the exposures trade off, as do relief and haze: free exposures keep the mean plane of the start, or take that of constraints on heights,
+//!   three points or more. With exposures held, points move only the ground around them.
 //! * Brightness is that of single scattering on facets: no light from neighbours, no opposition surge.
 //!
 //! Cost: per round and cell, about 4 steps of least squares over the images and 20 iterations of conjugate gradients. Memory: about
@@ -44,4 +45,4 @@ pub use cosine::CosinePoisson;
 pub use integration::{Constraint, HeightPoint};
 pub use observation::{Calibration, Image, Observed, Relief};
 pub use params::{Integration, Settings, Stereo};
-pub use recover::{Coarse, Known, RecoverError, Recovered, Round, recover};
+pub use recover::{Coarse, Known, RecoverError, Recovered, Round, check_lights, recover};

@@ -72,7 +72,7 @@ pub struct Observed {
 pub struct Relief<'a> {
     /// The map.
     pub geometry: &'a Geometry,
-    /// Height of every cell, m.
+    /// Height of every cell, m; NaN where it is unknown.
     pub heights_m: &'a [f64],
 }
 
@@ -83,9 +83,13 @@ impl Relief<'_> {
         [g.x(k % g.cols), g.y(k / g.cols), self.heights_m[k]]
     }
 
-    /// Slopes at a cell from the heights beside it: half the rise over both edges, one edge at a border.
+    /// Slopes at a cell from the heights beside it: half the rise over both edges, one edge at a border and beside an unknown height; NaN where the
+    /// cell itself has no height.
     pub fn slopes(&self, k: usize) -> [f64; 2] {
-        let [west, east, south, north] = self.edges(k);
+        if self.heights_m[k].is_nan() {
+            return [f64::NAN; 2];
+        }
+        let [west, east, south, north] = self.edges(k).map(|edge| edge.filter(|slope| slope.is_finite()));
         let mean = |a: Option<f64>, b: Option<f64>| match (a, b) {
             (Some(a), Some(b)) => 0.5 * (a + b),
             (a, b) => a.or(b).unwrap_or(0.0),

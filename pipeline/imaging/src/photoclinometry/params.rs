@@ -3,7 +3,7 @@
 use super::described::FirstImageErrors;
 use crate::description::Noise;
 use crate::photometry::Photometry;
-use sastrugi_schemas::ParameterError;
+use sastrugi_schemas::{ParameterError, shown};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -23,7 +23,8 @@ pub enum Integration {
     /// Weighted least squares over the whole map.
     #[default]
     Poisson,
-    /// Outward from the centre, averaged over random paths, as published; constraints on heights do not count.
+    /// Outward from the centre, averaged over random paths, as published; constraints on heights do not count, and cells that no path reaches have
+    /// no height.
     Paths,
 }
 
@@ -83,6 +84,9 @@ pub struct Settings {
     pub stereo: Option<Stereo>,
     /// Cells whose slopes and albedo are worse conditioned than this get the prior of poorly lit cells.
     pub condition_max: f64,
+    /// Largest share of the cells that may take their albedo from their neighbours, 0 to 1; an inversion with more is refused. Does not count where
+    /// `albedo` is given.
+    pub leaning_max: f64,
     /// Standard deviation of the slopes of poorly lit cells about those of the surface so far.
     pub slope_prior: f64,
     /// Perturbed solutions behind the uncertainty of heights; 0 leaves it out.
@@ -108,6 +112,7 @@ impl Default for Settings {
             paths: 64,
             stereo: None,
             condition_max: 300.0,
+            leaning_max: 0.5,
             slope_prior: 0.3,
             samples: 32,
         }
@@ -133,6 +138,10 @@ impl Settings {
         }
         within("paths", self.paths, 1, PATHS_MAX)?;
         ParameterError::positive("condition_max", self.condition_max)?;
+        if !(0.0..=1.0).contains(&self.leaning_max) {
+            let message = format!("is {}; it must lie between 0 and 1", shown(self.leaning_max));
+            return Err(ParameterError::new("leaning_max", message));
+        }
         ParameterError::positive("slope_prior", self.slope_prior)?;
         within("samples", self.samples, 0, SAMPLES_MAX)?;
         self.stereo.map_or(Ok(()), |s| s.check().map_err(|e| e.within("stereo")))

@@ -10,6 +10,7 @@ use super::paths::integrate_along_paths;
 use super::stereo;
 use super::uncertainty;
 use crate::description::Noise;
+use crate::direction::Vector;
 use crate::photometry::Photometry;
 use rayon::prelude::*;
 use sastrugi_numeric::{Geometry, Grid, Streams, sums};
@@ -62,7 +63,7 @@ pub struct Round {
 /// What the images tell.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recovered {
-    /// Heights, m; NaN where no image shows the cell.
+    /// Heights, m; NaN where no image shows the cell, or no path reaches it.
     pub heights: Grid,
     /// Slopes of the least squares, before they are made one surface.
     pub slopes: Vec<[f64; 2]>,
@@ -103,7 +104,8 @@ pub enum RecoverError {
     TooFewImages(usize),
     /// Lights lie in one plane.
     #[error(
-        "the lights lie in one plane (smallest over largest singular value: {ratio:.1e}), so the slope across it cannot be separated from albedo"
+        "the suns lie in one plane (smallest over largest singular value: {ratio:.1e}), so the slope across it cannot be separated from albedo; \
+         spread them in azimuth, as 0, 120 and 240 deg"
     )]
     CoplanarLights {
         /// Least over greatest singular value of the unit vectors to the lights.
@@ -131,6 +133,35 @@ pub enum RecoverError {
     /// No cell is lit in three images.
     #[error("no cell is lit in three images")]
     NothingLit,
+    /// No cell is conditioned well enough.
+    #[error(
+        "no cell has a condition number below {condition_max} (the least is {least:.0}): spread the suns in azimuth (0, 120, 240 deg), or give `albedo` \
+         if it is known"
+    )]
+    NothingFirm {
+        /// Least condition number of a cell.
+        least: f64,
+        /// What it must be below.
+        condition_max: f64,
+    },
+    /// Most cells take their albedo from others.
+    #[error(
+        "{percent:.0} % of the cells would take their albedo from their neighbours ({dark:.0} % are lit in fewer than three images, {ill:.0} % have a \
+         condition number above {condition_max}), at most {most:.0} % may: use three or more suns spread in azimuth (0, 120, 240 deg) that light most of \
+         the ground, give `albedo` if it is known, or raise `leaning_max`"
+    )]
+    MostlyLeaning {
+        /// Share of the cells shown, %.
+        percent: f64,
+        /// Those that fewer than three images show lit, %.
+        dark: f64,
+        /// Those whose equations are badly conditioned, %.
+        ill: f64,
+        /// Condition number from which equations are.
+        condition_max: f64,
+        /// Largest share allowed, %.
+        most: f64,
+    },
 }
 
 /// Heights and albedo on the cells of `start`, whose heights are where the rounds begin.
@@ -169,7 +200,6 @@ fn check(images: &[Image], start: &Grid, known: &Known) -> Result<(), RecoverErr
     if points.into_iter().any(|v| !v.is_finite()) || sigmas.into_iter().any(|s| !s.is_finite() || s <= 0.0) {
         return Err(RecoverError::NotFinite("a known height or its standard deviation".to_owned()));
     }
-    let mut normal = Symmetric3::default();
     for (k, image) in images.iter().enumerate() {
         let [rows, cols] = image.camera.shape();
         if image.brightness.len() != rows * cols {
@@ -185,8 +215,17 @@ fn check(images: &[Image], start: &Grid, known: &Known) -> Result<(), RecoverErr
         if image.light[2] <= 0.0 {
             return Err(RecoverError::SunBelowHorizon(k + 1));
         }
-        normal.add(image.light, 1.0);
     }
+    check_lights(&images.iter().map(|image| image.light).collect::<Vec<_>>())
+}
+
+/// Refuses unit vectors to lights that lie in one plane.
+///
+/// # Errors
+/// Lights in one plane.
+pub fn check_lights(lights: &[Vector]) -> Result<(), RecoverError> {
+    let mut normal = Symmetric3::default();
+    lights.iter().for_each(|light| normal.add(*light, 1.0));
     let ratio = 1.0 / normal.condition();
     if ratio < COPLANAR { Err(RecoverError::CoplanarLights { ratio }) } else { Ok(()) }
 }
@@ -212,6 +251,8 @@ struct Inversion<'a> {
     noise_scale: f64,
     heights_m: Vec<f64>,
     cells: Vec<Option<Cell>>,
+    /// Cells with slopes that no path reached, in any round.
+    unreached: Vec<bool>,
     system: Option<System>,
     rounds: Vec<Round>,
     converged: bool,
@@ -243,6 +284,7 @@ impl<'a> Inversion<'a> {
             noise_scale: 1.0,
             heights_m: start.values.clone(),
             cells: vec![None; g.len()],
+            unreached: vec![false; g.len()],
             system: None,
             rounds: Vec::new(),
             converged: false,
@@ -295,6 +337,7 @@ impl<'a> Inversion<'a> {
             noise: self.noise,
         };
         let cells = self.fit_cells(&stack, relief)?;
+        self.check_leaning(&cells)?;
         let scale = self.estimated_noise(&cells);
         let slopes: Vec<[f64; 2]> = cells.iter().map(|cell| cell.map_or([0.0; 2], |c| c.fit.slopes)).collect();
         let information = information(&self.geometry, &cells);
@@ -305,11 +348,13 @@ impl<'a> Inversion<'a> {
         let system = System::new(self.geometry, &information, constraints);
         let (mut heights_m, iterations) = self.integrate(&system, &slopes, &information);
         if !tied || self.settings.integration == Integration::Paths {
-            let shift = sums::mean(&self.start.values) - sums::mean(&heights_m);
+            let shift = sums::mean(&self.start.values) - sums::mean(&sums::finite(&heights_m));
             heights_m.iter_mut().for_each(|z| *z += shift);
         }
         let change: Vec<f64> = heights_m.iter().zip(&self.heights_m).map(|(a, b)| (a - b) * (a - b)).collect();
-        let change_m = sums::mean(&change).sqrt();
+        let change_m = sums::mean(&sums::finite(&change)).sqrt();
+        let unreached: Vec<bool> =
+            (0..heights_m.len()).map(|k| self.unreached[k] || (cells[k].is_some() && heights_m[k].is_nan())).collect();
         let predicted = Relief { geometry: &self.geometry, heights_m: &heights_m };
         let albedo: Vec<f64> = cells.iter().map(|c| c.map_or(f64::NAN, |c| c.fit.albedo)).collect();
         let brightness_rms = calibration::brightness_rms(&stack, &self.photometry, predicted, &albedo);
@@ -317,7 +362,7 @@ impl<'a> Inversion<'a> {
         let mut drift = 0.0;
         let mut calibrations = self.calibrations.clone();
         if free {
-            let plane = (!tied).then(|| calibration::plane(&self.geometry, &self.start.values));
+            let plane = self.mean_plane(&system, &slopes, &information);
             let free = [self.settings.free_exposure, self.settings.free_haze];
             let next = calibration::update(&stack, &self.photometry, predicted, &albedo, plane, free);
             drift = calibration::drift(&calibrations, &next);
@@ -327,8 +372,43 @@ impl<'a> Inversion<'a> {
         self.converged = rests && drift < CALIBRATION_TOLERANCE;
         self.rounds.push(Round { brightness_rms, change_m, iterations, stereo_points: points.len() });
         self.noise_scale = scale;
+        self.unreached = unreached;
         (self.cells, self.heights_m, self.system, self.calibrations) = (cells, heights_m, Some(system), calibrations);
         Ok(())
+    }
+
+    /// Mean plane that exposures are fitted to: that of the start without constraints; otherwise that of the slopes alone, tilted as the constraints
+    /// ask. `None` where constraints determine no tilt, or hazes alone are free: then the surface stays as it is.
+    fn mean_plane(&self, system: &System, slopes: &[[f64; 2]], information: &[Option<[f64; 3]>]) -> Option<[f64; 2]> {
+        if !system.tied() || self.settings.integration == Integration::Paths {
+            return Some(calibration::plane(&self.geometry, &self.start.values));
+        }
+        if !self.settings.free_exposure {
+            return None;
+        }
+        let alone = System::new(self.geometry, information, Vec::new());
+        let heights_m = alone.solve(&alone.right_side(slopes, &[]), None, Stop::COARSE).heights_m;
+        let [p, q] = calibration::plane(&self.geometry, &heights_m);
+        let tilt = calibration::plane_through(&system.residuals(&heights_m))?;
+        Some([p + tilt[0], q + tilt[1]])
+    }
+
+    /// Refuses an inversion that rests on the albedo of a few cells.
+    fn check_leaning(&self, cells: &[Option<Cell>]) -> Result<(), RecoverError> {
+        let shown = cells.iter().flatten().count() as f64;
+        let percent =
+            |of: &dyn Fn(&Cell) -> bool| 100.0 * cells.iter().flatten().filter(|c| of(c)).count() as f64 / shown;
+        let (leaning, most) = (percent(&|c| c.leaning), 100.0 * self.settings.leaning_max);
+        if self.settings.albedo.is_some() || leaning <= most {
+            return Ok(());
+        }
+        Err(RecoverError::MostlyLeaning {
+            percent: leaning,
+            dark: percent(&|c| c.leaning && c.lit < 3),
+            ill: percent(&|c| c.leaning && c.lit >= 3),
+            condition_max: self.settings.condition_max,
+            most,
+        })
     }
 
     /// Cells lit in three or more images first, then the others with the albedo of these around them.
@@ -346,15 +426,8 @@ impl<'a> Inversion<'a> {
             Some(Cell { fit, lit: samples.len().min(usize::from(u8::MAX)) as u8, leaning: prior.is_some() })
         };
         let cells = (0..self.geometry.len()).into_par_iter().with_min_len(256);
-        let firm: Vec<Option<Cell>> = cells
-            .clone()
-            .map_init(Vec::new, |samples, k| {
-                solve(k, samples, None).filter(|c| c.fit.condition < self.settings.condition_max)
-            })
-            .collect();
-        if firm.iter().all(Option::is_none) {
-            return Err(RecoverError::NothingLit);
-        }
+        let lit: Vec<Option<Cell>> = cells.clone().map_init(Vec::new, |samples, k| solve(k, samples, None)).collect();
+        let firm = self.firm(lit)?;
         let albedos: Vec<f64> = firm.iter().flatten().map(|c| c.fit.albedo).collect();
         let global = [sums::mean(&albedos), sums::variance(&albedos).sqrt()];
         Ok(cells
@@ -369,6 +442,17 @@ impl<'a> Inversion<'a> {
                 None => None,
             })
             .collect())
+    }
+
+    /// Cells lit in three or more images that are conditioned well enough.
+    fn firm(&self, mut lit: Vec<Option<Cell>>) -> Result<Vec<Option<Cell>>, RecoverError> {
+        let condition_max = self.settings.condition_max;
+        let least = lit.iter().flatten().map(|c| c.fit.condition).reduce(f64::min).ok_or(RecoverError::NothingLit)?;
+        if least >= condition_max {
+            return Err(RecoverError::NothingFirm { least, condition_max });
+        }
+        lit.iter_mut().for_each(|cell| *cell = cell.filter(|c| c.fit.condition < condition_max));
+        Ok(lit)
     }
 
     /// Root of the sum of squared residuals over its expectation.
@@ -410,9 +494,7 @@ impl<'a> Inversion<'a> {
             Integration::Paths => {
                 let good: Vec<bool> = information.iter().map(Option::is_some).collect();
                 let paths = self.settings.paths;
-                let mut heights = integrate_along_paths(&self.geometry, slopes, &good, paths, self.streams);
-                heights.iter_mut().filter(|z| z.is_nan()).for_each(|z| *z = 0.0);
-                (heights, 0)
+                (integrate_along_paths(&self.geometry, slopes, &good, paths, self.streams), 0)
             }
         }
     }
@@ -436,6 +518,12 @@ impl<'a> Inversion<'a> {
         let share = leaning.iter().filter(|l| **l).count() as f64 / g.len() as f64;
         if share > 0.0 {
             self.warnings.push(format!("{:.1} % of the cells lean on the albedo of their neighbours", 100.0 * share));
+        }
+        let unreached = self.unreached.iter().filter(|u| **u).count();
+        if unreached > 0 {
+            self.warnings.push(format!(
+                "no path from the centre reaches {unreached} cells behind holes: they have no height; `integration = \"poisson\"` does"
+            ));
         }
         if !self.converged {
             let last = self.rounds.last().map_or(f64::NAN, |r| r.change_m);

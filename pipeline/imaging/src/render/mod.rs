@@ -74,7 +74,7 @@ pub enum RenderError {
         value: f64,
     },
     /// No ray of the camera meets the surface.
-    #[error("the camera sees no ground")]
+    #[error("the camera sees no ground: all its rays pass the surface, or meet holes in it")]
     NothingSeen,
     /// A parameter is out of range, or the camera does not fit the surface.
     #[error(transparent)]

@@ -205,7 +205,8 @@ proptest! {
         }
     }
 
-    /// Shadows against a march to the sun.
+    /// Shadows against a march to the sun, in steps of 0.25 mm. Rays that pass within 1 mm of the ground are left out: over a step, or beside a hole in
+    /// it, steep ground falls by more than the march can tell.
     #[test]
     fn prop_shadows_are_those_of_a_slow_march(
         x in 0.6..7.2f64, y in 0.8..12.0f64, azimuth in 0.0..360.0f64, elevation in 0.1..80.0f64, holes: bool,
@@ -221,7 +222,7 @@ proptest! {
         let start = along(from.point_m, 1e-7, [0.0, 0.0, 1.0]);
         let steps = (0..60_000).map(|k| above(&heights, start, sun, f64::from(k) * 2.5e-4));
         let lowest = steps.filter(|f| f.is_finite()).skip(1).fold(f64::INFINITY, f64::min);
-        prop_assume!(!(-1e-4..1e-4).contains(&lowest) || lowest.is_infinite());
+        prop_assume!(!(-1e-3..1e-3).contains(&lowest) || lowest.is_infinite());
         prop_assert_eq!(fast, lowest < 0.0, "{}", lowest);
     }
 

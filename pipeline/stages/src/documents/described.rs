@@ -12,7 +12,7 @@ use serde_json::Value;
 pub const FOLDERS: [(&str, &str); 14] = [
     ("dem/", "measured inputs, and the same in metres (`.metric.tif`)"),
     ("mask/", "masks of the fits, obstacles of the routes"),
-    ("input/", "rasters and measured points that terrains are made with"),
+    ("input/", "rasters and measured points that terrains and recovered surfaces are made with"),
     ("terrain/", "generated heightfields, GeoTIFF, float32 metres, no data -9999; maps of the same cells beside them"),
     ("export/", "terrains to import into simulators: `export/<terrain>/<simulator>/README.md` says how"),
     ("texture/", "synthesised textures, GeoTIFF, float32 metres, no data -9999"),
@@ -28,7 +28,7 @@ pub const FOLDERS: [(&str, &str); 14] = [
     ),
     (
         "photoclinometry/",
-        "surfaces recovered from images, GeoTIFF, float32 metres, no data -9999; `.albedo.tif`, `.uncertainty.tif` (standard deviation of heights, m), `.lit.tif` (images that show a cell lit)",
+        "surfaces recovered from images, GeoTIFF, float32 metres, no data -9999; beside them `.albedo.tif`, standard deviations (`.uncertainty.tif` of heights, m; `.slope-sigma.tif`; `.albedo-sigma.tif`), `.condition.tif` (condition number), `.lit.tif` (images that show a cell lit), `.leaning.tif` (1 where the albedo leans on neighbours)",
     ),
     ("mcap/", "one recording per mission, run of a team, or recorded rover"),
     ("tables/", "Parquet, units and descriptions in the column metadata"),

@@ -70,7 +70,7 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
                 // Images differ by their noise, also those of one sweep and one explicit seed.
                 let number = (k * surfaces.len() + j) as u64;
                 let streams = builder.streams(STAGE, &id, envelope.seed, number);
-                let image = Image { item: ItemRef::new(STAGE, &id), id, surface: surface.clone() };
+                let image = Image { item: ItemRef::new(STAGE, &id), id, surface: surface.clone(), sun: parameters.sun };
                 add_one(builder, &entry, &envelope, one, (image, parameters.clone(), streams))?;
             }
         }

@@ -1,17 +1,18 @@
 //! Stage `photoclinometry`: a surface from its images.
 
 use super::image::{DESCRIPTION, IMAGE};
+use super::original::{self, INPUT_STAGE, Original};
 use super::rasters::{raster_options, raster_packing};
 use super::{fit, image};
-use crate::builder::{BuildError, Builder, HEIGHTS, Heightfield, Image, unknown_id};
+use crate::builder::{BuildError, Builder, HEIGHTS, Heightfield, Image, InputPlace, unknown_id};
 use crate::job::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work};
 use crate::operations::dem::input_error;
-use crate::operations::photoclinometry::{self, Beside, Files, Made, read_description, read_image, refusal};
+use crate::operations::photoclinometry::{self, Beside, Made, Map, read_description, read_image, read_points, refusal};
 use crate::revision::Room;
 use crate::runner::graph::Node;
 use crate::study::Entry;
 use crate::study::entry::{Expanded, joined};
-use sastrugi_imaging::photoclinometry::{Coarse, Settings};
+use sastrugi_imaging::photoclinometry::{Coarse, HeightPoint, Settings, check_lights};
 use sastrugi_numeric::{Streams, sums};
 use sastrugi_schemas::Kind;
 use sastrugi_schemas::kind::{read_parameters, schema_of};
@@ -23,8 +24,6 @@ use std::collections::BTreeSet;
 
 /// Name of the stage.
 pub const STAGE: &str = "photoclinometry";
-/// Maps beside the heights: albedo, standard deviation of heights, lit images.
-const MAPS: [&str; 3] = ["albedo.tif", "uncertainty.tif", "lit.tif"];
 /// Rough time of a cell of one image in a round, s.
 const SECONDS_PER_SAMPLE: f64 = 6e-7;
 /// Rough time of a cell in one perturbed solution, s.
@@ -47,10 +46,18 @@ struct PhotoclinometryJob {
     surface: (String, ItemRef),
     images: Vec<Image>,
     coarse: Option<(ItemRef, f64)>,
+    altimetry: Option<Altimetry>,
     settings: Settings,
     streams: Streams,
     cells: u64,
     geotiff: GeoTiff,
+}
+
+/// Measured points, a copy of a file beside the study.
+#[derive(Clone)]
+struct Altimetry {
+    item: ItemRef,
+    release_path: String,
 }
 
 /// Adds the items of `[[photoclinometry]]`, and the fits of what they recover.
@@ -63,12 +70,14 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
         entry.check_keys::<PhotoclinometryItem>(&params, &schema_of::<Settings>())?;
         let by_surface = images_by_surface(builder, &entry, &item)?;
         let coarse = coarse(builder, &entry, &item)?;
+        let altimetry = altimetry(builder, &entry, &item)?;
         let expanded = entry.expand(&item.id, None, &item.sweep, &params)?;
         let mut ids = Vec::new();
         for (k, one) in expanded.iter().enumerate() {
             let settings: Settings = read_parameters(&one.params).map_err(|e| entry.refuse(e))?;
             settings.check().map_err(|e| entry.refuse(e))?;
             for (j, (surface, images)) in by_surface.iter().enumerate() {
+                check_suns(&entry, images, &settings)?;
                 let id = if by_surface.len() == 1 { one.id.clone() } else { format!("{}-{surface}", one.id) };
                 builder.claim(&entry, STAGE, &id)?;
                 let number = (k * by_surface.len() + j) as u64;
@@ -82,6 +91,7 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
                     surface: (surface.clone(), field.item.clone()),
                     images: images.clone(),
                     coarse: coarse.clone(),
+                    altimetry: altimetry.clone(),
                     cells: cells(&field, &settings),
                     settings: settings.clone(),
                     streams,
@@ -118,7 +128,8 @@ fn add_one(
         geometry: None,
     };
     let images = job.images.iter().map(|i| &i.item);
-    let others = [&job.surface.1].into_iter().chain(job.coarse.as_ref().map(|(item, _)| item));
+    let known = [job.coarse.as_ref().map(|(item, _)| item), job.altimetry.as_ref().map(|points| &points.item)];
+    let others = [&job.surface.1].into_iter().chain(known.into_iter().flatten());
     let parents: BTreeSet<ItemRef> = others.chain(images).cloned().collect();
     let stream = Some(job.streams.label());
     let id = job.id.clone();
@@ -161,6 +172,33 @@ fn images_by_surface(
     }
 }
 
+/// Refuses suns that cannot tell slopes from albedo, as they are told to the inversion.
+fn check_suns(entry: &Entry<'_>, images: &[Image], settings: &Settings) -> Result<(), BuildError> {
+    let sun = |(k, image): (usize, &Image)| match k {
+        0 => settings.first_image_errors.sun(image.sun).direction(),
+        _ => image.sun.direction(),
+    };
+    let lights: Vec<_> = images.iter().enumerate().map(sun).collect();
+    check_lights(&lights).map_err(|e| entry.error("images", e.to_string()).into())
+}
+
+/// A copy of the measured points in the release.
+fn altimetry(
+    builder: &mut Builder<'_>,
+    entry: &Entry<'_>,
+    item: &PhotoclinometryItem,
+) -> Result<Option<Altimetry>, BuildError> {
+    let Some(file) = &item.altimetry else { return Ok(None) };
+    let id = format!("{}-altimetry", item.id);
+    let copy = Original::of(&format!("input/{id}"), &builder.study.folder, file)?;
+    let release_path = copy.release_path().to_owned();
+    let node = copy.node(INPUT_STAGE, &id);
+    let made = Altimetry { item: node.item.clone(), release_path: release_path.clone() };
+    builder.node(node)?;
+    builder.inputs.push(InputPlace { key: entry.path_of("altimetry"), release_path });
+    Ok(Some(made))
+}
+
 /// The coarse DEM with its standard deviation.
 fn coarse(
     builder: &Builder<'_>,
@@ -197,6 +235,13 @@ impl PhotoclinometryJob {
         format!("photoclinometry/{}.{ending}", self.id)
     }
 
+    /// The measured points. Messages are part of the release: they name the file as it is called there.
+    fn points(&self, work: &Work<'_>) -> Result<Vec<HeightPoint>, JobError> {
+        let Some(Altimetry { item, release_path }) = &self.altimetry else { return Ok(Vec::new()) };
+        let path = work.parent(item, original::name(release_path))?;
+        read_points(&path).map_err(|e| e.reworded(|words| words.replace(&path.display().to_string(), release_path)))
+    }
+
     fn made(&self, work: &Work<'_>) -> Result<Made, JobError> {
         let mut images = Vec::new();
         for image in &self.images {
@@ -208,7 +253,8 @@ impl PhotoclinometryJob {
             Some((item, sigma_m)) => Some(Coarse { dem: heights(item)?, sigma_m: *sigma_m }),
             None => None,
         };
-        let beside = Beside { truth: Some(heights(&self.surface.1)?), coarse, level_m: None };
+        let points = self.points(work)?;
+        let beside = Beside { truth: Some(heights(&self.surface.1)?), coarse, points, level_m: None };
         photoclinometry::make(images, beside, &self.settings, &self.streams).map_err(|e| refusal(&e))
     }
 
@@ -267,6 +313,8 @@ impl PhotoclinometryJob {
             modes: b.modes as i64,
             truth_rms_m: b.truth_rms_m,
             recovered_rms_m: b.recovered_rms_m,
+            truth_slope_rms: b.truth_slope_rms,
+            recovered_slope_rms: b.recovered_slope_rms,
             covariance_m2: b.covariance_m2,
             coherence: b.coherence,
         };
@@ -286,6 +334,7 @@ impl Job for PhotoclinometryJob {
             "surface": self.surface.0,
             "images": images,
             "coarse": coarse,
+            "altimetry": self.altimetry.as_ref().map(|points| &points.release_path),
             "settings": self.settings,
         })
     }
@@ -306,27 +355,24 @@ impl Job for PhotoclinometryJob {
         let cells = self.cells as f64;
         let rounds = 3.0 * SECONDS_PER_SAMPLE * self.images.len() as f64;
         let samples = SECONDS_PER_PERTURBED * self.settings.samples as f64;
-        Estimate { seconds: cells * (rounds + samples), bytes: 14.0 * cells }
+        Estimate { seconds: cells * (rounds + samples), bytes: 24.0 * cells }
     }
 
     fn run(&self, work: &Work<'_>) -> Result<Outcome, JobError> {
         let made = self.made(work)?;
-        let [heights, albedo, uncertainty, lit] = [HEIGHTS, MAPS[0], MAPS[1], MAPS[2]].map(|file| work.output(file));
-        let files = Files {
-            heights: (&heights).into(),
-            albedo: (&albedo).into(),
-            uncertainty: (&uncertainty).into(),
-            lit: (&lit).into(),
+        let beside = |map: Map| {
+            let file = work.output(map.ending);
+            (map, file)
         };
-        let mut notes = made.write(files, &raster_options(self.geotiff))?;
+        let maps: Vec<_> = made.maps().into_iter().map(beside).collect();
+        let targets = maps.iter().map(|(map, file)| (map, file.into()));
+        let mut notes = made.write((&work.output(HEIGHTS)).into(), targets, &raster_options(self.geotiff))?;
         notes.extend(made.recovered.warnings.iter().cloned());
         let content = digest::heights(&made.recovered.heights);
         let mut products = vec![Product::released(HEIGHTS, self.released("tif"), Some(content))];
-        for (file, map) in MAPS.into_iter().zip(made.maps()) {
-            if let Some(map) = map {
-                products.push(Product::released(file, self.released(file), Some(digest::heights(&map))));
-            }
-        }
+        let product =
+            |map: &Map| Product::released(map.ending, self.released(map.ending), Some(digest::heights(&map.values)));
+        products.extend(maps.iter().map(|(map, _)| product(map)));
         let mut outcome = Outcome { products, notes };
         outcome.write_rows(work, [self.row(&made)])?;
         outcome.write_rows(work, self.band_rows(&made))?;

@@ -2,15 +2,31 @@
 
 use crate::job::JobError;
 use crate::operations::dem::input_error;
-use sastrugi_imaging::ImageDescription;
 use sastrugi_imaging::photoclinometry::evaluation::{self, Band, Evaluation};
-use sastrugi_imaging::photoclinometry::{Coarse, Known, RecoverError, Recovered, Settings, described, recover};
+use sastrugi_imaging::photoclinometry::{
+    Coarse, HeightPoint, Known, RecoverError, Recovered, Settings, described, recover,
+};
+use sastrugi_imaging::{CameraPose, ImageDescription};
 use sastrugi_numeric::{Geometry, Grid, Streams, Surface, sums};
 use sastrugi_schemas::Kind;
 use sastrugi_schemas::kind::{read_parameters, schema_of};
+use sastrugi_store::altimetry;
 use sastrugi_store::atomic::Target;
 use sastrugi_store::dem::{self, Crs, Values, WriteOptions};
 use std::path::Path;
+
+/// Maps beside the heights: what their files add to the id, unit, and what they hold.
+pub const MAPS: [(&str, &str, &str); 7] = [
+    ("albedo.tif", "1", "albedo"),
+    ("uncertainty.tif", "m", "standard deviation of the height"),
+    ("lit.tif", "1", "number of images that show the cell lit"),
+    ("slope-sigma.tif", "1", "standard deviation of the slope (root of the sum of both variances)"),
+    ("albedo-sigma.tif", "1", "standard deviation of the albedo"),
+    ("condition.tif", "1", "condition number of the equations of the cell; no data where they determine too little"),
+    ("leaning.tif", "1", "1 where the albedo leans on that of neighbours, 0 elsewhere"),
+];
+/// Cells of the truth along a pixel that keep images apart from what is recovered.
+const TRUTH_CELLS_MIN: f64 = 4.0;
 
 /// The one kind of inversion.
 pub fn kind() -> Kind {
@@ -61,6 +77,26 @@ pub fn read_image(description: ImageDescription, path: &Path) -> Result<Describe
     Ok(Described { description, pixels: raster.grid.values, crs: raster.info.crs })
 }
 
+/// Reads measured points, each with its standard deviation.
+///
+/// # Errors
+/// A file that is missing or holds no such points, or a point without a standard deviation above 0.
+pub fn read_points(path: &Path) -> Result<Vec<HeightPoint>, JobError> {
+    let points = altimetry::read(path).map_err(input_error)?;
+    let one = |(k, [x_m, y_m, height_m, sigma_m]): (usize, [f64; 4])| {
+        if sigma_m > 0.0 {
+            return Ok(HeightPoint { x_m, y_m, height_m, sigma_m });
+        }
+        let message = format!(
+            "{}: point {} has a sigma of {sigma_m} m; give every point a column `sigma` above 0, the standard deviation of its height",
+            path.display(),
+            k + 1
+        );
+        Err(JobError::input(message))
+    };
+    points.into_iter().enumerate().map(one).collect()
+}
+
 /// What else is known.
 #[derive(Default)]
 pub struct Beside {
@@ -68,6 +104,8 @@ pub struct Beside {
     pub truth: Option<Grid>,
     /// A coarse DEM.
     pub coarse: Option<Coarse>,
+    /// Measured points.
+    pub points: Vec<HeightPoint>,
     /// Height of level ground where rounds begin, m; what the middles of the images show when absent.
     pub level_m: Option<f64>,
 }
@@ -101,6 +139,8 @@ pub fn make(
     }
     let mut settings = settings.clone();
     let first = &images[0].description;
+    // Truth and result are shaded as the image was taken, whatever is swept.
+    let (photometry, light) = (first.photometry, first.sun.direction());
     let noise = (!first.noise.is_none()).then_some(first.noise);
     (settings.photometry, settings.noise) = (settings.photometry.or(Some(first.photometry)), settings.noise.or(noise));
     let poses: Vec<_> = images.iter().map(|i| i.description.camera).collect();
@@ -111,15 +151,33 @@ pub fn make(
     let stack = images.into_iter().map(|i| (i.description, i.pixels)).collect();
     let images = described::images(stack, &settings.first_image_errors);
     let start = start(&geometry, beside.coarse.as_ref(), level_m);
-    let known = Known { points: Vec::new(), coarse: beside.coarse };
-    let recovered = recover(&images, &start, &known, &settings, streams)?;
-    let photometry = settings.photometry.unwrap_or_default();
-    let (light, view) = (images[0].light, [0.0, 0.0, 1.0]);
-    let heights = &recovered.heights;
+    let known = Known { points: beside.points, coarse: beside.coarse };
+    let mut recovered = recover(&images, &start, &known, &settings, streams)?;
     let truth = beside.truth.as_ref();
-    let evaluation = truth.and_then(|truth| evaluation::evaluate(truth, heights, &photometry, light, view));
+    recovered.warnings.extend(truth.and_then(|truth| same_cells(truth, &poses, &geometry)));
+    let heights = &recovered.heights;
+    let evaluation = truth.and_then(|truth| evaluation::evaluate(truth, heights, &photometry, light, [0.0, 0.0, 1.0]));
     let bands = truth.map(|truth| evaluation::bands(truth, heights)).unwrap_or_default();
     Ok(Made { recovered, geometry, crs, evaluation, bands })
+}
+
+/// A note where pixels have fewer than four cells of the truth along a side.
+fn same_cells(truth: &Grid, poses: &[CameraPose], map: &Geometry) -> Option<String> {
+    let pixel_m = poses.iter().filter_map(CameraPose::pixel_m).reduce(f64::min).unwrap_or(map.mean_cell());
+    let cells = pixel_m / truth.geometry.mean_cell();
+    (cells < TRUTH_CELLS_MIN - 1e-6).then(|| {
+        format!(
+            "a pixel has {} cells of the true surface along a side, fewer than {TRUTH_CELLS_MIN}: images rendered from it hold no relief below the pixel, \
+             and errors come out too small",
+            significant(cells)
+        )
+    })
+}
+
+/// Three digits.
+fn significant(value: f64) -> f64 {
+    let scale = libm::pow(10.0, 2.0 - libm::floor(libm::log10(value)));
+    (value * scale).round() / scale
 }
 
 /// Where rounds begin: the coarse DEM, as far as it goes, else level ground.
@@ -135,43 +193,60 @@ fn start(g: &Geometry, coarse: Option<&Coarse>, level_m: f64) -> Grid {
     Grid::new(*g, (0..g.len()).map(|k| at(k).unwrap_or(level_m)).collect())
 }
 
-/// Where the files of a surface go.
-pub struct Files<'a> {
-    /// Heights.
-    pub heights: Target<'a>,
-    /// Albedo.
-    pub albedo: Target<'a>,
-    /// Standard deviation of heights.
-    pub uncertainty: Target<'a>,
-    /// Images that show each cell lit.
-    pub lit: Target<'a>,
+/// A raster beside the heights.
+pub struct Map {
+    /// What its file adds to the id.
+    pub ending: &'static str,
+    unit: &'static str,
+    description: &'static str,
+    /// Values on the cells of the heights.
+    pub values: Grid,
+}
+
+impl Map {
+    /// Writes it.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    fn write(&self, target: Target<'_>, crs: &Crs, options: &WriteOptions) -> Result<(), JobError> {
+        let values = Values::Figures { unit: self.unit.into(), description: self.description.into() };
+        let options = WriteOptions { values, ..options.clone() };
+        dem::write(target, &self.values, crs, &options).map(|_| ()).map_err(JobError::io)
+    }
 }
 
 impl Made {
-    /// The rasters beside the heights: albedo, standard deviation of heights if it was asked for, lit images.
-    pub fn maps(&self) -> [Option<Grid>; 3] {
-        let lit = self.recovered.lit.map(f64::from);
-        [Some(self.recovered.albedo.clone()), self.recovered.height_sigma.clone(), Some(lit)]
+    /// The rasters beside the heights, in the order of [`MAPS`]; without standard deviations of heights where they were not asked for.
+    pub fn maps(&self) -> Vec<Map> {
+        let r = &self.recovered;
+        let of = |f: &dyn Fn(&[f64; 6]) -> f64| Grid::new(self.geometry, r.covariances.iter().map(f).collect());
+        let values = [
+            Some(r.albedo.clone()),
+            r.height_sigma.clone(),
+            Some(r.lit.map(f64::from)),
+            Some(of(&|[pp, _, _, qq, ..]| (pp + qq).sqrt())),
+            Some(of(&|covariance| covariance[5].sqrt())),
+            Some(r.condition.map(|c| if c.is_finite() { c } else { f64::NAN })),
+            Some(r.leaning.map(|leaning| f64::from(u8::from(leaning)))),
+        ];
+        let map = |((ending, unit, description), values): (_, Option<Grid>)| {
+            Some(Map { ending, unit, description, values: values? })
+        };
+        MAPS.into_iter().zip(values).filter_map(map).collect()
     }
 
     /// Writes the surface and its maps; returns sentences on what the format of the heights lost.
     ///
     /// # Errors
     /// A file that cannot be written.
-    pub fn write(&self, files: Files<'_>, options: &WriteOptions) -> Result<Vec<String>, JobError> {
-        let notes = dem::write(files.heights, &self.recovered.heights, &self.crs, options).map_err(JobError::io)?;
-        let described = [
-            ("1", "albedo"),
-            ("m", "standard deviation of the height"),
-            ("1", "number of images that show the cell lit"),
-        ];
-        for ((target, map), (unit, description)) in
-            [files.albedo, files.uncertainty, files.lit].into_iter().zip(self.maps()).zip(described)
-        {
-            let Some(map) = map else { continue };
-            let values = Values::Figures { unit: unit.into(), description: description.into() };
-            dem::write(target, &map, &self.crs, &WriteOptions { values, ..options.clone() }).map_err(JobError::io)?;
-        }
+    pub fn write<'a>(
+        &self,
+        heights: Target<'_>,
+        maps: impl IntoIterator<Item = (&'a Map, Target<'a>)>,
+        options: &WriteOptions,
+    ) -> Result<Vec<String>, JobError> {
+        let notes = dem::write(heights, &self.recovered.heights, &self.crs, options).map_err(JobError::io)?;
+        maps.into_iter().try_for_each(|(map, target)| map.write(target, &self.crs, options))?;
         Ok(notes)
     }
 

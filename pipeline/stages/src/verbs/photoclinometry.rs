@@ -3,7 +3,9 @@
 use super::{Reading, parameters, read};
 use crate::error::Error;
 use crate::jobs::photoclinometry::STAGE;
-use crate::operations::photoclinometry::{self, Beside, Described, Files, Made, read_description, read_image, refusal};
+use crate::operations::photoclinometry::{
+    self, Beside, Described, MAPS, Made, Map, read_description, read_image, read_points, refusal,
+};
 use sastrugi_imaging::ImageDescription;
 use sastrugi_imaging::photoclinometry::{Coarse, RecoverError, Settings};
 use sastrugi_numeric::{Streams, sums};
@@ -26,6 +28,8 @@ pub struct ImagesFile {
     pub coarse: Option<String>,
     /// Standard deviation of the heights of its cells, m.
     pub coarse_sigma_m: Option<f64>,
+    /// Measured points (columns `x`, `y`, `z`, `sigma`, m), each a soft constraint with its sigma, above 0.
+    pub altimetry: Option<String>,
     /// Height of the level ground where rounds begin, m; what the middles of the images show when absent.
     pub level_m: Option<f64>,
     /// True surface to compare with.
@@ -58,21 +62,25 @@ pub fn photoclinometry(request: &Request<'_>) -> Result<Value, Error> {
     }
     let file = read_file(request)?;
     file.settings.check().map_err(Error::from)?;
-    let maps = ["albedo.tif", "uncertainty.tif", "lit.tif"].map(|ending| request.output.with_extension(ending));
+    let outputs: Vec<PathBuf> = [request.output.to_path_buf()]
+        .into_iter()
+        .chain(MAPS.iter().map(|(ending, ..)| request.output.with_extension(ending)))
+        .collect();
     let folder = request.images.parent().unwrap_or(Path::new("."));
-    let (images, inputs) = described(&file, folder)?;
-    let outputs: Vec<&Path> = [request.output].into_iter().chain(maps.iter().map(PathBuf::as_path)).collect();
-    super::check_distinct(&outputs, &inputs.iter().map(PathBuf::as_path).collect::<Vec<_>>())?;
+    let (images, mut inputs) = described(&file, folder)?;
+    let others = [&file.coarse, &file.altimetry, &file.truth].into_iter().flatten();
+    inputs.extend(others.map(|name| folder.join(name)));
+    let [outputs, inputs] = [&outputs, &inputs].map(|all| all.iter().map(PathBuf::as_path).collect::<Vec<_>>());
+    super::check_distinct(&outputs, &inputs)?;
     let streams = Streams::for_seed(request.seed, STAGE);
     let made = photoclinometry::make(images, beside(&file, folder)?, &file.settings, &streams).map_err(refused)?;
-    let [albedo, uncertainty, lit] = &maps;
-    let files = Files {
-        heights: request.output.into(),
-        albedo: albedo.as_path().into(),
-        uncertainty: uncertainty.as_path().into(),
-        lit: lit.as_path().into(),
+    let beside = |map: Map| {
+        let path = request.output.with_extension(map.ending);
+        (map, path)
     };
-    let mut notes = made.write(files, &request.options)?;
+    let maps: Vec<(Map, PathBuf)> = made.maps().into_iter().map(beside).collect();
+    let targets = maps.iter().map(|(map, path)| (map, path.as_path().into()));
+    let mut notes = made.write(request.output.into(), targets, &request.options)?;
     notes.extend(made.recovered.warnings.iter().cloned());
     Ok(told(request, &made, &maps, notes))
 }
@@ -121,10 +129,11 @@ fn beside(file: &ImagesFile, folder: &Path) -> Result<Beside, Error> {
         (None, None) => None,
         _ => return Err(Error::Usage("`coarse` and `coarse_sigma_m` go together".to_owned())),
     };
-    Ok(Beside { truth: file.truth.as_ref().map(dem).transpose()?, coarse, level_m: file.level_m })
+    let points = file.altimetry.as_ref().map(|name| read_points(&folder.join(name))).transpose()?.unwrap_or_default();
+    Ok(Beside { truth: file.truth.as_ref().map(dem).transpose()?, coarse, points, level_m: file.level_m })
 }
 
-fn told(request: &Request<'_>, made: &Made, maps: &[PathBuf; 3], notes: Vec<String>) -> Value {
+fn told(request: &Request<'_>, made: &Made, maps: &[(Map, PathBuf)], notes: Vec<String>) -> Value {
     let r = &made.recovered;
     let median = |values: &[f64]| sums::median(&sums::finite(values));
     let rounds: Vec<Value> = r
@@ -154,9 +163,7 @@ fn told(request: &Request<'_>, made: &Made, maps: &[PathBuf; 3], notes: Vec<Stri
             "height_rms_m": e.height_rms_m,
         })
     });
-    let written = made.maps();
-    let files: Vec<String> =
-        maps.iter().zip(&written).filter(|(_, map)| map.is_some()).map(|(p, _)| p.display().to_string()).collect();
+    let files: Vec<String> = maps.iter().map(|(_, path)| path.display().to_string()).collect();
     json!({
         "file": request.output.display().to_string(),
         "maps": files,

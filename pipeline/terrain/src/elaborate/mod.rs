@@ -96,8 +96,8 @@ enum DemError {
     Shows { post_m: f64, what: &'static str, diameter_m: f64 },
     #[error("holds an albedo of {albedo} at x = {x}, y = {y} m; albedo lies in 0 to 1")]
     NoAlbedo { albedo: f64, x: f64, y: f64 },
-    #[error("cannot pass through its altimetry: {0}")]
-    Altimetry(#[from] AltimetryError),
+    #[error("cannot hold the surface: {0}")]
+    Altimetry(AltimetryError),
 }
 
 /// Columns and rows (from the south) of posts.
@@ -283,7 +283,11 @@ impl Elaborate {
         let g = &dem.geometry;
         self.check_size(g).map_err(of_dem)?;
         let post_m = g.cell[0].min(g.cell[1]);
-        let points = self.points(dem, &inputs.points).map_err(|e| of_dem(e.into()))?;
+        let of_points = |e: AltimetryError| {
+            let listed = || NamedInput::points("altimetry_points_m", "altimetry_points_m");
+            self.altimetry().unwrap_or_else(listed).failed(&DemError::Altimetry(e))
+        };
+        let points = self.points(dem, &inputs.points).map_err(of_points)?;
         // The lattice points around a point may lie one spacing beyond its reach.
         let beyond_m = if points.is_empty() { 0.0 } else { g.cell[0].max(g.cell[1]) + 2.0 * self.spacing_m };
         let posts = self.posts(g, beyond_m).map_err(of_dem)?;
