@@ -50,6 +50,16 @@ pub fn reached(rover: &RoverRow) -> bool {
     rover.outcome == "reached"
 }
 
+/// True for a rover that left the ground at its start: it never drove, and its efficiency, the straight line over itself, is 1 without a drive.
+pub fn never_drove(rover: &RoverRow) -> bool {
+    rover.outcome == "off_ground" && rover.distance_m == 0.0
+}
+
+/// Efficiency of a rover; NaN for one that never drove.
+pub fn efficiency(rover: &RoverRow) -> f64 {
+    if never_drove(rover) { f64::NAN } else { rover.efficiency }
+}
+
 /// Sets of the plain trials; of all rovers where every one belongs to a variant.
 pub fn plain(data: &Data) -> Vec<Set<'_>> {
     let any = data.rovers.iter().any(|r| r.variant.is_none());
