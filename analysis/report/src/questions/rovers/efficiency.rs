@@ -2,7 +2,7 @@
 
 use super::outcomes;
 use super::published::trial;
-use super::sets::{Set, World, efficiency, never_drove, reached};
+use super::sets::{Set, World, efficiency, off_ground, reached};
 use super::worlds::{ARRIVED, DISTANCE, EFFICIENCY, Figure, GREATEST, LEAST, OF_ARRIVALS, STRAIGHT, share};
 use crate::content::{self, Numbers, TableBlock, count, number, text};
 use crate::data::Data;
@@ -156,7 +156,7 @@ pub fn table(sets: &[Set]) -> TableBlock {
             number(straight.value),
             number(straight.ends()[0]),
             number(straight.ends()[1]),
-            mean(|r| if never_drove(r) { f64::NAN } else { r.efficiency_half_limit }),
+            mean(|r| if off_ground(r) { 0.0 } else { r.efficiency_half_limit }),
             mean(of_oracle),
             number(100.0 * share(set, without_way).value),
         ]);

@@ -35,7 +35,7 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     let mut blocks = vec![Block::Text(verdict(&sets))];
     blocks.extend(few_worlds(&sets).map(Block::Warning));
     blocks.extend(no_way(&sets).map(Block::Warning));
-    blocks.extend(without_drive(&sets).map(Block::Warning));
+    blocks.extend(off_ground(&sets).map(Block::Warning));
     blocks.extend(published::blocks(data, &sets));
     blocks.extend([
         Block::Heading("Efficiency and arrival".into()),
@@ -122,15 +122,15 @@ fn few_worlds(sets: &[Set]) -> Option<String> {
     ))
 }
 
-/// Rovers that left the ground at their start.
-fn without_drive(sets: &[Set]) -> Option<String> {
+/// Rovers that ended off the ground.
+fn off_ground(sets: &[Set]) -> Option<String> {
     let all = || sets.iter().flat_map(Set::rovers);
-    let never = all().filter(|r| sets::never_drove(r)).count();
-    (never > 0).then(|| {
+    let off = all().filter(|r| sets::off_ground(r)).count();
+    (off > 0).then(|| {
         format!(
-            "{} of {} left the known ground before they drove. Their efficiency would be 1: they are left out of all efficiencies and count among those that \
-             do not arrive.",
-            set_number::count(never),
+            "{} of {} ended off the known ground. They have shown no efficiency: in its means they count as 0, and the greatest and the least of a world leave \
+             them out.",
+            set_number::count(off),
             set_number::counted(all().count(), "rover")
         )
     })

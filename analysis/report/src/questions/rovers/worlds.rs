@@ -1,6 +1,6 @@
 //! Figures of one world, as a paper would print them of its only one: the mean over worlds, and the band of one world more.
 
-use super::sets::{Estimate, Set, World, efficiency, never_drove, reached};
+use super::sets::{Estimate, Set, World, efficiency, reached, shown};
 use crate::questions::clusters::LEVEL;
 use sastrugi_numeric::sums;
 use sastrugi_schemas::tables::RoverRow;
@@ -34,10 +34,7 @@ pub const STRAIGHT: Figure = Figure {
     id: "straight_over_mean_distance",
     name: "straight over mean distance",
     unit: "1",
-    totals: |w| {
-        let driven = |r: &RoverRow, v: f64| if never_drove(r) { f64::NAN } else { v };
-        (w.total(|r| driven(r, r.straight_m)).0, w.total(|r| driven(r, r.distance_m)).0)
-    },
+    totals: |w| (w.total(|r| r.straight_m).0, w.total(|r| r.distance_m).0),
 };
 /// Mean distance driven.
 pub const DISTANCE: Figure =
@@ -47,14 +44,14 @@ pub const GREATEST: Figure = Figure {
     id: "greatest_efficiency",
     name: "greatest efficiency of a world",
     unit: "1",
-    totals: |w| (w.values(efficiency).into_iter().fold(f64::NEG_INFINITY, f64::max), 1.0),
+    totals: |w| (w.values(shown).into_iter().fold(f64::NEG_INFINITY, f64::max), 1.0),
 };
 /// Least efficiency of a world's rovers.
 pub const LEAST: Figure = Figure {
     id: "least_efficiency",
     name: "least efficiency of a world",
     unit: "1",
-    totals: |w| (w.values(efficiency).into_iter().fold(f64::INFINITY, f64::min), 1.0),
+    totals: |w| (w.values(shown).into_iter().fold(f64::INFINITY, f64::min), 1.0),
 };
 /// Share of the rovers that arrive.
 pub const ARRIVED: Figure = Figure {
@@ -106,8 +103,7 @@ impl Figure {
         match self.id {
             id if [EFFICIENCY.id, OF_ARRIVALS.id, GREATEST.id, LEAST.id].contains(&id) => 1.0,
             id if id == STRAIGHT.id => {
-                let driven: Vec<&RoverRow> =
-                    set.rovers().filter(|r| !never_drove(r) && r.straight_m.is_finite()).collect();
+                let driven: Vec<&RoverRow> = set.rovers().filter(|r| r.straight_m.is_finite()).collect();
                 let total = |of: fn(&RoverRow) -> f64| sums::sum(&driven.iter().map(|r| of(r)).collect::<Vec<_>>());
                 let most = total(|r| r.straight_m) / total(|r| (r.straight_m - r.residual_m).max(0.0));
                 if most.is_finite() { most } else { f64::INFINITY }
