@@ -93,14 +93,20 @@ fn span(run: &[PhotoclinometryBandRow]) -> String {
 /// The same with what is wrong there.
 fn fault(run: &[PhotoclinometryBandRow]) -> String {
     let ratios: Vec<f64> = run.iter().map(|b| b.recovered_rms_m / b.truth_rms_m).collect();
+    let slopes: Vec<f64> =
+        run.iter().map(|b| b.recovered_slope_rms / b.truth_slope_rms).filter(|v| v.is_finite()).collect();
     let coherences: Vec<f64> = run.iter().map(|b| b.coherence).collect();
     let range = |values: &[f64], words: &dyn Fn(f64) -> String| {
         let (low, high) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
         let (low, high) = (words(low), words(high));
         if low == high { low } else { format!("{low} to {high}") }
     };
+    let slopes = match slopes.is_empty() {
+        true => String::new(),
+        false => format!(", rms slope {}", range(&slopes, &|v| set::percent(v, 0))),
+    };
     format!(
-        "{} (rms height {} of the truth's, squared coherence {})",
+        "{} (rms height {}{slopes} of the truth's, squared coherence {})",
         span(run),
         range(&ratios, &|v| set::percent(v, 0)),
         range(&coherences, &|v| set::significant(v, 2))
