@@ -61,7 +61,7 @@ fn row(id: &str, variant: Option<&str>, slope_error_rms: f64) -> Photoclinometry
         condition: 2.2,
         albedo_slope_correlation: 0.2,
         noise_scale: 1.0,
-        height_sigma_m: 0.02,
+        height_sigma_m: 0.015,
         albedo_mean: 0.2,
         cells: Some(1024),
         shaded_correlation: 0.91,
