@@ -10,9 +10,9 @@ use sastrugi_schemas::manifest::FailedItem;
 use sastrugi_schemas::study::{HypothesisItem, RoughnessSection};
 use sastrugi_schemas::tables::{
     CandidateCurveRow, CandidateRow, CovarianceRow, FitRow, FormationEventRow, FormationRow, FormationSampleRow,
-    HeightDistributionRow, ImageRow, LikelihoodProfileRow, LogRow, MissionRow, ParameterRow, ProfilePsdRow, PsdRow,
-    ReplicateRow, RoutePointRow, RouteRow, RoverEffectRow, RoverRow, RoverSampleRow, SampleRow, ScoreCovarianceRow,
-    ScoreRow, StructureRow, SurfaceRow, TerrainRow,
+    HeightDistributionRow, ImageRow, LikelihoodProfileRow, LogRow, MissionRow, ParameterRow, PhotoclinometryBandRow,
+    PhotoclinometryRow, ProfilePsdRow, PsdRow, ReplicateRow, RoutePointRow, RouteRow, RoverEffectRow, RoverRow,
+    RoverSampleRow, SampleRow, ScoreCovarianceRow, ScoreRow, StructureRow, SurfaceRow, TerrainRow,
 };
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -112,6 +112,10 @@ pub struct Data {
     pub routes: Vec<RouteRow>,
     /// Rendered images.
     pub images: Vec<ImageRow>,
+    /// Surfaces recovered from images.
+    pub photoclinometry: Vec<PhotoclinometryRow>,
+    /// The same by wavelength.
+    pub photoclinometry_bands: Vec<PhotoclinometryBandRow>,
     /// Runs of teams.
     pub formations: Vec<FormationRow>,
     /// What happened on these runs.

@@ -10,7 +10,7 @@
 //! * [`data`]: the only way to the release's rows and files.
 //!
 //! No kernel runs here: spectra, histograms, covariances, backgrounds, residuals, images and class maps are read as a stage
-//! stored them; shading and rendering a thinned relief counts as drawing. Medians and intervals come from `sastrugi-statistics`. The same release gives the same bytes:
+//! stored them; shading and rendering a thinned relief, and the difference of two stored rasters on the cells of one, count as drawing. Medians and intervals come from `sastrugi-statistics`. The same release gives the same bytes:
 //! there is no clock in this room, and threads change no byte.
 
 pub mod content;

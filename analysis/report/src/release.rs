@@ -15,7 +15,8 @@ use std::fs;
 use std::path::{Component, Path, PathBuf};
 
 /// Folders that hold data: what a page counts is the same before and after sealing.
-const DATA_FOLDERS: [&str; 9] = ["classes", "dem", "fit", "image", "mcap", "route", TABLES, "terrain", "texture"];
+const DATA_FOLDERS: [&str; 10] =
+    ["classes", "dem", "fit", "image", "mcap", "photoclinometry", "route", TABLES, "terrain", "texture"];
 const STUDY: &str = "study.toml";
 
 impl Data {
@@ -59,6 +60,8 @@ impl Data {
             replicates: release.rows()?,
             routes: release.rows()?,
             images: release.rows()?,
+            photoclinometry: release.rows()?,
+            photoclinometry_bands: release.rows()?,
             formations: release.rows()?,
             formation_events: release.rows()?,
             rovers: release.rows()?,

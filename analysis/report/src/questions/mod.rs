@@ -11,6 +11,7 @@ pub mod logs;
 pub mod losses;
 pub mod missions;
 mod outcome;
+pub mod photoclinometry;
 pub mod probability;
 pub mod published;
 pub mod releases;
@@ -43,10 +44,11 @@ pub struct Question {
 }
 
 /// All questions, in the order of the page.
-pub const ALL: [Question; 18] = [
+pub const ALL: [Question; 19] = [
     failures::QUESTION,
     terrain::QUESTION,
     images::QUESTION,
+    photoclinometry::QUESTION,
     covariance::QUESTION,
     texture::QUESTION,
     scoreboard::QUESTION,

@@ -83,6 +83,8 @@ pub fn empty() -> Data {
         replicates: Vec::new(),
         routes: Vec::new(),
         images: Vec::new(),
+        photoclinometry: Vec::new(),
+        photoclinometry_bands: Vec::new(),
         formations: Vec::new(),
         formation_events: Vec::new(),
         rovers: Vec::new(),
@@ -252,7 +254,8 @@ fn waves(geometry: Geometry, item: &str, amplitude_m: f64, hurst: f64) -> Grid {
     Grid::new(geometry, values.map(|(x, y)| height(x, y)).collect())
 }
 
-fn row(id: &str, stage: &str, path: &str, grid: &Grid) -> TerrainRow {
+/// A heightfield of which nothing but its heights is known.
+pub fn row(id: &str, stage: &str, path: &str, grid: &Grid) -> TerrainRow {
     let (low, high) = grid.range().unwrap();
     TerrainRow {
         terrain_id: id.into(),

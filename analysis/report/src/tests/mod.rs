@@ -3,6 +3,8 @@
 pub mod made_up;
 mod navigation;
 mod on_disk;
+mod photoclinometry;
+mod rendered;
 mod rovers;
 pub mod xml;
 

@@ -40,14 +40,14 @@ fn val_efficiencies() {
     let efficiency = all.iter().map(|d| RADIUS_M / (d + 0.4)).sum::<f64>() / all.len() as f64;
     let row = &found[0];
     assert_eq!((row[0].as_str(), row[1].as_u64(), row[2].as_u64()), (Some("2.30"), Some(4), Some(40)));
-    assert!(near(&row[3], 100.0) && near(&row[6], efficiency), "{row:?}");
-    assert!(near(&row[9], RADIUS_M * 40.0 / all.iter().sum::<f64>()), "{row:?}");
+    assert!(near(&row[3], 100.0) && near(&row[6], efficiency) && near(&row[7], efficiency), "{row:?}");
+    assert!(near(&row[10], RADIUS_M * 40.0 / all.iter().sum::<f64>()), "{row:?}");
     // Efficiency over that of the ground's shortest way, 1.05 times the straight line.
-    assert!(near(&row[13], 1.05 * efficiency) && near(&row[14], 0.0), "{row:?}");
+    assert!(near(&row[14], 1.05 * efficiency) && near(&row[15], 0.0), "{row:?}");
     // All arrive on four worlds: worlds count as single trials, 0.025^(1/4).
     assert!(near(&row[4], 100.0 * libm::pow(0.025, 0.25)) && near(&row[5], 100.0), "{row:?}");
     // Two of ten rovers of the last group are stopped, one of them without a way.
-    assert!(near(&found[2][3], 80.0) && near(&found[2][14], 10.0), "{:?}", found[2]);
+    assert!(near(&found[2][3], 80.0) && near(&found[2][15], 10.0), "{:?}", found[2]);
     for figure in [
         "rover-mean-efficiency",
         "rover-straight-over-mean-distance",
@@ -202,4 +202,63 @@ fn prop_odd_releases_have_sound_pages() {
     assert!(report(&data).0["index.html"].contains("<section id=\"rovers\">"));
     data.rover_effects.clear();
     assert!(!report(&data).0["index.html"].contains("<section id=\"rovers\">"));
+}
+
+/// A rover that leaves the ground at its start has an efficiency of 1 without a drive: in means it counts as 0, it does not arrive, and the page says how many there are.
+/// The efficiency of arrivals leaves out those that are stopped.
+#[test]
+fn val_rovers_off_the_ground_count_as_zero() {
+    let mut data = driven(4);
+    let (before, first) = (rows(&report(&data).0, "rover-efficiency"), data.rovers[0].clone());
+    let off = RoverRow {
+        rover_id: "zz".into(),
+        outcome: "off_ground".into(),
+        distance_m: 0.0,
+        residual_m: first.straight_m,
+        efficiency: 1.0,
+        efficiency_half_limit: 1.0,
+        ..first.clone()
+    };
+    data.rovers.push(off);
+    data.rovers.sort_by(|a, b| (&a.terrain_id, &a.rover_id).cmp(&(&b.terrain_id, &b.rover_id)));
+    let files = report(&data).0;
+    assert_sound(&files);
+    let found = rows(&files, "rover-efficiency");
+    assert!(near(&found[0][2], 41.0) && near(&found[0][3], 100.0 * 40.0 / 41.0), "{:?}", found[0]);
+    for column in [6, 7, 13, 14] {
+        let share = if column == 6 { 1.0 } else { 40.0 / 41.0 };
+        assert!(near(&found[0][column], share * before[0][column].as_f64().unwrap()), "{column}: {:?}", found[0]);
+    }
+    assert!(files["index.html"].contains("1 of 121 rovers ended off the known ground."));
+    // A fifth of the last group is stopped: arrivals are better than all.
+    let arrived: Vec<f64> = data
+        .rovers
+        .iter()
+        .filter(|r| r.group.as_deref() == Some("2.60") || r.terrain_id.starts_with("2.60"))
+        .filter(|r| r.outcome == "reached" && r.variant.is_none())
+        .map(|r| r.efficiency)
+        .collect();
+    assert_eq!(arrived.len(), 32);
+    assert!(near(&found[2][6], arrived.iter().sum::<f64>() / 32.0), "{:?}", found[2]);
+    assert!(found[2][6].as_f64() > found[2][7].as_f64());
+}
+
+/// Efficiencies scattered about 0.98 on three worlds: intervals and bands on the logarithm would pass 1, and end there. Straight over mean distance ends at
+/// the straight line over what is left of it at arrival, 0.4 m.
+#[test]
+fn val_bands_end_at_a_straight_drive() {
+    let mut data = driven(3);
+    let factor = |r: &RoverRow| if r.terrain_id.ends_with('1') { 1.0 } else { 1.09 };
+    for rover in &mut data.rovers {
+        rover.outcome = "reached".into();
+        rover.residual_m = 0.4;
+        rover.distance_m = (RADIUS_M - 0.4) * factor(rover);
+        rover.straight_m = RADIUS_M;
+        rover.efficiency = RADIUS_M / (rover.distance_m + 0.4);
+    }
+    let files = report(&data).0;
+    let most = RADIUS_M / (RADIUS_M - 0.4);
+    for row in rows(&files, "rover-efficiency") {
+        assert!(near(&row[9], 1.0) && near(&row[12], most), "{row:?}");
+    }
 }

@@ -1,7 +1,7 @@
 //! Designs side by side: efficiency and arrival for every combination of the swept parameters, one block for each group.
 
 use super::sets::{Estimate, Set, variants};
-use super::worlds::{ARRIVED, EFFICIENCY, STRAIGHT};
+use super::worlds::{ARRIVED, EFFICIENCY, OF_ARRIVALS, STRAIGHT};
 use crate::content::{Block, Numbers, TableBlock, count, number, slug, text};
 use crate::data::{Data, natural};
 use crate::render::number as set_number;
@@ -40,7 +40,7 @@ pub fn blocks(data: &Data) -> Vec<Block> {
     blocks
 }
 
-const WORDS: &str = "Each cell holds the mean efficiency with its 95 % interval over worlds, then the share of rovers that reach the goal. Designs drive on the same \
+const WORDS: &str = "Each cell holds the mean efficiency with its 95 % interval over worlds, then the share of rovers that reach the goal and the mean efficiency of those. Designs drive on the same \
 worlds from the same starts, so cells of a block differ by less chance than their intervals alone would say.";
 
 /// Parameters and values of a variant: `clearance_m = 0.1, scale = 0.75`.
@@ -126,8 +126,12 @@ fn words(set: &Set) -> String {
         Some(_) => format!(" ({} to {})", set_number::fixed(low, 2), set_number::fixed(high, 2)),
         None => String::new(),
     };
+    let arrivals = match OF_ARRIVALS.pooled(set).value {
+        e if e.is_finite() => format!(" at {}", set_number::fixed(e, 2)),
+        _ => String::new(),
+    };
     format!(
-        "{}{interval}; {}",
+        "{}{interval}; {}{arrivals}",
         set_number::fixed(efficiency.value, 2),
         set_number::percent(ARRIVED.pooled(set).value, 0)
     )
@@ -160,6 +164,7 @@ fn list(families: &[Family]) -> TableBlock {
         ("reached", "%"),
         ("low", "%"),
         ("high", "%"),
+        ("efficiency of arrivals", "1"),
     ];
     let mut numbers = Numbers::computed(query(families.iter().flat_map(|f| &f.designs)), &columns);
     for (family, design) in families.iter().flat_map(|f| f.designs.iter().map(move |d| (f, d))) {
@@ -174,7 +179,8 @@ fn list(families: &[Family]) -> TableBlock {
         ];
         let estimates =
             [three(EFFICIENCY.pooled(set), 1.0), three(STRAIGHT.pooled(set), 1.0), three(ARRIVED.pooled(set), 100.0)];
-        numbers.row(head.into_iter().chain(estimates.into_iter().flatten()));
+        let arrivals = number(OF_ARRIVALS.pooled(set).value);
+        numbers.row(head.into_iter().chain(estimates.into_iter().flatten()).chain([arrivals]));
     }
     TableBlock { id: "rover-designs".into(), caption: "All designs".into(), numbers }
 }

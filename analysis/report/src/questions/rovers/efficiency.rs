@@ -2,8 +2,8 @@
 
 use super::outcomes;
 use super::published::trial;
-use super::sets::{Set, World, reached};
-use super::worlds::{ARRIVED, DISTANCE, EFFICIENCY, Figure, GREATEST, LEAST, STRAIGHT, share};
+use super::sets::{Set, World, efficiency, off_ground, reached};
+use super::worlds::{ARRIVED, DISTANCE, EFFICIENCY, Figure, GREATEST, LEAST, OF_ARRIVALS, STRAIGHT, share};
 use crate::content::{self, Numbers, TableBlock, count, number, text};
 use crate::data::Data;
 use crate::questions::clusters::LEVEL;
@@ -24,7 +24,7 @@ efficiency_half_limit, oracle, oracle_m from 'tables/rovers/*.parquet'";
 
 /// Efficiency over the one that the ground allows; NaN where there is no way or nobody looked for one.
 pub fn of_oracle(rover: &RoverRow) -> f64 {
-    if rover.oracle == "found" { rover.efficiency * rover.oracle_m / rover.straight_m } else { f64::NAN }
+    if rover.oracle == "found" { efficiency(rover) * rover.oracle_m / rover.straight_m } else { f64::NAN }
 }
 
 /// True where the ground has no way to the goal; `None` where nobody looked for one.
@@ -125,6 +125,7 @@ pub fn table(sets: &[Set]) -> TableBlock {
         ("reached", "%"),
         ("low", "%"),
         ("high", "%"),
+        ("efficiency of arrivals", "1"),
         ("mean efficiency", "1"),
         ("low", "1"),
         ("high", "1"),
@@ -138,7 +139,7 @@ pub fn table(sets: &[Set]) -> TableBlock {
     let mut numbers = Numbers::computed(QUERY, &columns);
     for set in sets {
         let arrived = ARRIVED.pooled(set);
-        let (efficiency, straight) = (EFFICIENCY.pooled(set), STRAIGHT.pooled(set));
+        let (all, straight) = (EFFICIENCY.pooled(set), STRAIGHT.pooled(set));
         let [reached, low, high] = [arrived.value, arrived.ends()[0], arrived.ends()[1]].map(|v| number(100.0 * v));
         let mean = |of: fn(&RoverRow) -> f64| number(set.mean(of, LEVEL).value);
         numbers.row([
@@ -148,13 +149,14 @@ pub fn table(sets: &[Set]) -> TableBlock {
             reached,
             low,
             high,
-            number(efficiency.value),
-            number(efficiency.ends()[0]),
-            number(efficiency.ends()[1]),
+            number(OF_ARRIVALS.pooled(set).value),
+            number(all.value),
+            number(all.ends()[0]),
+            number(all.ends()[1]),
             number(straight.value),
             number(straight.ends()[0]),
             number(straight.ends()[1]),
-            mean(|r| r.efficiency_half_limit),
+            mean(|r| if off_ground(r) { 0.0 } else { r.efficiency_half_limit }),
             mean(of_oracle),
             number(100.0 * share(set, without_way).value),
         ]);
@@ -168,8 +170,7 @@ pub fn table(sets: &[Set]) -> TableBlock {
 
 /// What rovers of one world may have alike: its name and value.
 struct Alike(&'static str, fn(&RoverRow) -> f64);
-const ALIKE: [Alike; 2] =
-    [Alike("efficiency", |r| r.efficiency), Alike("reached", |r| f64::from(u8::from(reached(r))))];
+const ALIKE: [Alike; 2] = [Alike("efficiency", efficiency), Alike("reached", |r| f64::from(u8::from(reached(r))))];
 
 /// How alike the rovers of one world are.
 pub fn intraclass(sets: &[Set]) -> TableBlock {

@@ -17,7 +17,7 @@ use crate::content::Block;
 use crate::data::Data;
 use crate::render::number as set_number;
 use sets::Set;
-use worlds::{ARRIVED, EFFICIENCY};
+use worlds::{ARRIVED, EFFICIENCY, OF_ARRIVALS};
 
 /// Registry entry.
 pub const QUESTION: Question = Question { id: "rovers", name: "Rovers", title: "How far do the rovers get?", answer };
@@ -35,6 +35,7 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     let mut blocks = vec![Block::Text(verdict(&sets))];
     blocks.extend(few_worlds(&sets).map(Block::Warning));
     blocks.extend(no_way(&sets).map(Block::Warning));
+    blocks.extend(off_ground(&sets).map(Block::Warning));
     blocks.extend(published::blocks(data, &sets));
     blocks.extend([
         Block::Heading("Efficiency and arrival".into()),
@@ -66,7 +67,8 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
 const EFFICIENCIES: &str = "Efficiency of a rover is the straight distance over what it drove and what was left in the end. Its mean over rovers and the straight distance over \
 the mean distance are two figures: a few short ways lift the first, a few long ones lower the second. Intervals go over worlds, which are the independent trials: those of \
 means and ratios are Student's for the linearised ratio of world totals (Cochran, 1977), on the logarithm; those of shares are Korn and Graubard's (1998), where all or no \
-rovers arrive with worlds as single trials. At half the limit: each rover as if stopped after half of its distance limit. Over the ground's: over the efficiency of \
+rovers arrive with worlds as single trials. Intervals and bands end at what a straight drive would have: an efficiency of 1; straight over mean distance may be slightly \
+more, because rovers stop within a tolerance of their goal. At half the limit: each rover as if stopped after half of its distance limit. Over the ground's: over the efficiency of \
 the shortest way on the whole map, for rovers that have one; the others stay in all figures.";
 const ALIKE: &str = "Rovers of one world share its rocks and often a goal. The intraclass correlation is the share of the variance between worlds (analysis of variance, Searle's \
 interval, exact for normal values); the design effect is the factor on the variance of a mean that it makes (Kish, 1965).";
@@ -76,14 +78,18 @@ were stopped included.";
 /// What the sets say, in a sentence each.
 fn verdict(sets: &[Set]) -> String {
     let sentence = |set: &Set| {
-        let (arrived, efficiency) = (ARRIVED.pooled(set), EFFICIENCY.pooled(set));
+        let (arrived, efficiency, of_arrivals) = (ARRIVED.pooled(set), EFFICIENCY.pooled(set), OF_ARRIVALS.pooled(set));
         let [low, high] = arrived.ends();
         let interval = match arrived.interval {
             Some(_) => format!(" ({} to {} %)", set_number::fixed(100.0 * low, 0), set_number::fixed(100.0 * high, 0)),
             None => String::new(),
         };
+        let arrivals = match of_arrivals.value.is_finite() {
+            true => format!(", {} of those that arrive", set_number::significant(of_arrivals.value, 2)),
+            false => String::new(),
+        };
         format!(
-            "{}: {}{interval} of the rovers reach their goal, with a mean efficiency of {}.",
+            "{}: {}{interval} of the rovers reach their goal. The mean efficiency is {} of all rovers{arrivals}.",
             set.name,
             set_number::percent(arrived.value, 0),
             set_number::significant(efficiency.value, 2)
@@ -114,6 +120,20 @@ fn few_worlds(sets: &[Set]) -> Option<String> {
         "{all} stands on fewer than {WORLDS_MIN} worlds (the least: {}). Rovers of one world are not independent, so worlds count, not rovers. {ends}",
         set_number::count(least)
     ))
+}
+
+/// Rovers that ended off the ground.
+fn off_ground(sets: &[Set]) -> Option<String> {
+    let all = || sets.iter().flat_map(Set::rovers);
+    let off = all().filter(|r| sets::off_ground(r)).count();
+    (off > 0).then(|| {
+        format!(
+            "{} of {} ended off the known ground. They have shown no efficiency: in its means they count as 0, and the greatest and the least of a world leave \
+             them out.",
+            set_number::count(off),
+            set_number::counted(all().count(), "rover")
+        )
+    })
 }
 
 /// Rovers for which the ground has no way.

@@ -50,6 +50,22 @@ pub fn reached(rover: &RoverRow) -> bool {
     rover.outcome == "reached"
 }
 
+/// True for a rover that ended off the known ground.
+pub fn off_ground(rover: &RoverRow) -> bool {
+    rover.outcome == "off_ground"
+}
+
+/// Efficiency of a rover in means: 0 for one that ended off the ground, as `sastrugi rover` counts it. It has shown none, and the 1 of a rover that
+/// never drove must not lift a mean.
+pub fn efficiency(rover: &RoverRow) -> f64 {
+    if off_ground(rover) { 0.0 } else { rover.efficiency }
+}
+
+/// Efficiency of a rover that stayed on the ground; NaN for others.
+pub fn shown(rover: &RoverRow) -> f64 {
+    if off_ground(rover) { f64::NAN } else { rover.efficiency }
+}
+
 /// Sets of the plain trials; of all rovers where every one belongs to a variant.
 pub fn plain(data: &Data) -> Vec<Set<'_>> {
     let any = data.rovers.iter().any(|r| r.variant.is_none());

@@ -1,6 +1,6 @@
 //! Figures of one world, as a paper would print them of its only one: the mean over worlds, and the band of one world more.
 
-use super::sets::{Estimate, Set, World, reached};
+use super::sets::{Estimate, Set, World, efficiency, reached, shown};
 use crate::questions::clusters::LEVEL;
 use sastrugi_numeric::sums;
 use sastrugi_schemas::tables::RoverRow;
@@ -21,7 +21,14 @@ pub struct Figure {
 
 /// Mean of the rovers' efficiencies.
 pub const EFFICIENCY: Figure =
-    Figure { id: "mean_efficiency", name: "mean efficiency", unit: "1", totals: |w| w.total(|r| r.efficiency) };
+    Figure { id: "mean_efficiency", name: "mean efficiency", unit: "1", totals: |w| w.total(efficiency) };
+/// Mean of the efficiencies of those that arrive.
+pub const OF_ARRIVALS: Figure = Figure {
+    id: "efficiency_of_arrivals",
+    name: "mean efficiency of arrivals",
+    unit: "1",
+    totals: |w| w.total(|r| if reached(r) { efficiency(r) } else { f64::NAN }),
+};
 /// Straight metres over metres driven.
 pub const STRAIGHT: Figure = Figure {
     id: "straight_over_mean_distance",
@@ -37,14 +44,14 @@ pub const GREATEST: Figure = Figure {
     id: "greatest_efficiency",
     name: "greatest efficiency of a world",
     unit: "1",
-    totals: |w| (w.values(|r| r.efficiency).into_iter().fold(f64::NEG_INFINITY, f64::max), 1.0),
+    totals: |w| (w.values(shown).into_iter().fold(f64::NEG_INFINITY, f64::max), 1.0),
 };
 /// Least efficiency of a world's rovers.
 pub const LEAST: Figure = Figure {
     id: "least_efficiency",
     name: "least efficiency of a world",
     unit: "1",
-    totals: |w| (w.values(|r| r.efficiency).into_iter().fold(f64::INFINITY, f64::min), 1.0),
+    totals: |w| (w.values(shown).into_iter().fold(f64::INFINITY, f64::min), 1.0),
 };
 /// Share of the rovers that arrive.
 pub const ARRIVED: Figure = Figure {
@@ -73,15 +80,36 @@ impl Figure {
         if self.id == ARRIVED.id {
             return arrived(set);
         }
-        set.ratio(|w| (self.totals)(w), LEVEL)
+        let estimate = set.ratio(|w| (self.totals)(w), LEVEL);
+        Estimate { interval: estimate.interval.map(|i| self.within(set, i)), ..estimate }
     }
 
     /// Band in which one more world falls; `None` for a single world.
     pub fn one_more(&self, set: &Set) -> Option<Interval> {
         let values: Vec<f64> = self.values(set).into_iter().map(|v| v.1).collect();
         let band = prediction::one_more_positive(&values, LEVEL)?;
-        let bounded = [EFFICIENCY, GREATEST, LEAST].iter().any(|f| f.id == self.id);
-        Some(if bounded { Interval { high: band.high.min(1.0).max(band.estimate), ..band } } else { band })
+        Some(self.within(set, band))
+    }
+
+    /// An interval on a logarithmic scale, ended at the greatest value that the figure can have.
+    fn within(&self, set: &Set, interval: Interval) -> Interval {
+        let most = self.most(set).max(interval.estimate);
+        Interval { high: interval.high.min(most), low: interval.low.min(most), ..interval }
+    }
+
+    /// The greatest value that the figure can have: 1 for efficiencies. A rover drives at least the straight line less what was left in the end, so straight
+    /// over mean distance may be a little above 1.
+    fn most(&self, set: &Set) -> f64 {
+        match self.id {
+            id if [EFFICIENCY.id, OF_ARRIVALS.id, GREATEST.id, LEAST.id].contains(&id) => 1.0,
+            id if id == STRAIGHT.id => {
+                let driven: Vec<&RoverRow> = set.rovers().filter(|r| r.straight_m.is_finite()).collect();
+                let total = |of: fn(&RoverRow) -> f64| sums::sum(&driven.iter().map(|r| of(r)).collect::<Vec<_>>());
+                let most = total(|r| r.straight_m) / total(|r| (r.straight_m - r.residual_m).max(0.0));
+                if most.is_finite() { most } else { f64::INFINITY }
+            }
+            _ => f64::INFINITY,
+        }
     }
 }
 

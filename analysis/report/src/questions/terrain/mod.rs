@@ -44,7 +44,7 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     }
     let (of_shape, of_heights) = (families(drawn, alike_in_shape), families(drawn, alike_in_heights));
     push(&mut blocks, "Relief", reliefs::figures(data, &of_heights)?);
-    push(&mut blocks, "Rendered", rendered::figures(data, drawn)?);
+    blocks.extend(rendered::blocks(data, drawn)?);
     push(&mut blocks, "Maps", maps::figures(data, drawn)?);
     push(&mut blocks, "Roughness classes", classes::figures(data, drawn)?);
     push(&mut blocks, "Spectra", of_shape.iter().flat_map(|f| spectra::spectra(data, f)).collect());

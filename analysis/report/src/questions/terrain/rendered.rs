@@ -1,69 +1,215 @@
-//! Planets under the sun: the representative of each group of planetary terrains, rendered from above with its albedo and cast shadows.
+//! Planets under the sun: every planetary and elaborated terrain rendered from above with its albedo and cast shadows. The representative of each
+//! group is drawn large, the others are thumbnails.
 //!
 //! Drawing, as the shading of reliefs is: heights and albedo are thinned to the pixels of the picture before.
 
 use super::representative;
 use crate::ReportError;
-use crate::content::{Figure, Numbers, count, number, slug, text};
-use crate::data::{Data, Group};
+use crate::content::{Block, Figure, Numbers, count, number, slug, text};
+use crate::data::{Data, Group, label};
 use crate::questions::relief::{MAP_WIDTH, extent};
+use crate::questions::sql::quoted;
+use crate::render::chart::WIDTH;
 use crate::render::map::{Key, Map};
-use crate::render::{number as set, picture, thin};
-use sastrugi_imaging::{RenderParameters, Scene, Sun, display, render};
-use sastrugi_numeric::Streams;
+use crate::render::picture::{self, Picture};
+use crate::render::svg::{Anchor, Paint, Svg, fitted};
+use crate::render::{number as set, thin};
+use sastrugi_imaging::{RenderParameters, Rendering, Scene, Sun, display, render};
+use sastrugi_numeric::{Grid, Streams};
 use sastrugi_schemas::tables::TerrainRow;
 
-/// Kind of terrain with an albedo of its own.
-const PLANETARY: &str = "planetary";
+/// Kinds of terrain with an albedo of their own.
+const KINDS: [&str; 2] = ["planetary", "elaborate"];
 /// Low in the north-west, so that rocks and rims throw shadows.
 const SUN: Sun = Sun { azimuth_deg: 315.0, elevation_deg: 25.0 };
-/// Largest number of rows or columns of a picture.
+/// Largest number of rows or columns of a large picture.
 const PIXELS: usize = 480;
+/// The same of a thumbnail.
+const THUMBNAIL_PIXELS: usize = 128;
+/// Thumbnails on a page: some 15 kB each.
+const THUMBNAILS_MAX: usize = 96;
+/// Thumbnails in a row.
+const COLUMNS: usize = 4;
+/// Between thumbnails, px.
+const GAP: f64 = 8.0;
+/// Room for the id below a thumbnail, px.
+const LABEL: f64 = 18.0;
+/// Size of the id, px.
+const LABEL_SIZE: f64 = 11.0;
 
-/// One picture for each group.
-pub fn figures(data: &Data, groups: &[Group<TerrainRow>]) -> Result<Vec<Figure>, ReportError> {
+/// A large picture for each group, thumbnails of the other terrains, and how many are left out.
+pub fn blocks(data: &Data, groups: &[Group<TerrainRow>]) -> Result<Vec<Block>, ReportError> {
+    let large: Vec<&TerrainRow> = groups.iter().filter_map(representative).filter(|t| is_planet(t)).collect();
     let mut figures = Vec::new();
-    for terrain in groups.iter().filter_map(representative).filter(|t| t.kind == PLANETARY) {
+    for terrain in &large {
         figures.extend(figure(data, terrain)?);
     }
-    Ok(figures)
+    let others: Vec<&TerrainRow> = data
+        .of_stage("terrain")
+        .filter(|t| is_planet(t) && !large.iter().any(|l| l.terrain_id == t.terrain_id))
+        .collect();
+    let (drawn, left_out) = others.split_at(others.len().min(THUMBNAILS_MAX));
+    for group in drawn.chunk_by(|a, b| label(a) == label(b)) {
+        figures.extend(sheet(data, group)?);
+    }
+    let mut blocks = Vec::new();
+    if !figures.is_empty() {
+        blocks.extend([Block::Heading("Rendered".into()), Block::Figures(figures)]);
+    }
+    if !left_out.is_empty() {
+        blocks.push(Block::Text(format!(
+            "{} of {} planetary and elaborated terrains are not rendered here: a page holds the representative of each group and {THUMBNAILS_MAX} \
+             thumbnails, to stay small. An `[[image]]` renders any terrain of a study.",
+            set::count(left_out.len()),
+            set::count(left_out.len() + drawn.len() + large.len())
+        )));
+    }
+    Ok(blocks)
 }
 
-fn figure(data: &Data, terrain: &TerrainRow) -> Result<Option<Figure>, ReportError> {
+fn is_planet(terrain: &TerrainRow) -> bool {
+    KINDS.contains(&terrain.kind.as_str())
+}
+
+/// A terrain under the sun.
+struct View {
+    rendering: Rendering,
+    picture: Picture,
+    /// Size of the whole terrain, in words.
+    extent: String,
+    /// Rows and columns rendered.
+    shape: [usize; 2],
+    /// Cells along a side of a pixel.
+    step: usize,
+    /// Size of a pixel on the ground, m.
+    pixel_m: f64,
+    with_albedo: bool,
+}
+
+/// Renders a terrain with at most `most` pixels along a side; `None` without its heights.
+fn view(data: &Data, terrain: &TerrainRow, most: usize) -> Result<Option<View>, ReportError> {
     let Some(heights) = data.files.grid(&terrain.path)? else { return Ok(None) };
     let map = terrain.path.strip_suffix(".tif").map(|path| format!("{path}.albedo.tif"));
     let albedo = map.map_or(Ok(None), |path| data.files.grid(&path))?;
-    let step = thin::step(heights.rows(), heights.cols(), PIXELS);
+    let step = thin::step(heights.rows(), heights.cols(), most);
     let thinned = thin::block_mean(&heights, step);
-    let albedo = albedo.map(|grid| thin::block_mean(&grid, step));
+    let albedo: Option<Grid> = albedo.map(|grid| thin::block_mean(&grid, step));
     let parameters = RenderParameters { sun: SUN, samples: 1, ..RenderParameters::default() };
     let scene = Scene { heights: &thinned, albedo: albedo.as_ref() };
     // Without noise nothing is drawn at random.
-    let Ok(rendering) = render(&scene, &parameters, &Streams::for_seed(0, PLANETARY)) else { return Ok(None) };
+    let Ok(rendering) = render(&scene, &parameters, &Streams::for_seed(0, KINDS[0])) else { return Ok(None) };
     let image = rendering.image();
-    let picture = picture::brightness(&image, display::white(&image), PIXELS)?;
-    let albedo_words = if albedo.is_some() { "its albedo" } else { "one albedo" };
-    let columns = [("file", ""), ("rows", "1"), ("cols", "1"), ("mean brightness", "1"), ("in shadow", "%")];
-    let mut numbers = Numbers::of_file(terrain.path.as_str(), &columns);
+    let picture = picture::brightness(&image, display::white(&image), most)?;
+    Ok(Some(View {
+        rendering,
+        picture,
+        extent: extent(&heights),
+        shape: [thinned.rows(), thinned.cols()],
+        step,
+        pixel_m: thinned.geometry.mean_cell(),
+        with_albedo: albedo.is_some(),
+    }))
+}
+
+const COLUMN_NAMES: [(&str, &str); 6] =
+    [("file", ""), ("rows", "1"), ("cols", "1"), ("pixel", "m"), ("mean brightness", "1"), ("in shadow", "%")];
+
+fn row(numbers: &mut Numbers, terrain: &TerrainRow, view: &View) {
     numbers.row([
         text(&terrain.path),
-        count(thinned.rows()),
-        count(thinned.cols()),
-        number(rendering.mean_brightness()),
-        number(100.0 * rendering.share_in_shadow()),
+        count(view.shape[0]),
+        count(view.shape[1]),
+        number(view.pixel_m),
+        number(view.rendering.mean_brightness()),
+        number(100.0 * view.rendering.share_in_shadow()),
     ]);
+}
+
+fn sun_words() -> String {
+    format!(
+        "sun from {} degrees (north-west), {} degrees above the horizon",
+        set::plain(SUN.azimuth_deg, 3),
+        set::plain(SUN.elevation_deg, 3)
+    )
+}
+
+fn figure(data: &Data, terrain: &TerrainRow) -> Result<Option<Figure>, ReportError> {
+    let Some(view) = view(data, terrain, PIXELS)? else { return Ok(None) };
+    let albedo_words = if view.with_albedo { "its albedo" } else { "one albedo" };
+    let mut numbers = Numbers::of_file(terrain.path.as_str(), &COLUMN_NAMES);
+    row(&mut numbers, terrain, &view);
+    let step = view.step;
     Ok(Some(Figure {
         id: slug(&format!("rendered-{}", terrain.terrain_id)),
         title: "Under the sun.".into(),
         caption: format!(
-            "{} from above with {albedo_words} and cast shadows{}; sun from {} degrees (north-west), {} degrees above the horizon.",
+            "{} from above with {albedo_words} and cast shadows, pixels of {}{}; {}.",
             terrain.terrain_id,
-            if step > 1 { format!(", drawn from means over {step} × {step} cells") } else { String::new() },
-            set::plain(SUN.azimuth_deg, 3),
-            set::plain(SUN.elevation_deg, 3)
+            set::with_unit(view.pixel_m, 3, "m"),
+            if step > 1 { format!(" (means over {step} × {step} cells)") } else { String::new() },
+            sun_words()
         ),
-        description: format!("Rendered image of {}, {}.", terrain.path, extent(&heights)),
-        svg: Map::new(&picture, MAP_WIDTH, &Key::Entries(&[])).svg,
+        description: format!("Rendered image of {}, {}.", terrain.path, view.extent),
+        svg: Map::new(&view.picture, MAP_WIDTH, &Key::Entries(&[])).svg,
         numbers,
     }))
+}
+
+/// Thumbnails of terrains of one label, each with its id below.
+fn sheet(data: &Data, terrains: &[&TerrainRow]) -> Result<Option<Figure>, ReportError> {
+    let mut views = Vec::new();
+    for terrain in terrains {
+        views.extend(view(data, terrain, THUMBNAIL_PIXELS)?.map(|view| (*terrain, view)));
+    }
+    let Some((first, _)) = views.first() else { return Ok(None) };
+    let name = label(first);
+    let width = (WIDTH - GAP * (COLUMNS - 1) as f64) / COLUMNS as f64;
+    let height = views.iter().map(|(_, v)| shown(&v.picture, width).1).fold(0.0, f64::max);
+    let lines = views.len().div_ceil(COLUMNS);
+    let mut svg = Svg::new(WIDTH, lines as f64 * (height + LABEL + GAP));
+    let ids: Vec<String> = views.iter().map(|(t, _)| quoted(&t.terrain_id)).collect();
+    let query = format!("select path from 'tables/terrains/*.parquet' where terrain_id in ({})", ids.join(", "));
+    let mut numbers = Numbers::computed(query, &COLUMN_NAMES);
+    for (k, (terrain, view)) in views.iter().enumerate() {
+        let corner = ((k % COLUMNS) as f64 * (width + GAP), (k / COLUMNS) as f64 * (height + LABEL + GAP));
+        let size = shown(&view.picture, width);
+        svg.picture(corner, size, &view.picture.data_uri, false);
+        let words = fitted(&terrain.terrain_id, width, LABEL_SIZE);
+        svg.text_sized((corner.0, corner.1 + size.1 + 13.0), Anchor::Start, Paint::Ink, LABEL_SIZE, &words);
+        row(&mut numbers, terrain, view);
+    }
+    let with_albedo = views.iter().filter(|(_, v)| v.with_albedo).count();
+    let albedo = match with_albedo {
+        0 => "one albedo",
+        n if n == views.len() => "their albedo",
+        _ => "their albedo where they have a map of it",
+    };
+    Ok(Some(Figure {
+        id: slug(&format!("thumbnails-{name}-{}", first.terrain_id)),
+        title: format!("Group {name} under the sun."),
+        caption: format!(
+            "{} from above with {albedo} and cast shadows, pixels of {}, each with a white of its own; {}.",
+            set::counted(views.len(), "terrain"),
+            pixels(&views),
+            sun_words()
+        ),
+        description: format!("Rendered thumbnails of {} of group {name}.", set::counted(views.len(), "terrain")),
+        svg,
+        numbers,
+    }))
+}
+
+/// Size on the page of a picture in a box of that width.
+fn shown(picture: &Picture, width: f64) -> (f64, f64) {
+    let [x, y] = picture.size_m;
+    let scale = width / x.max(y);
+    (scale * x, scale * y)
+}
+
+/// Size of the pixels of all views, in words.
+fn pixels(views: &[(&TerrainRow, View)]) -> String {
+    let sizes = || views.iter().map(|(_, v)| v.pixel_m);
+    let (low, high) = sizes().fold((f64::INFINITY, 0.0_f64), |(a, b), v| (a.min(v), b.max(v)));
+    let ends = [low, high].map(|v| set::with_unit(v, 3, "m"));
+    if ends[0] == ends[1] { ends[0].clone() } else { ends.join(" to ") }
 }

@@ -1,0 +1,63 @@
+//! Rendered pictures of planetary and elaborated terrains.
+
+use super::made_up::{self, Shelf};
+use super::{assert_sound, report, rows};
+use crate::data::Data;
+use sastrugi_numeric::{Geometry, Grid};
+use sastrugi_schemas::tables::TerrainRow;
+
+/// Planetary worlds of one group and elaborated ones of another, 32 x 32 cells of 0.5 m.
+fn planets(planetary: usize, elaborate: usize) -> Data {
+    let (mut data, mut shelf) = (made_up::empty(), Shelf::default());
+    for (kind, n) in [("elaborate", elaborate), ("planetary", planetary)] {
+        for k in 0..n {
+            let g = Geometry::square(32, 32, 0.5);
+            let id = format!("{kind}-{k:04}");
+            let height = |c: usize| 0.2 * libm::sin((g.x(c % 32) + k as f64) * 1.3) * libm::cos(g.y(c / 32));
+            let grid = Grid::new(g, (0..g.len()).map(height).collect());
+            let path = format!("terrain/{id}.tif");
+            let row = made_up::row(&id, "terrain", &path, &grid);
+            data.terrains.push(TerrainRow { kind: kind.into(), rms_slope: 0.1 + 0.001 * k as f64, ..row });
+            if kind == "planetary" {
+                shelf.grids.insert(format!("terrain/{id}.albedo.tif"), grid.map(|z| 0.25 + 0.1 * z));
+            }
+            shelf.grids.insert(path, grid);
+        }
+    }
+    data.files = Box::new(shelf);
+    data
+}
+
+/// Every terrain has a picture: the one with the middle slope of each group a large one, the others thumbnails, each with its row of numbers.
+#[test]
+fn val_every_planet_is_rendered() {
+    let (files, summary) = report(&planets(6, 3));
+    assert_sound(&files);
+    let large: Vec<&String> = summary.figures.iter().filter(|f| f.starts_with("rendered-")).collect();
+    assert_eq!(large, ["rendered-elaborate-0001", "rendered-planetary-0002"]);
+    let sheets = [("elaborate", 2), ("planetary", 5)].map(|(kind, n)| {
+        let found = rows(&files, &format!("thumbnails-{kind}-{kind}-0000"));
+        assert_eq!(found.len(), n);
+        assert!(found.iter().all(|row| row[1] == 32 && row[3] == 0.5), "{found:?}");
+        let svg = &files[&format!("figures/thumbnails-{kind}-{kind}-0000.svg")];
+        assert_eq!(svg.matches("<image").count(), n);
+        found
+    });
+    let drawn = sheets.iter().flatten().filter_map(|row| row[0].as_str()).collect::<Vec<_>>();
+    assert!(!drawn.contains(&"terrain/planetary-0002.tif") && drawn.contains(&"terrain/planetary-0005.tif"));
+    let page = &files["index.html"];
+    assert!(page.contains("5 terrains from above with their albedo and cast shadows, pixels of 0.500 m"));
+    assert!(
+        page.contains("2 terrains from above with one albedo")
+            && page.contains("sun from 315 degrees (north-west), 25 degrees above the horizon")
+    );
+    assert!(!page.contains("are not rendered here"));
+}
+
+/// A page holds 96 thumbnails, and says how many terrains it leaves out.
+#[test]
+fn val_thumbnails_are_bounded() {
+    let (files, _) = report(&planets(100, 0));
+    assert_eq!(rows(&files, "thumbnails-planetary-planetary-0000").len(), 96);
+    assert!(files["index.html"].contains("3 of 100 planetary and elaborated terrains are not rendered here"));
+}
