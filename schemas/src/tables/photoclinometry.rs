@@ -35,7 +35,7 @@ super::table! {
         stereo_points: i64 ["1"],
         /// Mean number of images that show a cell lit.
         lit_mean: f64 ["1"],
-        /// Share of cells whose albedo leans on their neighbours, 0 to 1.
+        /// Of the cells that an image shows, the share whose albedo leans on their neighbours, 0 to 1.
         share_leaning: f64 ["1"],
         /// Median condition number of the equations of a cell.
         condition: f64 ["1"],

@@ -75,8 +75,11 @@ pub struct Recovered {
     pub height_sigma: Option<Grid>,
     /// Images that show each cell lit.
     pub lit: Grid<u8>,
-    /// Cells whose albedo leans on their neighbours: fewer than three images, or too badly conditioned.
-    pub leaning: Grid<bool>,
+    /// 1 in cells whose albedo leans on their neighbours (fewer than three images show them lit, or they are too badly conditioned), 0 in
+    /// others; NaN where no image shows the cell.
+    pub leaning: Grid,
+    /// Mean of `leaning` over the cells that an image shows.
+    pub share_leaning: f64,
     /// Condition number of each cell's equations; infinite where they determine too little.
     pub condition: Grid,
     /// Multiple correlation of albedo and slopes of each cell.
@@ -514,10 +517,11 @@ impl<'a> Inversion<'a> {
             }
             _ => None,
         };
-        let leaning: Vec<bool> = self.cells.iter().map(|c| c.is_none_or(|c| c.leaning)).collect();
-        let share = leaning.iter().filter(|l| **l).count() as f64 / g.len() as f64;
-        if share > 0.0 {
-            self.warnings.push(format!("{:.1} % of the cells lean on the albedo of their neighbours", 100.0 * share));
+        let leaning = Grid::new(g, of(&|c| f64::from(u8::from(c.leaning))));
+        let share_leaning = sums::mean(&sums::finite(&leaning.values));
+        if share_leaning > 0.0 {
+            let percent = 100.0 * share_leaning;
+            self.warnings.push(format!("{percent:.1} % of the cells lean on the albedo of their neighbours"));
         }
         let unreached = self.unreached.iter().filter(|u| **u).count();
         if unreached > 0 {
@@ -536,7 +540,8 @@ impl<'a> Inversion<'a> {
             condition: Grid::new(g, of(&|c| c.fit.condition)),
             albedo_slope_correlation: Grid::new(g, of(&|c| c.fit.albedo_slope_correlation())),
             heights: Grid::new(g, masked(self.heights_m, &self.cells)),
-            leaning: Grid::new(g, leaning),
+            leaning,
+            share_leaning,
             covariances,
             height_sigma,
             calibrations: self.calibrations,

@@ -285,7 +285,7 @@ impl PhotoclinometryJob {
             change_m: last.map_or(f64::NAN, |r| r.change_m),
             stereo_points: last.map_or(0, |r| r.stereo_points as i64),
             lit_mean: sums::mean(&r.lit.map(f64::from).values),
-            share_leaning: made.share_leaning(),
+            share_leaning: made.recovered.share_leaning,
             condition: sums::median(&known(&r.condition.values)),
             albedo_slope_correlation: sums::median(&known(&r.albedo_slope_correlation.values)),
             noise_scale: r.noise_scale,

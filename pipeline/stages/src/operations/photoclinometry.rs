@@ -227,7 +227,7 @@ impl Made {
             Some(of(&|[pp, _, _, qq, ..]| (pp + qq).sqrt())),
             Some(of(&|covariance| covariance[5].sqrt())),
             Some(r.condition.map(|c| if c.is_finite() { c } else { f64::NAN })),
-            Some(r.leaning.map(|leaning| f64::from(u8::from(leaning)))),
+            Some(r.leaning.clone()),
         ];
         let map = |((ending, unit, description), values): (_, Option<Grid>)| {
             Some(Map { ending, unit, description, values: values? })
@@ -248,12 +248,6 @@ impl Made {
         let notes = dem::write(heights, &self.recovered.heights, &self.crs, options).map_err(JobError::io)?;
         maps.into_iter().try_for_each(|(map, target)| map.write(target, &self.crs, options))?;
         Ok(notes)
-    }
-
-    /// Share of the cells that lean on the albedo of their neighbours.
-    pub fn share_leaning(&self) -> f64 {
-        let leaning = &self.recovered.leaning.values;
-        leaning.iter().filter(|l| **l).count() as f64 / leaning.len() as f64
     }
 }
 

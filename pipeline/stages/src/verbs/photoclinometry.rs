@@ -171,7 +171,7 @@ fn told(request: &Request<'_>, made: &Made, maps: &[(Map, PathBuf)], notes: Vec<
         "grid": super::describe_grid(&r.heights),
         "rounds": rounds,
         "converged": r.converged,
-        "share_leaning": made.share_leaning(),
+        "share_leaning": made.recovered.share_leaning,
         "condition": median(&r.condition.values),
         "albedo_slope_correlation": median(&r.albedo_slope_correlation.values),
         "noise_scale": r.noise_scale,

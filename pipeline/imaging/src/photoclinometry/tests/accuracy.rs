@@ -43,7 +43,7 @@ fn val_images_without_noise_give_the_surface_back() {
     // Far inside the bound for heights: the integration is of fourth order.
     assert!(heights < 0.01 * 2.0, "{heights}");
     assert!(found.converged && found.rounds.len() == 2, "{:?}", found.rounds);
-    assert!(found.lit.values.iter().all(|&n| n == 3) && found.leaning.values.iter().all(|l| !l));
+    assert!(found.lit.values.iter().all(|&n| n == 3) && found.leaning.values.iter().all(|l| *l == 0.0));
 }
 
 /// Acceptance: 1 % noise, the same suns: slopes within 0.03 (rms), and the table of other suns (section 11 of the specification: 0.016, 0.060, 0.50,
