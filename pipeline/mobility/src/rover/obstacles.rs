@@ -1,7 +1,7 @@
 //! What a rover that knows the whole map would keep clear of: cells with rocks that it cannot pass over, and sand that is too steep.
 //!
-//! The sand is known by its plane around every half metre of ground ([`super::contacts::sand_plane`]). A cell is blocked where a sample of
-//! rock stands higher above it than the obstacle height, where the plane is too steep, or where the ground is not known.
+//! The sand is known by its plane around every half metre of ground ([`super::contacts::sand_plane`]). Obstacles are samples of rock that stand
+//! higher above it than the obstacle height, and the ground where the plane is too steep or nothing is known.
 
 use super::contacts::sand_plane;
 use super::sensing::Sensor;
@@ -20,23 +20,19 @@ pub struct ObstacleLimits {
     pub height_m: f64,
     /// Steepest sand, m per m.
     pub slope_max: f64,
+    /// How far the centre of the rover stays from what stops it, m.
+    pub margin_m: f64,
 }
 
 impl Task {
-    /// What the rover's body cannot do: rocks above its clearance, and sand steeper than its sensor lets it drive on.
+    /// What the rover's body cannot do: drive nearer than its wheels are to rocks above its clearance, and to sand steeper than its sensor
+    /// lets it drive on.
     pub fn obstacle_limits(&self) -> ObstacleLimits {
         let slope_max = match &self.sensor {
             Sensor::Rays(rays) => libm::tan(rays.tilt_max_rad),
             Sensor::Rectangles(rectangles) => rectangles.slope_max,
         };
-        ObstacleLimits { height_m: self.clearance_m, slope_max }
-    }
-
-    /// Least distance between a blocked cell of `cell_m` and a cell of the rover's centre, m: half of its track less a cell, since rock and centre lie
-    /// half a cell inside their own on average. A way may so pass rocks at half of the track less a cell, and gaps that are narrower
-    /// than the body by up to two cells: it is a bound of how short ways can be, not a way to drive.
-    pub fn obstacle_margin_m(&self, cell_m: f64) -> f64 {
-        (self.chassis.track_m - cell_m).max(0.0)
+        ObstacleLimits { height_m: self.clearance_m, slope_max, margin_m: self.chassis.track_m }
     }
 }
 
@@ -58,38 +54,77 @@ pub fn block_rows(map: &Geometry) -> usize {
     map.rows / CELLS
 }
 
-/// Cells of one row of blocks, counted from the north, that are blocked: `CELLS` rows of the map.
-pub fn blocked(ground: &impl Ground, map: &Geometry, block_row: usize, limits: &ObstacleLimits) -> Vec<bool> {
-    let mut cells = vec![false; CELLS * map.cols];
+/// Numbers of the cells that one row of blocks, counted from the north, blocks: those whose centre lies within the margin of an obstacle in it,
+/// and those that hold one. Ways over cells that nothing blocks pass an obstacle at the margin less half of a cell's diagonal, or farther off.
+pub fn blocked(ground: &impl Ground, map: &Geometry, block_row: usize, limits: &ObstacleLimits) -> Vec<usize> {
+    let mut cells = Blocked::new(map, block_row, limits.margin_m);
     let north = map.y(block_row * CELLS) + 0.5 * map.cell[1];
     for block in 0..map.cols / CELLS {
-        let west = map.origin[0] + block as f64 * BLOCK_M;
-        let corner = [west, north - BLOCK_M];
-        let mut part = [false; CELLS * CELLS];
-        if block_cells(ground, corner, limits, &mut part).is_err() {
-            part.fill(true);
-        }
-        for (k, blocked) in part.into_iter().enumerate() {
-            // Of the part row 0 is in the south.
-            let (row, col) = (CELLS - 1 - k / CELLS, block * CELLS + k % CELLS);
-            cells[row * map.cols + col] = blocked;
+        let corner = [map.origin[0] + block as f64 * BLOCK_M, north - BLOCK_M];
+        if obstacles(ground, corner, limits, |at| cells.mark(at)).is_err() {
+            centres(corner).for_each(|at| cells.mark(at));
         }
     }
-    cells
+    cells.numbers()
 }
 
-/// The cells of a block with its south-west corner.
-fn block_cells(
+/// Cells around a row of blocks.
+struct Blocked<'a> {
+    map: &'a Geometry,
+    margin_m: f64,
+    /// Cells within the margin along an axis.
+    reach: usize,
+    first_row: usize,
+    marked: Vec<bool>,
+}
+
+impl<'a> Blocked<'a> {
+    fn new(map: &'a Geometry, block_row: usize, margin_m: f64) -> Self {
+        let reach = (libm::ceil(margin_m / map.mean_cell()) as usize + 1).min(map.rows.max(map.cols));
+        let first_row = (block_row * CELLS).saturating_sub(reach);
+        let last_row = (block_row * CELLS + CELLS + reach).min(map.rows);
+        Self { map, margin_m, reach, first_row, marked: vec![false; (last_row - first_row) * map.cols] }
+    }
+
+    /// Blocks the cells around an obstacle.
+    fn mark(&mut self, [x, y]: [f64; 2]) {
+        let Some((row, col)) = self.map.cell_at(x, y) else { return };
+        let Self { map, reach, first_row, .. } = *self;
+        let last_row = first_row + self.marked.len() / map.cols;
+        for r in row.saturating_sub(reach).max(first_row)..(row + reach + 1).min(last_row) {
+            for c in col.saturating_sub(reach)..(col + reach + 1).min(map.cols) {
+                let [east, north] = [map.x(c) - x, map.y(r) - y];
+                if (r, c) == (row, col) || east * east + north * north <= self.margin_m * self.margin_m {
+                    self.marked[(r - first_row) * map.cols + c] = true;
+                }
+            }
+        }
+    }
+
+    fn numbers(self) -> Vec<usize> {
+        let first = self.first_row * self.map.cols;
+        self.marked.into_iter().enumerate().filter(|(_, marked)| *marked).map(|(k, _)| first + k).collect()
+    }
+}
+
+/// Centres of the cells of a block with this south-west corner.
+fn centres([west, south]: [f64; 2]) -> impl Iterator<Item = [f64; 2]> {
+    let at = |k: usize| (k as f64 + 0.5) * (BLOCK_M / CELLS as f64);
+    (0..CELLS * CELLS).map(move |k| [west + at(k % CELLS), south + at(k / CELLS)])
+}
+
+/// Visits what stops a rover in the block with this south-west corner.
+fn obstacles(
     ground: &impl Ground,
     [west, south]: [f64; 2],
     limits: &ObstacleLimits,
-    cells: &mut [bool],
+    mut visit: impl FnMut([f64; 2]),
 ) -> Result<(), NoGround> {
     let centre = [west + 0.5 * BLOCK_M, south + 0.5 * BLOCK_M];
     let sand = sand_plane(ground, centre)?;
     let [ahead, left] = sand.slopes;
     if ahead * ahead + left * left > limits.slope_max * limits.slope_max {
-        cells.fill(true);
+        centres([west, south]).for_each(visit);
         return Ok(());
     }
     let count = libm::ceil(BLOCK_M / ground.cell_m()).max(CELLS as f64) as usize;
@@ -97,9 +132,10 @@ fn block_cells(
     for j in 0..count {
         for i in 0..count {
             let offset = [i, j].map(|n| (n as f64 + 0.5) * step_m - 0.5 * BLOCK_M);
-            let point = ground.at(centre[0] + offset[0], centre[1] + offset[1])?;
+            let at = [centre[0] + offset[0], centre[1] + offset[1]];
+            let point = ground.at(at[0], at[1])?;
             if point.class == GroundClass::Rock && point.height_m - sand.height_m(offset) > limits.height_m {
-                cells[j * CELLS / count * CELLS + i * CELLS / count] = true;
+                visit(at);
             }
         }
     }

@@ -266,29 +266,49 @@ fn prop_draws_are_named() {
     assert_ne!(first, a.normal(Purpose::Heading));
 }
 
-/// The map of obstacles blocks the cells of a rock above the limit, on a slope as on level ground, no others; steep sand and unknown ground
-/// wholly.
+/// The map of obstacles blocks the cells with a centre within the margin of a rock above the limit, on a slope as on level ground, and no
+/// others, by the slow reference: every sample against every cell. Steep sand and unknown ground are blocked wholly.
 #[test]
 fn val_obstacles_are_mapped() {
+    use super::contacts::sand_plane;
     use super::obstacles::{ObstacleLimits, block_rows, blocked, map_geometry};
-    let limits = ObstacleLimits { height_m: 0.13, slope_max: 0.4 };
+    let limits = |margin_m: f64| ObstacleLimits { height_m: 0.13, slope_max: 0.4, margin_m };
     let map = map_geometry([-1.0, -1.0, 1.3, 1.0]);
     assert_eq!((map.rows, map.cols, map.origin), (20, 25, [-1.0, -1.0]));
-    let of = |ground: &Made| -> Vec<bool> {
-        (0..block_rows(&map)).flat_map(|row| blocked(ground, &map, row, &limits)).collect()
-    };
-    for slopes in [[0.0, 0.0], [0.2, -0.3]] {
-        let ground = Made { slopes, ..Made::flat(&[([0.31, -0.42], 0.15, 0.2), ([-0.6, 0.6], 0.15, 0.1)]) };
-        for (k, blocked) in of(&ground).into_iter().enumerate() {
-            let [x, y] = [map.x(k % map.cols), map.y(k / map.cols)];
-            let away = ((x - 0.31) * (x - 0.31) + (y + 0.42) * (y + 0.42)).sqrt();
-            assert!(blocked || away > 0.10, "free at {x} {y}");
-            assert!(!blocked || away < 0.15 + 0.08, "blocked at {x} {y}");
+    let of = |ground: &Made, margin_m: f64| -> Vec<bool> {
+        let mut cells = vec![false; map.len()];
+        for row in 0..block_rows(&map) {
+            blocked(ground, &map, row, &limits(margin_m)).into_iter().for_each(|cell| cells[cell] = true);
         }
+        cells
+    };
+    for (slopes, margin_m) in [([0.0, 0.0], 0.0), ([0.2, -0.3], 0.0), ([0.0, 0.0], 0.2), ([0.2, -0.3], 0.33)] {
+        let ground = Made { slopes, ..Made::flat(&[([0.31, -0.42], 0.15, 0.2), ([-0.6, 0.6], 0.15, 0.1)]) };
+        let mut expected = vec![false; map.len()];
+        for k in 0..125 * 100 {
+            let at = [-1.0 + 0.02 * (f64::from(k % 125) + 0.5), -1.0 + 0.02 * (f64::from(k / 125) + 0.5)];
+            let middle = at.map(|v| 0.5 * (2.0 * v).floor() + 0.25);
+            let above_m = {
+                let sand = sand_plane(&ground, middle).unwrap();
+                ground.at(at[0], at[1]).unwrap().height_m - sand.height_m([at[0] - middle[0], at[1] - middle[1]])
+            };
+            if ground.at(at[0], at[1]).unwrap().class != GroundClass::Rock || above_m <= 0.13 {
+                continue;
+            }
+            for (cell, expected) in expected.iter_mut().enumerate() {
+                let [x, y] = [map.x(cell % map.cols) - at[0], map.y(cell / map.cols) - at[1]];
+                *expected |= x * x + y * y <= margin_m * margin_m || x.abs().max(y.abs()) < 0.05;
+            }
+        }
+        assert_eq!(of(&ground, margin_m), expected, "{slopes:?} {margin_m}");
+        assert!(expected.iter().any(|blocked| *blocked) && !expected.iter().all(|blocked| *blocked));
     }
     let steep = Made { slopes: [0.5, 0.0], ..Made::flat(&[]) };
     let unknown = Made { known_m: 0.5, ..Made::flat(&[]) };
-    assert!(of(&steep).into_iter().all(|blocked| blocked) && of(&unknown).into_iter().all(|blocked| blocked));
+    for margin_m in [0.0, 0.2] {
+        assert!(of(&steep, margin_m).into_iter().all(|blocked| blocked));
+        assert!(of(&unknown, margin_m).into_iter().all(|blocked| blocked));
+    }
 }
 
 /// Slip shortens drives; a rover that reckons its place by its commands then stops short of the goal, lost.

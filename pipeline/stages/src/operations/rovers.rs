@@ -8,8 +8,7 @@ use rayon::prelude::*;
 use sastrugi_mobility::rover::obstacles;
 use sastrugi_mobility::rover::quantised::{HEIGHT_STEP_MAX_M, height_step_m};
 use sastrugi_mobility::rover::{Drive, Ending, RoverParameters, Start, Surroundings, Task};
-use sastrugi_navigation::map::Neighbourhood;
-use sastrugi_navigation::obstacles::block_cells;
+use sastrugi_navigation::map::{Neighbourhood, Node};
 use sastrugi_navigation::{CostModel, Method, RouteError, RouteSettings, SlopeCost, SlopeLimits, TravelMap, line};
 use sastrugi_numeric::{Grid, Ground, GroundClass, GroundGrid};
 use sastrugi_schemas::{ParameterError, RoughnessClass};
@@ -130,8 +129,8 @@ impl Oracle {
     }
 }
 
-/// For each start the shortest way over ground that is free of rocks above the clearance and of steep sand, with margin [`Task::obstacle_margin_m`]: lines at
-/// any angle over a map of 0.1 m cells, which reaches beyond all starts and goals.
+/// For each start the shortest way around rocks above the clearance and steep sand ([`Task::obstacle_limits`]): lines at any angle over a map
+/// of 0.1 m cells, which reaches beyond all starts and goals.
 ///
 /// # Errors
 /// A map that cannot be planned on.
@@ -144,10 +143,10 @@ pub fn oracles(grounds: &Grounds, task: &Task, starts: &[Start]) -> Result<Vec<O
         Grounds::World(world) => obstacles::blocked(&world.view(), &geometry, n, &limits),
         Grounds::Grid(grid) => obstacles::blocked(grid, &geometry, n, &limits),
     };
-    let marked: Vec<bool> = (0..obstacles::block_rows(&geometry)).into_par_iter().flat_map_iter(row).collect();
+    let blocked: Vec<usize> = (0..obstacles::block_rows(&geometry)).into_par_iter().flat_map_iter(row).collect();
     let free = SlopeLimits::new(LEVEL_DEG, LEVEL_DEG).map_err(JobError::new)?;
     let mut map = TravelMap::new(Grid::filled(geometry, 0.0), free).map_err(JobError::new)?;
-    block_cells(&mut map, &marked, task.obstacle_margin_m(geometry.mean_cell())).map_err(JobError::new)?;
+    blocked.into_iter().for_each(|cell| map.block(cell as Node));
     let costs = CostModel::new(SlopeCost::Linear { up: 0.0, down: 0.0 }, None, &map).map_err(JobError::new)?;
     let ground = line::Ground { map: &map, costs: &costs, clearance: None };
     let settings =
