@@ -26,7 +26,7 @@ fn world(coverage: f64) -> Planetary {
 /// All rovers of a trial on one world.
 fn trial(navigator: &Navigator, parameters: &RoverParameters, coverage: f64, seed: u64) -> Vec<Drive> {
     let streams = Streams::for_seed(seed, "terrain");
-    let starts = parameters.starts(&Streams::for_seed(seed, "rover"));
+    let starts = parameters.starts(&Streams::for_seed(seed, "rover"), |_| true);
     let clearing = |centre_m: [f64; 2]| Clearing { centre_m, radius_m: parameters.clear_m };
     let clearings: Vec<Clearing> = starts.iter().flat_map(|s| [clearing(s.start_m), clearing(s.goal_m)]).collect();
     let ground = world(coverage).ground(&streams, parameters.cell_m, &clearings, 400).unwrap();
@@ -194,7 +194,7 @@ fn prop_tracks_do_not_depend_on_the_cache() {
     let [small, large] = [1, 64].map(|tiles| {
         let streams = Streams::for_seed(3, "terrain");
         let ground = world(0.118).ground(&streams, 0.02, &[], tiles).unwrap();
-        let starts = parameters.starts(&Streams::for_seed(3, "rover"));
+        let starts = parameters.starts(&Streams::for_seed(3, "rover"), |_| true);
         let noise = Counter::new(&mut Streams::for_seed(3, "rover").stream("noise"));
         let track = |(k, start): (usize, &Start)| {
             let mut track = Vec::new();

@@ -4,7 +4,7 @@ use super::motion::NoiseParameters;
 use super::policies::{Policy, SchoppersLike, SchoppersRules, SojournerLike, SojournerRules};
 use super::pose::Chassis;
 use super::sensing::{RaySensor, RectangleSensor, Sensor};
-use super::starts::{self, Facing, Start};
+use super::starts::{self, Disk, Facing, Start};
 use super::trial::Task;
 use sastrugi_numeric::Streams;
 use sastrugi_schemas::ParameterError;
@@ -235,7 +235,7 @@ pub enum Starts {
     /// At equal angles on a circle about the common goal.
     #[default]
     Circle,
-    /// At drawn places in a disk, with goals `distance_m` away in drawn directions.
+    /// At drawn places in a disk, with goals `distance_m` away in drawn directions; drawn again where there is no ground.
     Drawn,
 }
 
@@ -304,12 +304,14 @@ impl RoverParameters {
         self.noise.check().map_err(|e| e.within("noise"))
     }
 
-    /// Starts and goals; draws are those of the streams.
-    pub fn starts(&self, streams: &Streams) -> Vec<Start> {
+    /// Starts and goals; draws are those of the streams. Drawn ones lie on the ground, if any are found there.
+    pub fn starts(&self, streams: &Streams, on_ground: impl Fn([f64; 2]) -> bool) -> Vec<Start> {
         let Self { rovers, centre_m, radius_m, distance_m, facing, .. } = *self;
         match self.starts {
             Starts::Circle => starts::on_circle(rovers, centre_m, radius_m, facing, streams),
-            Starts::Drawn => starts::drawn(rovers, centre_m, radius_m, distance_m, facing, streams),
+            Starts::Drawn => {
+                starts::drawn(rovers, &Disk { centre_m, radius_m, distance_m }, facing, streams, on_ground)
+            }
         }
     }
 

@@ -6,6 +6,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{PI, TAU};
 
+/// How often a start is drawn before one off the ground is kept.
+pub const DRAWS_MAX: u32 = 1000;
+
 /// A start and its goal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Start {
@@ -64,23 +67,45 @@ pub fn on_circle(count: u32, centre_m: [f64; 2], radius_m: f64, facing: Facing, 
     (0..count).map(start).collect()
 }
 
-/// Starts and goals a distance apart, at drawn places in a disk about the centre, in drawn directions.
+/// Where starts and goals are drawn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Disk {
+    /// Its centre, m.
+    pub centre_m: [f64; 2],
+    /// Its radius, m.
+    pub radius_m: f64,
+    /// From start to goal, m.
+    pub distance_m: f64,
+}
+
+impl Disk {
+    fn draw(&self, stream: &mut Stream) -> Start {
+        let (sin, cos) = libm::sincos(stream.uniform_in(0.0, TAU));
+        let away_m = self.radius_m * stream.uniform_in(0.0, 1.0).sqrt();
+        let start_m = [self.centre_m[0] + away_m * cos, self.centre_m[1] + away_m * sin];
+        let (sin, cos) = libm::sincos(stream.uniform_in(0.0, TAU));
+        Start::facing(start_m, [start_m[0] + self.distance_m * cos, start_m[1] + self.distance_m * sin])
+    }
+}
+
+/// Starts at drawn places in a disk, and goals in drawn directions. Each is drawn again, up to [`DRAWS_MAX`] times, until both are `on_ground`.
 pub fn drawn(
     count: u32,
-    centre_m: [f64; 2],
-    radius_m: f64,
-    distance_m: f64,
+    disk: &Disk,
     facing: Facing,
     streams: &Streams,
+    on_ground: impl Fn([f64; 2]) -> bool,
 ) -> Vec<Start> {
     let start = |k: u32| {
         let mut stream = stream(streams, k);
-        let (sin, cos) = libm::sincos(stream.uniform_in(0.0, TAU));
-        let away_m = radius_m * stream.uniform_in(0.0, 1.0).sqrt();
-        let start_m = [centre_m[0] + away_m * cos, centre_m[1] + away_m * sin];
-        let (sin, cos) = libm::sincos(stream.uniform_in(0.0, TAU));
-        let goal_m = [start_m[0] + distance_m * cos, start_m[1] + distance_m * sin];
-        Start::facing(start_m, goal_m).turned(facing, &mut stream)
+        let mut start = disk.draw(&mut stream);
+        for _ in 1..DRAWS_MAX {
+            if on_ground(start.start_m) && on_ground(start.goal_m) {
+                break;
+            }
+            start = disk.draw(&mut stream);
+        }
+        start.turned(facing, &mut stream)
     };
     (0..count).map(start).collect()
 }

@@ -266,6 +266,27 @@ fn prop_draws_are_named() {
     assert_ne!(first, a.normal(Purpose::Heading));
 }
 
+/// Starts are drawn again until they and their goals have ground; the others stay where they were, and where there is no ground at all the
+/// draws end.
+#[test]
+fn prop_starts_are_drawn_on_the_ground() {
+    let trial = RoverParameters {
+        rovers: 50,
+        starts: parameters::Starts::Drawn,
+        radius_m: 5.0,
+        distance_m: 2.0,
+        ..Default::default()
+    };
+    let streams = Streams::for_seed(3, "rover");
+    let east = |[x, _]: [f64; 2]| x > 0.0;
+    let (anywhere, kept) = (trial.starts(&streams, |_| true), trial.starts(&streams, east));
+    assert!(kept.iter().all(|s| east(s.start_m) && east(s.goal_m)));
+    let had_ground = |s: &Start| east(s.start_m) && east(s.goal_m);
+    assert!(anywhere.iter().zip(&kept).all(|(first, kept)| had_ground(first) == (first == kept)));
+    assert!((5..45).contains(&anywhere.iter().filter(|s| had_ground(s)).count()));
+    assert_eq!(trial.starts(&streams, |_| false).len(), 50);
+}
+
 /// The map of obstacles blocks the cells with a centre within the margin of a rock above the limit, on a slope as on level ground, and no
 /// others, by the slow reference: every sample against every cell. Steep sand and unknown ground are blocked wholly.
 #[test]
@@ -283,7 +304,7 @@ fn val_obstacles_are_mapped() {
         cells
     };
     for (slopes, margin_m) in [([0.0, 0.0], 0.0), ([0.2, -0.3], 0.0), ([0.0, 0.0], 0.2), ([0.2, -0.3], 0.33)] {
-        let ground = Made { slopes, ..Made::flat(&[([0.31, -0.42], 0.15, 0.2), ([-0.6, 0.6], 0.15, 0.1)]) };
+        let ground = Made { slopes, ..Made::flat(&[([0.31, -0.42], 0.151, 0.2), ([-0.6, 0.6], 0.151, 0.1)]) };
         let mut expected = vec![false; map.len()];
         for k in 0..125 * 100 {
             let at = [-1.0 + 0.02 * (f64::from(k % 125) + 0.5), -1.0 + 0.02 * (f64::from(k / 125) + 0.5)];

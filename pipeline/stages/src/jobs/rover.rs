@@ -478,10 +478,9 @@ impl Job for RoverJob {
 
     fn run(&self, work: &Work<'_>) -> Result<Outcome, JobError> {
         let parameters = &self.trial.parameters;
-        let starts = parameters.starts(&self.streams);
+        let heights = work.parent(&self.field.item, HEIGHTS)?;
+        let (grounds, starts) = Grounds::new(&self.field, &heights, parameters, &self.streams)?;
         let noise = Counter::new(&mut self.streams.stream("noise"));
-        let grounds = Grounds::new(&self.field, &work.parent(&self.field.item, HEIGHTS)?, parameters, &starts)?;
-        grounds.check_places(&starts)?;
         let oracles = rovers::oracles(&grounds, &self.trial.navigator.task(parameters), &starts)?;
         let one = |(k, start): (usize, &Start)| match &grounds {
             Grounds::World(world) => self.drive(work, &world.view(), k, (start, oracles[k]), noise),
@@ -491,6 +490,7 @@ impl Job for RoverJob {
         let mut driven = driven?;
         let products = driven.iter_mut().flat_map(|d| std::mem::take(&mut d.products)).collect();
         let mut outcome = Outcome { products, notes: notes(&driven) };
+        outcome.notes.extend(rovers::redrawn(parameters, &self.streams, &starts));
         outcome.write_rows(work, driven.iter_mut().flat_map(|d| std::mem::take(&mut d.samples)))?;
         outcome.write_rows(work, driven.into_iter().map(|d| d.row))?;
         Ok(outcome)

@@ -155,10 +155,9 @@ impl Job for DesignsJob {
 
     fn run(&self, work: &Work<'_>) -> Result<Outcome, JobError> {
         let parameters = &self.trial.parameters;
-        let starts = parameters.starts(&self.streams);
+        let heights = work.parent(&self.field.item, HEIGHTS)?;
+        let (grounds, starts) = Grounds::new(&self.field, &heights, parameters, &self.streams)?;
         let noise = Counter::new(&mut self.streams.stream("noise"));
-        let grounds = Grounds::new(&self.field, &work.parent(&self.field.item, HEIGHTS)?, parameters, &starts)?;
-        grounds.check_places(&starts)?;
         let drives = match &grounds {
             Grounds::World(world) => self.drives(|| world.view(), &starts, noise),
             Grounds::Grid(grid) => self.drives(|| grid, &starts, noise),

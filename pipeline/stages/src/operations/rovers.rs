@@ -10,7 +10,7 @@ use sastrugi_mobility::rover::quantised::{HEIGHT_STEP_MAX_M, height_step_m};
 use sastrugi_mobility::rover::{Drive, Ending, RoverParameters, Start, Surroundings, Task};
 use sastrugi_navigation::map::{Neighbourhood, Node};
 use sastrugi_navigation::{CostModel, Method, RouteError, RouteSettings, SlopeCost, SlopeLimits, TravelMap, line};
-use sastrugi_numeric::{Grid, Ground, GroundClass, GroundGrid};
+use sastrugi_numeric::{Grid, Ground, GroundClass, GroundGrid, Streams};
 use sastrugi_schemas::{ParameterError, RoughnessClass};
 use sastrugi_store::dem;
 use sastrugi_store::mcap::{ROCK, SAND};
@@ -51,18 +51,34 @@ impl Grounds {
     ///
     /// # Errors
     /// The first of them.
-    pub fn check_places(&self, starts: &[Start]) -> Result<(), JobError> {
+    fn check_places(&self, starts: &[Start]) -> Result<(), JobError> {
         match self {
             Self::World(world) => places_on(&world.view(), starts),
             Self::Grid(grid) => places_on(grid, starts),
         }
     }
 
-    /// The ground of a terrain; `heights` is its file, beside which its maps lie.
+    /// The ground of a terrain, and the starts of a trial on it; `heights` is its file, beside which its maps lie.
     ///
     /// # Errors
-    /// Files that cannot be read.
+    /// Files that cannot be read, starts or goals off the ground.
     pub fn new(
+        field: &Heightfield,
+        heights: &Path,
+        parameters: &RoverParameters,
+        streams: &Streams,
+    ) -> Result<(Self, Vec<Start>), JobError> {
+        let starts = anywhere(parameters, streams);
+        let grounds = Self::around(field, heights, parameters, &starts)?;
+        let starts = match &grounds {
+            Self::World(_) => starts,
+            Self::Grid(grid) => parameters.starts(streams, |[x, y]| grid.at(x, y).is_ok()),
+        };
+        grounds.check_places(&starts)?;
+        Ok((grounds, starts))
+    }
+
+    fn around(
         field: &Heightfield,
         heights: &Path,
         parameters: &RoverParameters,
@@ -180,6 +196,18 @@ pub fn ground_codes(around: &Surroundings) -> Grid<u8> {
         None => RoughnessClass::NO_DATA,
     };
     Grid { geometry: around.classes.geometry, values: around.classes.values.iter().map(code).collect() }
+}
+
+/// Starts without a look at the ground.
+fn anywhere(parameters: &RoverParameters, streams: &Streams) -> Vec<Start> {
+    parameters.starts(streams, |_| true)
+}
+
+/// A sentence on starts that were drawn again, for want of ground.
+pub fn redrawn(parameters: &RoverParameters, streams: &Streams, starts: &[Start]) -> Option<String> {
+    let count = anywhere(parameters, streams).iter().zip(starts).filter(|(first, kept)| first != kept).count();
+    (count > 0)
+        .then(|| format!("{count} of {} starts were drawn again: they or their goals had no ground", starts.len()))
 }
 
 /// Refuses starts and goals without ground.
