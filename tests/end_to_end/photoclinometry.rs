@@ -47,6 +47,12 @@ altimetry = "laser.csv"
 photometry = {{ lambert = 1.0, lommel_seeliger = 0.0 }}
 first_image_errors = {{ sun_azimuth_deg = 20.0, sun_elevation_deg = 5.0 }}
 
+[[photoclinometry]]
+id = "misplaced"
+images = ["suns"]
+samples = 0
+sweep."first_image_errors.shift_east_m" = [90.0, 360.0]
+
 [[fit]]
 id = "of-recovered"
 dem = "held"
@@ -126,6 +132,9 @@ fn val_a_study_recovers_a_measured_surface() {
         assert_eq!(number(of("misled"), column), number(plain, column), "{column}");
     }
     assert!(number(of("misled"), "slope_error_rms") > 1.05 * number(plain, "slope_error_rms"));
+    // A misplaced image costs the shading, not the heights: a quarter of a pixel little, a whole one much.
+    let shaded = [plain, of("misplaced-90.0"), of("misplaced-360.0")].map(|row| number(row, "shaded_correlation"));
+    assert!(shaded[0] > shaded[1] && shaded[1] > shaded[2] + 0.01, "{shaded:?}");
     assert!(files.contains_key("input/misled-altimetry.csv"));
     assert!(number(of("held"), "height_error_rms_m") < number(plain, "height_error_rms_m"));
     let bands = rows(&release, "photoclinometry_bands");

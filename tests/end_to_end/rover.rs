@@ -206,8 +206,10 @@ fn val_recordings_have_the_metrics_of_the_table() {
 fn val_pairs_without_a_way_are_marked() {
     let of = |clearance_m: &str| {
         let folder = area();
-        let study = STUDY
-            .replace("sweep.clearance_m = [0.13, 0.2]", &format!("clearance_m = {clearance_m}\nscale = 1.5\ncycle_limit = 300"));
+        let study = STUDY.replace(
+            "sweep.clearance_m = [0.13, 0.2]",
+            &format!("clearance_m = {clearance_m}\nscale = 1.5\ncycle_limit = 300"),
+        );
         run_study(folder.path(), &study, &[]);
         let rovers = rows(&folder.path().join("release"), "rovers");
         rovers.into_iter().filter(|row| text(row, "stage_id") == "boxes").collect::<Vec<Row>>()

@@ -161,7 +161,7 @@ def rovers(report):
         arrivals = [r["efficiency"] for r in own if r["outcome"] == "reached"]
         shown = lambda r, column: 0.0 if r["outcome"] == "off_ground" else r[column]
         ways = [r for r in own if r["oracle"] == "found"]
-        over = mean(r["efficiency"] * r["oracle_m"] / r["straight_m"] for r in ways) if ways else None
+        over = mean(shown(r, "efficiency") * r["oracle_m"] / r["straight_m"] for r in ways) if ways else None
         found = [len(worlds), len(own), 100.0 * len(arrivals) / len(own), mean(arrivals) if arrivals else None]
         found += [mean(shown(r, "efficiency") for r in own), sum(r["straight_m"] for r in own) / sum(r["distance_m"] for r in own)]
         found += [mean(shown(r, "efficiency_half_limit") for r in own), over]

@@ -104,8 +104,8 @@ fn planner(parameters: &Value) -> (Navigator, RoverParameters) {
 /// Every navigator on one world at four densities, 25 rovers of 25 m (the table of docs/rovers.md). The planner that sees rectangles: up to 8.8 % rocks
 /// at least 24 arrive, with d0 over the mean distance of at least 0.93 (here 25, 0.994 and 0.986). The planner on rays, up to 8.8 %: at
 /// least 22 arrive, and it meets no more rocks than the rules on the same rays. While it put a hazard anywhere in its strip, 18 arrived at 8.8 %, with
-/// 3 contacts each where the rules have 0.9. Everything is fixed by the seed, so that false alarms come from a change of the code alone; were
-/// each of the 50 rays' drives to fail with a chance of 2 %, a count below 22 of 25 had one of 0.2 %.
+/// 3 contacts each where the rules have 0.9. Everything is fixed by the seed, so that false alarms come from a change of the code alone. If each
+/// drive failed with a chance of 2 %, fewer than 22 of 25 would arrive with a chance of 0.2 % at either density.
 #[test]
 #[ignore = "slow: ./test --full"]
 fn stat_planners_beside_navigators() {

@@ -168,8 +168,8 @@ pub enum Verb {
         A GeoTIFF holds the brightness (I/F), with sun and camera in a .json beside it; a PNG shows it in 8-bit grey.\n\n\
         Examples:\n  sastrugi render site.tif --sun 120,20 -o site-morning.tif\n  \
         sastrugi render planetary --set-surface size_m='[20, 20]' --seed 3 --sun 90,15 -o mars.png\n  \
-        sastrugi render mars.tif --camera parallel:200,40,0.05 --set noise.relative=0.01 -o oblique.tif\n  \
-        sastrugi render mars.tif --camera pinhole:4,2,0.3,4,12,0 --size 960x540 -o rover.png"
+        sastrugi render site.tif --camera parallel:200,40,0.5 --set noise.relative=0.01 -o oblique.tif\n  \
+        sastrugi render planetary --set-surface size_m='[20, 20]' --seed 3 --camera pinhole:4,2,0.3,4,12,0 --size 960x540 -o rover.png"
     )]
     Render(Render),
     /// Recover heights and albedo from three or more registered images of one surface under different suns.

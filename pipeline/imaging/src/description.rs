@@ -46,7 +46,6 @@ pub struct ImageDescription {
     /// File of the image, in the folder of this one.
     pub image: String,
     /// Sun.
-    #[serde(default)]
     pub sun: Sun,
     /// Camera, in the coordinates of the surface.
     pub camera: CameraPose,

@@ -125,7 +125,7 @@ fn val_the_verdict_names_wavelengths() {
         "<section id=\"photoclinometry\">",
         "on the same waves, at 8 to 32 m; not at 4 to 8 m (rms height 70 %, rms slope 70 % of the truth&#39;s, squared coherence 0.80)",
         "rms height 97 % of the truth&#39;s, rms slope 82 %",
-        "Heights are off by 4.00 m (rms) where the true ones have 1.00 m; most of it is a tilt, 0.0500 m are left less the plane.",
+        "Heights are off by 4.00 m (rms) where the true ones have 1.00 m; most of it is a tilt: 0.0500 m remain less the plane.",
         "recovered: heights are off by more than three times their uncertainty",
     ] {
         let plain = words.replace("&#39;", "'");

@@ -28,8 +28,10 @@ pub struct FirstImageErrors {
     pub exposure: f64,
     /// Added to its haze, I/F.
     pub haze: f64,
-    /// Its camera is taken to stand this far east and north of where it stands, m.
-    pub shift_m: [f64; 2],
+    /// Its camera is taken to stand this far east of where it stands, m: a misregistration.
+    pub shift_east_m: f64,
+    /// The same to the north, m.
+    pub shift_north_m: f64,
 }
 
 impl FirstImageErrors {
@@ -48,7 +50,8 @@ impl FirstImageErrors {
             ("sun_azimuth_deg", self.sun_azimuth_deg),
             ("sun_elevation_deg", self.sun_elevation_deg),
             ("haze", self.haze),
-            ("shift_m", self.shift_m[0] + self.shift_m[1]),
+            ("shift_east_m", self.shift_east_m),
+            ("shift_north_m", self.shift_north_m),
         ];
         if let Some((key, value)) = numbers.into_iter().find(|(_, v)| !v.is_finite()) {
             return Err(ParameterError::new(key, format!("is {}; it must be finite", shown(value))));
@@ -66,7 +69,7 @@ pub fn images(described: Vec<(ImageDescription, Vec<f64>)>, errors: &FirstImageE
             sun = errors.sun(sun);
             exposure *= 1.0 + errors.exposure;
             haze += errors.haze;
-            pose = shifted(pose, errors.shift_m);
+            pose = shifted(pose, [errors.shift_east_m, errors.shift_north_m]);
         }
         Image { camera: pose.camera(), light: sun.direction(), exposure, haze, brightness }
     };

@@ -138,8 +138,8 @@ pub enum RecoverError {
     NothingLit,
     /// No cell is conditioned well enough.
     #[error(
-        "no cell has a condition number below {condition_max} (the least is {least:.0}): spread the suns in azimuth (0, 120, 240 deg), or give `albedo` \
-         if it is known"
+        "no cell has a condition number below {condition_max} (the least is {least:.0}): spread the suns in azimuth (0, 120, 240 deg), give `albedo` if \
+         it is known, or raise `condition_max`"
     )]
     NothingFirm {
         /// Least condition number of a cell.
@@ -351,7 +351,8 @@ impl<'a> Inversion<'a> {
         let system = System::new(self.geometry, &information, constraints);
         let (mut heights_m, iterations) = self.integrate(&system, &slopes, &information);
         if !tied || self.settings.integration == Integration::Paths {
-            let shift = sums::mean(&self.start.values) - sums::mean(&sums::finite(&heights_m));
+            let known = heights_m.iter().zip(&self.start.values).filter(|(z, _)| z.is_finite());
+            let shift = sums::mean(&known.map(|(z, start)| start - z).collect::<Vec<_>>());
             heights_m.iter_mut().for_each(|z| *z += shift);
         }
         let change: Vec<f64> = heights_m.iter().zip(&self.heights_m).map(|(a, b)| (a - b) * (a - b)).collect();
@@ -526,7 +527,7 @@ impl<'a> Inversion<'a> {
         let unreached = self.unreached.iter().filter(|u| **u).count();
         if unreached > 0 {
             self.warnings.push(format!(
-                "no path from the centre reaches {unreached} cells behind holes: they have no height; `integration = \"poisson\"` does"
+                "no path from the centre reaches {unreached} cells behind holes: they have no height; `integration = \"poisson\"` recovers them"
             ));
         }
         if !self.converged {

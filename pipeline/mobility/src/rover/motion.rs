@@ -3,9 +3,12 @@
 use super::draws::{CycleDraws, Purpose};
 use super::policies::Command;
 use super::pose::Pose;
-use sastrugi_schemas::ParameterError;
+use sastrugi_schemas::{ParameterError, shown};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+
+/// Greatest deviation of moves: beyond it nothing is left of a command.
+const DEVIATION_MAX: f64 = 10.0;
 
 /// Noise of sensing and moving; without any by default.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -33,9 +36,12 @@ impl NoiseParameters {
         if !(0.0..1.0).contains(&self.slip) {
             return Err(ParameterError::new("slip", format!("is {}; it must be 0 or above and below 1", self.slip)));
         }
-        ParameterError::not_negative("slip_deviation", self.slip_deviation)?;
-        ParameterError::not_negative("turn", self.turn)?;
-        ParameterError::not_negative("drift_rad", self.drift_rad).map(|_| ())
+        let rest = [("slip_deviation", self.slip_deviation), ("turn", self.turn), ("drift_rad", self.drift_rad)];
+        rest.into_iter().try_for_each(|(key, value)| {
+            ParameterError::not_negative(key, value)?;
+            let most = format!("is {}; it must be {DEVIATION_MAX} or below", shown(value));
+            if value > DEVIATION_MAX { Err(ParameterError::new(key, most)) } else { Ok(()) }
+        })
     }
 }
 

@@ -13,6 +13,10 @@ use serde::{Deserialize, Serialize};
 
 /// Most rovers of a trial: four digits in their ids.
 const ROVERS_MAX: u32 = 9999;
+/// Longest part of a body, its sensor or a step, m.
+const LENGTH_MAX_M: f64 = 20.0;
+/// Greatest scale.
+const SCALE_MAX: f64 = 10.0;
 /// Most rays or rectangles along a side of a sensor.
 const PARTS_MAX: usize = 64;
 
@@ -299,8 +303,9 @@ impl RoverParameters {
         ParameterError::positive("distance_m", self.distance_m)?;
         ParameterError::not_negative("clear_m", self.clear_m)?;
         ParameterError::positive("cell_m", self.cell_m)?;
-        ParameterError::positive("speed_m_s", self.speed_m_s)?;
-        ParameterError::positive("turn_rate_deg_s", self.turn_rate_deg_s)?;
+        // Poses are judged once a second.
+        ParameterError::between("speed_m_s", self.speed_m_s, 1e-5, 1e3)?;
+        ParameterError::between("turn_rate_deg_s", self.turn_rate_deg_s, 1e-3, 1e5)?;
         self.noise.check().map_err(|e| e.within("noise"))
     }
 
@@ -347,6 +352,11 @@ fn all_positive(values: &[(&str, f64)]) -> Result<(), ParameterError> {
     values.iter().try_for_each(|(key, value)| ParameterError::positive(key, *value).map(|_| ()))
 }
 
+/// Lengths of a body, its sensor and its steps: up to what samples and recordings have room for.
+fn lengths(values: &[(&str, f64)]) -> Result<(), ParameterError> {
+    values.iter().try_for_each(|(key, value)| ParameterError::between(key, *value, 0.0, LENGTH_MAX_M).map(|_| ()))
+}
+
 fn angle(key: &str, value_deg: f64) -> Result<(), ParameterError> {
     ParameterError::between(key, value_deg, 0.0, 90.0).map(|_| ())
 }
@@ -370,15 +380,17 @@ impl SojournerParameters {
     /// # Errors
     /// A value out of range.
     pub fn check(&self) -> Result<(), ParameterError> {
-        all_positive(&[
-            ("scale", self.scale),
+        ParameterError::between("scale", self.scale, 0.0, SCALE_MAX)?;
+        lengths(&[
             ("axle_m", self.axle_m),
             ("track_m", self.track_m),
             ("nose_m", self.nose_m),
             ("sensor_height_m", self.sensor_height_m),
+            ("step_m", self.step_m),
+        ])?;
+        all_positive(&[
             ("hazard_step_m", self.hazard_step_m),
             ("hazard_span_m", self.hazard_span_m),
-            ("step_m", self.step_m),
             ("goal_tolerance_m", self.goal_tolerance_m),
             ("clearance_m", self.clearance_m),
             ("distance_limit_m", self.distance_limit_m),
@@ -386,6 +398,13 @@ impl SojournerParameters {
         in_order("columns_m", &self.columns_m, false)?;
         in_order("rows_m", &self.rows_m, true)?;
         ParameterError::positive("rows_m.0", self.rows_m[0])?;
+        let reach_m = self.columns_m.iter().chain(&self.rows_m).fold(0.0, |far: f64, at| far.max(at.abs()));
+        if reach_m >= LENGTH_MAX_M {
+            return Err(ParameterError::new(
+                "rows_m",
+                format!("and `columns_m` reach {reach_m} m; they must end below {LENGTH_MAX_M}"),
+            ));
+        }
         angle("tilt_max_deg", self.tilt_max_deg)?;
         angle("turn_deg", self.turn_deg)?;
         ParameterError::not_negative("turn_noise_rad", self.turn_noise_rad)?;
@@ -424,14 +443,16 @@ impl SchoppersParameters {
     /// # Errors
     /// A value out of range.
     pub fn check(&self) -> Result<(), ParameterError> {
-        all_positive(&[
-            ("scale", self.scale),
+        ParameterError::between("scale", self.scale, 0.0, SCALE_MAX)?;
+        lengths(&[
             ("axle_m", self.axle_m),
             ("track_m", self.track_m),
             ("sensor_length_m", self.sensor_length_m),
             ("sensor_width_m", self.sensor_width_m),
-            ("clearance_m", self.clearance_m),
             ("step_m", self.step_m),
+        ])?;
+        all_positive(&[
+            ("clearance_m", self.clearance_m),
             ("commit_m", self.commit_m),
             ("commit_max_m", self.commit_max_m),
             ("progress_m", self.progress_m),

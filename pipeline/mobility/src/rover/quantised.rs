@@ -21,12 +21,21 @@ pub fn height_step_m(heights_m: &[f32]) -> Option<f64> {
     let least = gaps.clone().fold(f64::INFINITY, f64::min);
     // The mean of the gaps that are about one step: single ones are off by the rounding of the heights.
     let (count, sum) = gaps.filter(|gap| *gap < 1.5 * least).fold((0.0, 0.0), |(n, sum), gap| (n + 1.0, sum + gap));
-    let step = sum / count;
+    let mut step = sum / count;
     let rounding = f64::from(f32::EPSILON) * lowest.abs().max(highest.abs());
-    // Errors of the step add up over a gap, not over the whole height.
-    let whole = levels.windows(2).all(|pair| {
-        let gap = f64::from(pair[1]) - f64::from(pair[0]);
-        (gap - step * (gap / step).round()).abs() <= NEAR * gap + 2.0 * rounding
-    });
-    (whole && rounding < 0.1 * step).then_some(step)
+    if rounding >= 0.1 * step {
+        return None;
+    }
+    // From the lowest level up: the step is the least-squares one of the levels so far, known the better the farther they reach.
+    let (mut products, mut squares, mut reached) = (0.0, 0.0, 1.0);
+    for level in &levels[1..] {
+        let above = f64::from(*level) - lowest;
+        let steps = (above / step).round();
+        if (above - steps * step).abs() > NEAR * step + 2.0 * rounding * (1.0 + steps / reached) {
+            return None;
+        }
+        (products, squares, reached) = (products + steps * above, squares + steps * steps, steps);
+        step = products / squares;
+    }
+    Some(step)
 }

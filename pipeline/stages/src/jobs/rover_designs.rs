@@ -5,7 +5,7 @@ use super::rover::{self, prepare};
 use super::rover_effects;
 use crate::builder::{Builder, HEIGHTS, Heightfield};
 use crate::job::{Estimate, ItemRef, Job, JobError, Outcome, Work};
-use crate::operations::rovers::Grounds;
+use crate::operations::rovers::{self, Grounds};
 use crate::revision::Room;
 use crate::runner::graph::Node;
 use crate::study::entry::joined;
@@ -163,7 +163,8 @@ impl Job for DesignsJob {
             Grounds::Grid(grid) => self.drives(|| grid, &starts, noise),
         };
         let of_designs = self.designs().iter().zip(drives.chunks(starts.len().max(1))).enumerate();
-        let mut outcome = Outcome::default();
+        let notes = rovers::redrawn(parameters, &self.streams, &starts).into_iter().collect();
+        let mut outcome = Outcome { notes, ..Outcome::default() };
         outcome.write_rows(work, of_designs.map(|(step, (design, drives))| self.row(step, design, drives)))?;
         Ok(outcome)
     }

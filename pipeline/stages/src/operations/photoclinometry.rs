@@ -151,14 +151,28 @@ pub fn make(
     let stack = images.into_iter().map(|i| (i.description, i.pixels)).collect();
     let images = described::images(stack, &settings.first_image_errors);
     let start = start(&geometry, beside.coarse.as_ref(), level_m);
+    let aside = beside.coarse.as_ref().filter(|coarse| !holds_any(&geometry, &coarse.dem));
+    let aside = aside.map(|_| "the coarse DEM has no cell on the map: it holds nothing".to_owned());
     let known = Known { points: beside.points, coarse: beside.coarse };
     let mut recovered = recover(&images, &start, &known, &settings, streams)?;
     let truth = beside.truth.as_ref();
-    recovered.warnings.extend(truth.and_then(|truth| same_cells(truth, &poses, &geometry)));
     let heights = &recovered.heights;
     let evaluation = truth.and_then(|truth| evaluation::evaluate(truth, heights, &photometry, light, [0.0, 0.0, 1.0]));
+    let note = match (truth, evaluation) {
+        (Some(truth), Some(_)) => same_cells(truth, &poses, &geometry),
+        (Some(_), None) => Some("the true surface and the map share too few cells: nothing was compared".to_owned()),
+        (None, _) => None,
+    };
     let bands = truth.map(|truth| evaluation::bands(truth, heights)).unwrap_or_default();
+    recovered.warnings.extend(note);
+    recovered.warnings.extend(aside);
     Ok(Made { recovered, geometry, crs, evaluation, bands })
+}
+
+/// Whether a known cell of a DEM has its centre on a map.
+fn holds_any(map: &Geometry, dem: &Grid) -> bool {
+    let on_map = |k: usize| map.cell_at(dem.geometry.x(k % dem.cols()), dem.geometry.y(k / dem.cols())).is_some();
+    (0..dem.values.len()).any(|k| dem.values[k].is_finite() && on_map(k))
 }
 
 /// A note where pixels have fewer than four cells of the truth along a side.
@@ -167,8 +181,8 @@ fn same_cells(truth: &Grid, poses: &[CameraPose], map: &Geometry) -> Option<Stri
     let cells = pixel_m / truth.geometry.mean_cell();
     (cells < TRUTH_CELLS_MIN - 1e-6).then(|| {
         format!(
-            "a pixel has {} cells of the true surface along a side, fewer than {TRUTH_CELLS_MIN}: images rendered from it hold no relief below the pixel, \
-             and errors come out too small",
+            "a side of a pixel spans {} of the true surface's cells, fewer than {TRUTH_CELLS_MIN}: images rendered from it hold little relief below the pixel, and \
+             errors come out too small",
             significant(cells)
         )
     })
@@ -245,9 +259,9 @@ impl Made {
         maps: impl IntoIterator<Item = (&'a Map, Target<'a>)>,
         options: &WriteOptions,
     ) -> Result<Vec<String>, JobError> {
-        let notes = dem::write(heights, &self.recovered.heights, &self.crs, options).map_err(JobError::io)?;
+        // Heights last: where they are, their maps are too.
         maps.into_iter().try_for_each(|(map, target)| map.write(target, &self.crs, options))?;
-        Ok(notes)
+        dem::write(heights, &self.recovered.heights, &self.crs, options).map_err(JobError::io)
     }
 }
 

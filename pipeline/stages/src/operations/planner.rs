@@ -13,9 +13,9 @@
 //! The map is all that it remembers. Its cells are blocked within half of the body's width of what may be a hazard; how looks that disagree are
 //! joined stands in [`sastrugi_navigation::explorer`].
 //!
-//! It comes to an end whatever it sees: between two of the three times that it forgets, knowledge of a cell rises three times at most, and cells are
-//! limited. Once nothing is new the plan stays, each cycle turns or drives along it, and it leads to the goal. The limits of distance and
-//! cycles hold all the same.
+//! What it sees brings it to an end: between two of the three times that it forgets, knowledge of a cell rises three times at most, and cells are
+//! limited. Once nothing is new the plan stays, each cycle turns or drives along it, and it leads to the goal. Ground on which it leans too much
+//! is on no map: there, and with errors of its place, the limits of distance and cycles end it.
 
 use sastrugi_mobility::rover::{Command, PlannerParameters, Policy, RoverParameters, Situation, Stop, View};
 use sastrugi_navigation::explorer::{CELLS_MAX, Explorer, ExplorerSettings, Sight};

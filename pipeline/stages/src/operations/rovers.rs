@@ -214,7 +214,7 @@ pub fn redrawn(parameters: &RoverParameters, streams: &Streams, starts: &[Start]
 fn places_on(ground: &impl Ground, starts: &[Start]) -> Result<(), JobError> {
     for (what, [x, y]) in starts.iter().flat_map(|s| [("start", s.start_m), ("goal", s.goal_m)]) {
         ground.at(x, y).map_err(|nowhere| {
-            let advice = "choose another centre or a smaller radius";
+            let advice = "choose another centre, or a smaller `radius_m` or `distance_m`";
             JobError::input(format!("a {what} lies off the terrain: {nowhere}; {advice}"))
         })?;
     }

@@ -9,6 +9,7 @@ use crate::operations::photoclinometry::{
 use sastrugi_imaging::ImageDescription;
 use sastrugi_imaging::photoclinometry::{Coarse, RecoverError, Settings};
 use sastrugi_numeric::{Streams, sums};
+use sastrugi_schemas::ParameterError;
 use sastrugi_schemas::kind::{read_parameters, schema_of};
 use sastrugi_store::dem::{Format, WriteOptions};
 use schemars::JsonSchema;
@@ -80,6 +81,13 @@ pub fn photoclinometry(request: &Request<'_>) -> Result<Value, Error> {
     };
     let maps: Vec<(Map, PathBuf)> = made.maps().into_iter().map(beside).collect();
     let targets = maps.iter().map(|(map, path)| (map, path.as_path().into()));
+    // No map of an earlier surface stays beside this one.
+    for path in outputs[1..].iter().filter(|path| !maps.iter().any(|(_, written)| written == *path)) {
+        match std::fs::remove_file(path) {
+            Err(e) if e.kind() != std::io::ErrorKind::NotFound => return Err(Error::at(path, e)),
+            _ => {}
+        }
+    }
     let mut notes = made.write(request.output.into(), targets, &request.options)?;
     notes.extend(made.recovered.warnings.iter().cloned());
     Ok(told(request, &made, &maps, notes))
@@ -125,7 +133,10 @@ fn described(file: &ImagesFile, folder: &Path) -> Result<(Vec<Described>, Vec<Pa
 fn beside(file: &ImagesFile, folder: &Path) -> Result<Beside, Error> {
     let dem = |name: &String| Ok::<_, Error>(read(&folder.join(name), &Reading::default())?.dem.grid);
     let coarse = match (&file.coarse, file.coarse_sigma_m) {
-        (Some(name), Some(sigma_m)) => Some(Coarse { dem: dem(name)?, sigma_m }),
+        (Some(name), Some(sigma_m)) => {
+            ParameterError::positive("coarse_sigma_m", sigma_m)?;
+            Some(Coarse { dem: dem(name)?, sigma_m })
+        }
         (None, None) => None,
         _ => return Err(Error::Usage("`coarse` and `coarse_sigma_m` go together".to_owned())),
     };

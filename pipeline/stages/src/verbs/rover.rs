@@ -244,8 +244,8 @@ fn of_trial(rows: &[RoverRow], stream: &mut Stream) -> TrialSummary {
     // Worlds have the same number of rovers, so that the mean of their means is that of all.
     let of_worlds = |drawn: &[Vec<usize>]| sums::mean(&drawn[0].iter().map(|&w| efficiencies[w]).collect::<Vec<_>>());
     let arrival = by_world(reached);
-    let all: Vec<&RoverRow> = rows.iter().collect();
-    let mean_distance_m = mean_of(&all, |row| row.distance_m);
+    let stayed: Vec<&RoverRow> = rows.iter().filter(|row| !is_off(row)).collect();
+    let mean_distance_m = mean_of(&stayed, |row| row.distance_m);
     TrialSummary {
         stage_id: String::new(),
         group: None,
@@ -259,7 +259,7 @@ fn of_trial(rows: &[RoverRow], stream: &mut Stream) -> TrialSummary {
             sums::mean(&efficiencies),
             cluster_interval(&[efficiencies.len()], REDRAWS, LEVEL, stream, of_worlds),
         ),
-        straight_over_mean_distance: mean_of(&all, |row| row.straight_m) / mean_distance_m,
+        straight_over_mean_distance: mean_of(&stayed, |row| row.straight_m) / mean_distance_m,
         mean_distance_m,
         efficiency_of_arrivals: if arrivals.is_empty() { f64::NAN } else { sums::mean(&arrivals) },
         off_ground: rows.iter().filter(|row| is_off(row)).count(),

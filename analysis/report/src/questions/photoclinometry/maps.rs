@@ -135,15 +135,16 @@ fn uncertainty(data: &Data, surface: &Surface) -> Result<Option<Figure>, ReportE
         set::with_unit(surface.row.height_sigma_m, 3, "m")
     );
     let words = words("photoclinometry-uncertainty", surface, "Uncertainty.", caption);
-    values(&grid, &path, ((0.0, high), "standard deviation, m"), words)
+    values(&grid, &path, ((0.0, high), "uncertainty, m"), words)
 }
 
 fn lit(data: &Data, surface: &Surface) -> Result<Option<Figure>, ReportError> {
     let path = companion(surface, "lit");
     let Some(grid) = data.files.grid(&path)? else { return Ok(None) };
-    let few = grid.values.iter().filter(|n| **n < 3.0).count() as f64 / grid.values.len().max(1) as f64;
+    let shown: Vec<f64> = grid.values.iter().copied().filter(|n| *n > 0.0).collect();
+    let few = shown.iter().filter(|n| **n < 3.0).count() as f64 / shown.len().max(1) as f64;
     let caption = format!(
-        "Of {}: how many show a cell lit. {} of the cells are lit in fewer than three and take their albedo from their neighbours.",
+        "Of {}: how many show a cell lit. {} of the cells that are lit at all are lit in fewer than three.",
         set::counted(surface.row.images.max(0) as usize, "image"),
         set::percent(few, 1)
     );

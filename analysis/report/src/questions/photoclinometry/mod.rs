@@ -41,7 +41,7 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     let chosen = chosen(&surfaces);
     let drawn = &chosen[..chosen.len().min(CHOSEN_MAX)];
     let pairs = covariances::pairs(data, &surfaces);
-    let mut blocks = vec![Block::Text(verdict::paragraph(drawn, &pairs))];
+    let mut blocks: Vec<Block> = verdict::paragraphs(drawn, &pairs).into_iter().map(Block::Text).collect();
     blocks.extend(left_out(&surfaces, drawn).map(Block::Text));
     blocks.extend(verdict::warnings(&surfaces).into_iter().map(Block::Warning));
     blocks.extend([Block::Text(CEILINGS.into()), Block::Table(tables::errors(&surfaces))]);

@@ -41,7 +41,7 @@ pub fn chosen<'a, 'b>(surfaces: &'b [Surface<'a>]) -> Vec<&'b Surface<'a>> {
         let mut ranked: Vec<&Surface> = run.iter().collect();
         ranked.sort_by(|a, b| a.row.slope_error_rms.total_cmp(&b.row.slope_error_rms));
         match ranked[..] {
-            [least, .., greatest] => vec![least, greatest],
+            [least, .., greatest] if greatest.row.slope_error_rms.is_finite() => vec![least, greatest],
             _ => ranked,
         }
     };

@@ -38,13 +38,13 @@ pub fn alike(band: &PhotoclinometryBandRow) -> bool {
     band.coherence >= COHERENT && near(band.recovered_rms_m, band.truth_rms_m) && slopes
 }
 
-/// The verdict of each surface.
-pub fn paragraph(surfaces: &[&Surface], pairs: &[Pair]) -> String {
+/// The verdict of each surface, a paragraph each.
+pub fn paragraphs(surfaces: &[&Surface], pairs: &[Pair]) -> Vec<String> {
     let of = |s: &&Surface| {
         let pair = pairs.iter().find(|p| p.recovered.dem_id == s.id()).map(|p| format!(" {}", p.sentence()));
         format!("{}{}", surface(s), pair.unwrap_or_default())
     };
-    surfaces.iter().map(of).collect::<Vec<_>>().join(" ")
+    surfaces.iter().map(of).collect()
 }
 
 fn surface(surface: &Surface) -> String {
@@ -56,7 +56,7 @@ fn surface(surface: &Surface) -> String {
     let slope = if slope == set::ABSENT { String::new() } else { format!(", rms slope {slope}") };
     let (whole, level) = (row.height_error_rms_m, row.height_error_rms_detrended_m);
     let tilt = if level * level < (1.0 - TILTED) * whole * whole {
-        format!("; most of it is a tilt, {} are left less the plane", set::with_unit(level, 3, "m"))
+        format!("; most of it is a tilt: {} remain less the plane", set::with_unit(level, 3, "m"))
     } else {
         String::new()
     };
@@ -143,7 +143,7 @@ pub fn warnings(surfaces: &[Surface]) -> Vec<String> {
         }),
         that(&|s| s.row.share_leaning > LEANING_MAX, &|of| {
             format!(
-                "up to {} of the cells take their albedo from their neighbours, because too few images show them lit.",
+                "up to {} of the cells take their albedo from their neighbours, because too few images show them lit or the suns hardly tell slopes from albedo there.",
                 set::percent(most(of, |s| s.row.share_leaning), 0)
             )
         }),

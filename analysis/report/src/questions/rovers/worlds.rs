@@ -1,6 +1,6 @@
 //! Figures of one world, as a paper would print them of its only one: the mean over worlds, and the band of one world more.
 
-use super::sets::{Estimate, Set, World, efficiency, reached, shown};
+use super::sets::{Estimate, Set, World, efficiency, off_ground, reached, shown};
 use crate::questions::clusters::LEVEL;
 use sastrugi_numeric::sums;
 use sastrugi_schemas::tables::RoverRow;
@@ -34,25 +34,25 @@ pub const STRAIGHT: Figure = Figure {
     id: "straight_over_mean_distance",
     name: "straight over mean distance",
     unit: "1",
-    totals: |w| (w.total(|r| r.straight_m).0, w.total(|r| r.distance_m).0),
+    totals: |w| (w.total(|r| stayed(r, r.straight_m)).0, w.total(|r| stayed(r, r.distance_m)).0),
 };
 /// Mean distance driven.
-pub const DISTANCE: Figure =
-    Figure { id: "mean_distance_m", name: "mean distance", unit: "m", totals: |w| w.total(|r| r.distance_m) };
+pub const DISTANCE: Figure = Figure {
+    id: "mean_distance_m",
+    name: "mean distance",
+    unit: "m",
+    totals: |w| w.total(|r| stayed(r, r.distance_m)),
+};
 /// Greatest efficiency of a world's rovers.
 pub const GREATEST: Figure = Figure {
     id: "greatest_efficiency",
     name: "greatest efficiency of a world",
     unit: "1",
-    totals: |w| (w.values(shown).into_iter().fold(f64::NEG_INFINITY, f64::max), 1.0),
+    totals: |w| extreme(w, f64::max),
 };
 /// Least efficiency of a world's rovers.
-pub const LEAST: Figure = Figure {
-    id: "least_efficiency",
-    name: "least efficiency of a world",
-    unit: "1",
-    totals: |w| (w.values(shown).into_iter().fold(f64::INFINITY, f64::min), 1.0),
-};
+pub const LEAST: Figure =
+    Figure { id: "least_efficiency", name: "least efficiency of a world", unit: "1", totals: |w| extreme(w, f64::min) };
 /// Share of the rovers that arrive.
 pub const ARRIVED: Figure = Figure {
     id: "reached",
@@ -62,6 +62,16 @@ pub const ARRIVED: Figure = Figure {
 };
 /// All figures that papers print.
 pub const PRINTED: [Figure; 5] = [STRAIGHT, EFFICIENCY, DISTANCE, GREATEST, LEAST];
+
+/// A value of a rover that stayed on the ground; NaN for others, whose drive ended too soon to tell.
+fn stayed(rover: &RoverRow, value: f64) -> f64 {
+    if off_ground(rover) { f64::NAN } else { value }
+}
+
+/// The greatest or least efficiency of a world, as a ratio to 1; to 0 where no rover stayed on the ground.
+fn extreme(world: &World, pick: fn(f64, f64) -> f64) -> (f64, f64) {
+    world.values(shown).into_iter().reduce(pick).map_or((0.0, 0.0), |value| (value, 1.0))
+}
 
 impl Figure {
     /// Value of a world; NaN where it is not known.
@@ -91,24 +101,27 @@ impl Figure {
         Some(self.within(set, band))
     }
 
-    /// An interval on a logarithmic scale, ended at the greatest value that the figure can have.
+    /// An interval on a logarithmic scale, ended where the figure must end.
     fn within(&self, set: &Set, interval: Interval) -> Interval {
-        let most = self.most(set).max(interval.estimate);
-        Interval { high: interval.high.min(most), low: interval.low.min(most), ..interval }
+        let [least, most] = self.bounds(set);
+        let (least, most) = (least.min(interval.estimate), most.max(interval.estimate));
+        Interval { high: interval.high.clamp(least, most), low: interval.low.clamp(least, most), ..interval }
     }
 
-    /// The greatest value that the figure can have: 1 for efficiencies. A rover drives at least the straight line less what was left in the end, so straight
-    /// over mean distance may be a little above 1.
-    fn most(&self, set: &Set) -> f64 {
+    /// The least and the greatest value that the figure can have. Efficiencies end at 1. A rover drives at least the straight line less what was left in the
+    /// end, so that straight over mean distance may be a little above 1.
+    fn bounds(&self, set: &Set) -> [f64; 2] {
+        let mean = |of: fn(&RoverRow) -> f64| {
+            sums::mean(&sums::finite(&set.rovers().map(|r| stayed(r, of(r))).collect::<Vec<_>>()))
+        };
+        let straight_m = mean(|r| r.straight_m);
+        let shortest_m = mean(|r| (r.straight_m - r.residual_m).max(0.0));
+        let known = |value: f64, otherwise: f64| if value.is_finite() { value } else { otherwise };
         match self.id {
-            id if [EFFICIENCY.id, OF_ARRIVALS.id, GREATEST.id, LEAST.id].contains(&id) => 1.0,
-            id if id == STRAIGHT.id => {
-                let driven: Vec<&RoverRow> = set.rovers().filter(|r| r.straight_m.is_finite()).collect();
-                let total = |of: fn(&RoverRow) -> f64| sums::sum(&driven.iter().map(|r| of(r)).collect::<Vec<_>>());
-                let most = total(|r| r.straight_m) / total(|r| (r.straight_m - r.residual_m).max(0.0));
-                if most.is_finite() { most } else { f64::INFINITY }
-            }
-            _ => f64::INFINITY,
+            id if [EFFICIENCY.id, OF_ARRIVALS.id, GREATEST.id, LEAST.id].contains(&id) => [0.0, 1.0],
+            id if id == STRAIGHT.id => [0.0, known(straight_m / shortest_m, f64::INFINITY)],
+            id if id == DISTANCE.id => [known(shortest_m, 0.0), f64::INFINITY],
+            _ => [0.0, f64::INFINITY],
         }
     }
 }
