@@ -171,7 +171,7 @@ fn val_errors_are_mapped_on_the_cells() {
     };
     assert_eq!(ends("truth"), ends("heights"));
     // A quarter of the columns is lit by two of three images.
-    assert!(files["index.html"].contains("25.0 % of the cells are lit in fewer than three"));
+    assert!(files["index.html"].contains("25.0 % of the cells that are lit at all are lit in fewer than three"));
 }
 
 /// A sweep is drawn by the value that it sweeps, in order of the values; of many surfaces the best and the worst of the item are mapped.
