@@ -29,6 +29,12 @@ pub fn rover(args: &Rover, common: &Common) -> Verdict {
         text.push_str("\n\n");
         text.push_str(&ranking);
     }
+    if !summary.ranking.is_empty() {
+        text.push_str(
+            "\nmu: mean effect; mu*: mean size of the effects, by which they rank; sigma: their scatter between trajectories; noise: the mu* that\n\
+             reshuffled ways alone would give.",
+        );
+    }
     let mut json = serde_json::to_value(&run).map_err(Failure::failed)?;
     json["trials"] = serde_json::to_value(&summary.trials).map_err(Failure::failed)?;
     json["effects"] = summary.effects.into();
@@ -72,7 +78,8 @@ fn trials(summary: &Summary) -> String {
             trial.off_ground.to_string(),
         ]);
     }
-    let note = "Intervals count worlds, not rovers. Distances of rovers at a limit are censored: d0/mean d depends on the limit. Rovers that ended off the ground count as e = 0.";
+    let note = "e: straight line over metres driven and left; d0/mean d: straight line over mean metres driven. Intervals count worlds, not rovers. Distances of\n\
+                rovers at a limit are censored: d0/mean d depends on the limit. Rovers that ended off the ground count as e = 0.";
     format!("{}\n{note}", columns(&rows))
 }
 
@@ -90,27 +97,44 @@ fn rankings(rows: &[RoverEffectRow]) -> Vec<String> {
 fn ranking(rows: &[&RoverEffectRow]) -> String {
     let of = |measure: &str| rows.iter().filter(|row| row.measure == measure).copied().collect::<Vec<_>>();
     let (efficiency, arrival) = (of("efficiency"), of("arrival"));
-    let heads = ["  parameter", "value", "e: mu*", "(95 %)", "mu", "sigma", "noise", "arrival: mu*", "(95 %)", "mu"];
+    let heads = [
+        "  parameter",
+        "value",
+        "e: mu*",
+        "(95 %)",
+        "mu",
+        "(95 %)",
+        "sigma",
+        "noise",
+        "arrival: mu*",
+        "(95 %)",
+        "mu",
+        "(95 %)",
+    ];
     let mut lines = vec![heads.map(str::to_owned).to_vec()];
     let (some, none): (Vec<&RoverEffectRow>, Vec<_>) = efficiency.iter().partition(|row| row.mu_star > 0.0);
     for row in some.iter().take(RANKED) {
         let Some(arrives) = arrival.iter().find(|other| other.parameter == row.parameter) else { continue };
         let per = |value: f64| per_share(value, row.share);
-        let star = |row: &RoverEffectRow| match row.mu_star_low.is_nan() {
+        let range = |low: f64, high: f64| match low.is_nan() {
             true => "-".to_owned(),
-            false => format!("{} to {}", per(row.mu_star_low), per(row.mu_star_high)),
+            false => format!("{} to {}", per(low), per(high)),
         };
+        let star = |row: &RoverEffectRow| range(row.mu_star_low, row.mu_star_high);
+        let signed = |row: &RoverEffectRow| range(row.mu_low, row.mu_high);
         lines.push(vec![
             format!("  {}", row.parameter),
             base(row),
             per(row.mu_star),
             star(row),
             per(row.mu),
+            signed(row),
             per(row.sigma),
             per(row.mu_star_noise),
             per(arrives.mu_star),
             star(arrives),
             per(arrives.mu),
+            signed(arrives),
         ]);
     }
     let Some(first) = efficiency.first() else { return String::new() };

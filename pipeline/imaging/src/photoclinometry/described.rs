@@ -56,7 +56,13 @@ impl FirstImageErrors {
         if let Some((key, value)) = numbers.into_iter().find(|(_, v)| !v.is_finite()) {
             return Err(ParameterError::new(key, format!("is {}; it must be finite", shown(value))));
         }
-        ParameterError::positive("exposure", 1.0 + self.exposure).map(|_| ())
+        if self.exposure.is_finite() && self.exposure > -1.0 {
+            return Ok(());
+        }
+        Err(ParameterError::new(
+            "exposure",
+            format!("is {}; it must be a finite number above -1", shown(self.exposure)),
+        ))
     }
 }
 

@@ -134,7 +134,9 @@ pub enum RecoverError {
     #[error("a map of {0} x {1} cells is too small; it takes 4 x 4 or more")]
     SmallMap(usize, usize),
     /// No cell is lit in three images.
-    #[error("no cell is lit in three images")]
+    #[error(
+        "no cell is lit in three images; look for images that are dark or show other ground, and for a wrong exposure, haze or camera"
+    )]
     NothingLit,
     /// No cell is conditioned well enough.
     #[error(
@@ -149,7 +151,7 @@ pub enum RecoverError {
     },
     /// Most cells take their albedo from others.
     #[error(
-        "{percent:.0} % of the cells would take their albedo from their neighbours ({dark:.0} % are lit in fewer than three images, {ill:.0} % have a \
+        "{percent:.1} % of the cells would take their albedo from their neighbours ({dark:.1} % are lit in fewer than three images, {ill:.1} % have a \
          condition number above {condition_max}), at most {most:.0} % may: use three or more suns spread in azimuth (0, 120, 240 deg) that light most of \
          the ground, give `albedo` if it is known, or raise `leaning_max`"
     )]

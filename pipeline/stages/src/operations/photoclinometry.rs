@@ -88,7 +88,7 @@ pub fn read_points(path: &Path) -> Result<Vec<HeightPoint>, JobError> {
             return Ok(HeightPoint { x_m, y_m, height_m, sigma_m });
         }
         let message = format!(
-            "{}: point {} has a sigma of {sigma_m} m; give every point a column `sigma` above 0, the standard deviation of its height",
+            "{}: point {} has no `sigma` above 0; every point needs one, in a column of this name: the standard deviation of its height, m",
             path.display(),
             k + 1
         );

@@ -115,7 +115,12 @@ fn read_file(request: &Request<'_>) -> Result<ImagesFile, Error> {
 /// The images, and their files.
 fn described(file: &ImagesFile, folder: &Path) -> Result<(Vec<Described>, Vec<PathBuf>), Error> {
     let mut all: Vec<(ImageDescription, PathBuf)> = Vec::new();
-    for name in &file.images {
+    for (k, name) in file.images.iter().enumerate() {
+        if file.images[..k].contains(name) {
+            return Err(Error::Usage(format!(
+                "`images` holds {name} twice; its noise would count as that of two images"
+            )));
+        }
         let path = folder.join(name);
         let description = read_description(&path)?;
         let image = path.with_file_name(&description.image);
