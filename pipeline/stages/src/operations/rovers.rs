@@ -10,7 +10,7 @@ use sastrugi_mobility::rover::quantised::{HEIGHT_STEP_MAX_M, height_step_m};
 use sastrugi_mobility::rover::{Drive, Ending, RoverParameters, Start, Surroundings, Task};
 use sastrugi_navigation::map::{Neighbourhood, Node};
 use sastrugi_navigation::{CostModel, Method, RouteError, RouteSettings, SlopeCost, SlopeLimits, TravelMap, line};
-use sastrugi_numeric::{Grid, Ground, GroundClass, GroundGrid, Streams};
+use sastrugi_numeric::{Geometry, Grid, Ground, GroundClass, GroundGrid, Streams};
 use sastrugi_schemas::{ParameterError, RoughnessClass};
 use sastrugi_store::dem;
 use sastrugi_store::mcap::{ROCK, SAND};
@@ -53,8 +53,8 @@ impl Grounds {
     /// The first of them.
     fn check_places(&self, starts: &[Start]) -> Result<(), JobError> {
         match self {
-            Self::World(world) => places_on(&world.view(), starts),
-            Self::Grid(grid) => places_on(grid, starts),
+            Self::World(world) => places_on(&world.view(), starts, ""),
+            Self::Grid(grid) => places_on(grid, starts, &reach(&grid.heights.geometry)),
         }
     }
 
@@ -210,12 +210,19 @@ pub fn redrawn(parameters: &RoverParameters, streams: &Streams, starts: &[Start]
         .then(|| format!("{count} of {} starts were drawn again: they or their goals had no ground", starts.len()))
 }
 
+/// Words on where a terrain lies.
+fn reach(g: &Geometry) -> String {
+    let [[west, south], [width, height]] = [g.origin, g.size()];
+    let (east, north) = (west + width, south + height);
+    format!(" (it reaches from x = {west:.3} to {east:.3} and y = {south:.3} to {north:.3} m)")
+}
+
 /// Refuses starts and goals without ground.
-fn places_on(ground: &impl Ground, starts: &[Start]) -> Result<(), JobError> {
+fn places_on(ground: &impl Ground, starts: &[Start], reach: &str) -> Result<(), JobError> {
     for (what, [x, y]) in starts.iter().flat_map(|s| [("start", s.start_m), ("goal", s.goal_m)]) {
         ground.at(x, y).map_err(|nowhere| {
             let advice = "choose another centre, or a smaller `radius_m` or `distance_m`";
-            JobError::input(format!("a {what} lies off the terrain: {nowhere}; {advice}"))
+            JobError::input(format!("a {what} lies off the terrain: {nowhere}{reach}; {advice}"))
         })?;
     }
     Ok(())
