@@ -1,0 +1,1 @@
+//! Tiles that were made once, in memory and on disk.
