@@ -218,7 +218,7 @@ impl Elaborate {
         if let Some(t) = texture {
             assembly.add_texture(t.roughness_m, t.hurst, Counter::new(&mut streams.stream("texture-1")));
         }
-        assembly.with(processes, streams, potential)
+        assembly.with(processes, streams, potential, |_| true)
     }
 
     /// A quantity of the detail at the posts of a part, interpolated as backgrounds are.
@@ -383,7 +383,7 @@ impl Elaborate {
 
 /// One lattice point of a world.
 fn sample(world: &World, [west, south]: [i64; 2]) -> Patch {
-    world.patch(&Window { zoom: 0, west, south, cols: 1, rows: 1 })
+    world.patch(&Window { zoom: 0, west, south, cols: 1, rows: 1, centred: false })
 }
 
 /// The DEM with its mean where it has no data: far from the window, where only planes of distant craters ask.

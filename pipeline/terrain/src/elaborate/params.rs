@@ -122,7 +122,7 @@ impl TryFrom<RawElaborate> for Elaborate {
         let images = raw.check_images()?;
         raw.check_inputs()?;
         let [west, south] = raw.origin_m.map(|at| column(at, cell_m));
-        let window = Window { zoom, west: west?, south: south?, cols: size.cols(), rows: size.rows() };
+        let window = Window { zoom, west: west?, south: south?, cols: size.cols(), rows: size.rows(), centred: false };
         let work = window_in_reach(&raw.processes, spacing_m, &window)?;
         let offset_m = [(raw.origin_m[0], window.west), (raw.origin_m[1], window.south)].map(|(at_m, column)| {
             let beyond_m = at_m - column as f64 * cell_m;

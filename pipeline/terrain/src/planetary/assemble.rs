@@ -19,7 +19,7 @@ pub fn world(
     streams: &Streams,
     potential: Option<Potential>,
 ) -> World {
-    Assembly::new(spacing_m, anchor).with(processes, streams, potential)
+    Assembly::new(spacing_m, anchor).with(processes, streams, potential, |_| true)
 }
 
 /// A world in the making.
@@ -75,15 +75,30 @@ impl Assembly {
         }
     }
 
-    /// The world with the processes; rocks follow a raster of their potential where there is one. Draws of a process are named by its kind
-    /// and its number among that kind.
-    pub fn with(mut self, processes: &[RawProcess], streams: &Streams, potential: Option<Potential>) -> World {
+    /// The world with the processes of a list that act, by their place in it; rocks follow a raster of their potential where there is one.
+    /// Draws of a process are named by its kind and its number among that kind in the whole list, and which craters strike in one order of time
+    /// goes by the whole list too: what the others do is the same whether a process acts or not. Secondaries around primaries that do not act
+    /// are where they were.
+    pub fn with(
+        mut self,
+        processes: &[RawProcess],
+        streams: &Streams,
+        potential: Option<Potential>,
+        acts: impl Fn(usize) -> bool,
+    ) -> World {
         let (mut rocks, mut albedo) = (None, None);
-        let dust = processes.iter().find_map(|p| if let RawProcess::Dust(dust) = p { Some(dust) } else { None });
+        let dust = processes.iter().enumerate().find_map(|(n, p)| match p {
+            RawProcess::Dust(dust) if acts(n) => Some(dust),
+            _ => None,
+        });
         for (n, process) in processes.iter().enumerate() {
             let kind = process.kind();
             let number = 1 + processes[..n].iter().filter(|p| p.kind() == kind).count();
             let counter = Counter::new(&mut streams.stream(&format!("{kind}-{number}")));
+            if !acts(n) {
+                self.pass(process, n, counter);
+                continue;
+            }
             match process {
                 RawProcess::BaseSlope(p) => self.add_base(slope(p, self.spacing_m, self.anchor)),
                 RawProcess::Texture(p) => self.add_texture(p.roughness_m, p.hurst, counter),
@@ -105,6 +120,17 @@ impl Assembly {
             }
         }
         World { steps: self.steps, rocks, albedo }
+    }
+
+    /// Passes over a process that does not act.
+    fn pass(&mut self, process: &RawProcess, number: usize, counter: Counter) {
+        match process {
+            RawProcess::BaseSlope(_) | RawProcess::Texture(_) | RawProcess::Rocks(_) => self.same_time = false,
+            RawProcess::PrimaryCraters(p) => {
+                self.primaries = Some(PowerLaw::new(&p.power_law(), number, self.spacing_m, counter));
+            }
+            RawProcess::SecondaryCraters(_) | RawProcess::Albedo(_) | RawProcess::Dust(_) => {}
+        }
     }
 }
 

@@ -120,7 +120,8 @@ impl WorldGround {
     /// A tile, in cells from its south-west sample, with the first column and row of its neighbours: heights between them are known.
     fn make(&self, [col, row]: Place) -> GroundGrid {
         let side = TILE as usize + 1;
-        let window = Window { zoom: self.zoom, west: TILE * col, south: TILE * row, cols: side, rows: side };
+        let window =
+            Window { zoom: self.zoom, west: TILE * col, south: TILE * row, cols: side, rows: side, centred: false };
         let patch = self.world.patch(&window);
         let geometry = Geometry { origin: [-0.5; 2], ..Geometry::square(side, side, 1.0) };
         GroundGrid {

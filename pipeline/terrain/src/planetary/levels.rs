@@ -10,7 +10,8 @@
 
 use std::ops::Range;
 
-/// A rectangle of lattice points, `2^zoom` apart: columns from `west` and rows from `south` on, counted in that spacing.
+/// A rectangle of lattice points, `2^zoom` apart: columns from `west` and rows from `south` on, counted in that spacing. A centred one has the
+/// points in the middle of these and their neighbours to the north and east, as map tiles ask for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Window {
     /// Binary logarithm of the spacing in lattice units, at most 61.
@@ -23,6 +24,8 @@ pub struct Window {
     pub cols: usize,
     /// Number of rows.
     pub rows: usize,
+    /// Whether the points lie half a spacing north-east of those of the grid; `zoom` is then at least 1.
+    pub centred: bool,
 }
 
 /// Columns and rows of a window, counted from its south-west point.
@@ -44,7 +47,7 @@ impl Window {
 
     /// One point, `(i, j)` in units of `2^zoom`.
     pub(super) fn point(zoom: u32, i: i64, j: i64) -> Self {
-        Self { zoom, west: i, south: j, cols: 1, rows: 1 }
+        Self { zoom, west: i, south: j, cols: 1, rows: 1, centred: false }
     }
 
     /// The points of spacing `2^zoom` in the square of half side `reach` about a centre, lattice units.
@@ -52,27 +55,45 @@ impl Window {
         let unit = spacing(zoom);
         let first = |at: f64| ((at - reach) / unit).ceil() as i64;
         let count = |at: f64| (((at + reach) / unit).floor() as i64 - first(at) + 1).max(0) as usize;
-        Self { zoom, west: first(x), south: first(y), cols: count(x), rows: count(y) }
+        Self { zoom, west: first(x), south: first(y), cols: count(x), rows: count(y), centred: false }
     }
 
     /// East of a column, lattice units.
     pub fn x(&self, col: usize) -> f64 {
-        ((self.west + col as i64) << self.zoom) as f64
+        self.lattice(self.west + col as i64) as f64
     }
 
     /// North of a row, lattice units.
     pub fn y(&self, row: usize) -> f64 {
-        ((self.south + row as i64) << self.zoom) as f64
+        self.lattice(self.south + row as i64) as f64
     }
 
-    /// The points of twice the spacing from which all of this window's points and what they are made from descend.
+    /// The lattice point in a column and row.
+    pub(super) fn place(&self, col: usize, row: usize) -> [i64; 2] {
+        [self.west + col as i64, self.south + row as i64].map(|at| self.lattice(at))
+    }
+
+    fn lattice(&self, at: i64) -> i64 {
+        if self.centred { (2 * at + 1) << (self.zoom - 1) } else { at << self.zoom }
+    }
+
+    /// Where the points lie between those of the grid, in its spacing.
+    fn shift(&self) -> f64 {
+        if self.centred { 0.5 } else { 0.0 }
+    }
+
+    /// The points of twice the spacing from which all of this window's points and what they are made from descend; of a centred window, those
+    /// around its points.
     pub(super) fn parents(&self) -> Self {
+        if self.centred {
+            return Self { cols: self.cols + 1, rows: self.rows + 1, centred: false, ..*self };
+        }
         let span = |first: i64, count: usize| {
             let low = (first - 1).div_euclid(2);
             (low, ((first + count as i64 + 1).div_euclid(2) - low + 1) as usize)
         };
         let ((west, cols), (south, rows)) = (span(self.west, self.cols), span(self.south, self.rows));
-        Self { zoom: self.zoom + 1, west, south, cols, rows }
+        Self { zoom: self.zoom + 1, west, south, cols, rows, centred: false }
     }
 
     /// Whether a place is so far outside that no point lies within `reach` of it along either axis; lattice units.
@@ -86,10 +107,10 @@ impl Window {
         if self.misses([x, y], reach) {
             return None;
         }
-        let unit = spacing(self.zoom);
+        let (unit, shift) = (spacing(self.zoom), self.shift());
         let range = |at: f64, first: i64, count: usize| {
-            let low = ((at - reach) / unit).ceil() - first as f64;
-            let high = ((at + reach) / unit).floor() - first as f64;
+            let low = ((at - reach) / unit - shift).ceil() - first as f64;
+            let high = ((at + reach) / unit - shift).floor() - first as f64;
             (low.max(0.0) as usize)..((high + 1.0).max(0.0) as usize).min(count)
         };
         let (cols, rows) = (range(x, self.west, self.cols), range(y, self.south, self.rows));
@@ -99,13 +120,19 @@ impl Window {
     /// The part as a window of its own.
     pub(super) fn of_part(&self, part: &Part) -> Self {
         let (west, south) = (self.west + part.cols.start as i64, self.south + part.rows.start as i64);
-        Self { zoom: self.zoom, west, south, cols: part.cols.len(), rows: part.rows.len() }
+        Self { west, south, cols: part.cols.len(), rows: part.rows.len(), ..*self }
     }
 
     /// The place in [`Self`]'s row-major values (south first) of the point `(i, j)` of spacing `2^zoom`, if it is among them.
     pub(super) fn find(&self, zoom: u32, i: i64, j: i64) -> Option<usize> {
-        let shift = zoom.checked_sub(self.zoom)?;
-        let (col, row) = ((i << shift) - self.west, (j << shift) - self.south);
+        let (col, row) = if self.centred {
+            // Both coordinates of its points are odd, in units of half the spacing.
+            let odd = zoom + 1 == self.zoom && i & j & 1 == 1;
+            odd.then_some((i.div_euclid(2) - self.west, j.div_euclid(2) - self.south))?
+        } else {
+            let shift = zoom.checked_sub(self.zoom)?;
+            ((i << shift) - self.west, (j << shift) - self.south)
+        };
         let inside = (0..self.cols as i64).contains(&col) && (0..self.rows as i64).contains(&row);
         inside.then(|| row as usize * self.cols + col as usize)
     }
@@ -249,7 +276,7 @@ mod tests {
     #[test]
     fn prop_diamonds_come_once() {
         for (zoom, reach) in [(3, 3.0), (3, 3.4), (3, 3.6), (3, 20.0), (6, 30.0)] {
-            let window = Window { zoom, west: -3, south: 5, cols: 4, rows: 3 };
+            let window = Window { zoom, west: -3, south: 5, cols: 4, rows: 3, centred: false };
             let mut found = Vec::new();
             window.visit_diamonds(1, reach, |i, j| found.push([i, j]));
             let near = |i: i64, j: i64| {

@@ -53,7 +53,7 @@ pub use processes::RawProcess;
 pub(crate) use processes::{check as check_processes, check_texture, potential as potential_input};
 pub use rocks::law::Law;
 pub(crate) use rocks::potential::Potential;
-pub use world::{Patch, ROCK, SAND, World};
+pub use world::{Patch, ROCK, Request, SAND, World};
 
 use crate::generator::{Generator, Input, Map, NamedInput, Terrain, TerrainError};
 use rayon::prelude::*;
@@ -88,7 +88,7 @@ impl World {
             .map(|&(row, col)| {
                 let (rows, cols) = (TILE.min(window.rows - row), TILE.min(window.cols - col));
                 let (west, south) = (window.west + col as i64, window.south + row as i64);
-                self.patch(&Window { zoom: window.zoom, west, south, cols, rows })
+                self.patch(&Window { west, south, cols, rows, ..*window })
             })
             .collect();
         let field = |of: fn(&Patch) -> &[f64]| joined(window, &made, of, 0.0);

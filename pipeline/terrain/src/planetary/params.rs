@@ -97,7 +97,7 @@ impl TryFrom<RawPlanetary> for Planetary {
         }
         processes::check(&raw.processes, spacing_m)?;
         let [west, south] = raw.origin_m.map(|at| column(at, cell_m));
-        let window = Window { zoom, west: west?, south: south?, cols: size.cols(), rows: size.rows() };
+        let window = Window { zoom, west: west?, south: south?, cols: size.cols(), rows: size.rows(), centred: false };
         let work = window_in_reach(&raw.processes, spacing_m, &window)?;
         let origin_m = [window.west, window.south].map(|column| column as f64 * cell_m);
         let (size_px, basic_spacing_m) = (Some(size.px), Some(spacing_m));
@@ -135,6 +135,26 @@ impl Planetary {
     /// A distance that is no basic spacing times a power of 2.
     pub fn check_samples(&self, cell_m: f64) -> Result<(), ParameterError> {
         Lattice::check(Some(self.spacing_m), cell_m).map(|_| ())
+    }
+
+    /// The parameters, all filled in.
+    pub fn raw(&self) -> &RawPlanetary {
+        &self.raw
+    }
+
+    /// Distance of the lattice points, m.
+    pub fn spacing_m(&self) -> f64 {
+        self.spacing_m
+    }
+
+    /// The world in which only the processes at some places of the list act, from 0; the others keep their number and their draws.
+    ///
+    /// # Errors
+    /// An input that has not been read ([`Self::with_inputs`]).
+    pub fn world_of(&self, streams: &Streams, acts: impl Fn(usize) -> bool) -> Result<World, ParameterError> {
+        self.check_inputs()?;
+        let assembly = assemble::Assembly::new(self.spacing_m, self.raw.anchor_level);
+        Ok(assembly.with(&self.raw.processes, streams, self.potential.clone(), acts))
     }
 
     /// The world that the patch is part of.

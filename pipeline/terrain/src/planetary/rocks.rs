@@ -25,6 +25,7 @@ use law::Law;
 use potential::Potential;
 use sastrugi_numeric::{Counter, Poisson};
 use std::f64::consts::PI;
+use std::sync::atomic::AtomicBool;
 
 /// Largest share of the ground that rocks may cover.
 pub const COVERAGE_MAX: f64 = 0.6;
@@ -117,7 +118,29 @@ pub struct Rock {
     place: [i64; 4],
 }
 
+impl Bin {
+    /// Diameter that none of its rocks exceeds, m.
+    fn widest_m(&self) -> f64 {
+        1.0 / (self.inverse[0] - self.inverse[1])
+    }
+}
+
 impl RockParameters {
+    /// Share of the ground that rocks no wider than `diameter_m` cover where the wider ones do not, at a coverage by all; what dust buries of them
+    /// counts too.
+    pub fn cover_below(&self, coverage: f64, diameter_m: f64) -> f64 {
+        let [least, most] = self.diameters_m;
+        if coverage <= 0.0 || diameter_m <= least {
+            return 0.0;
+        }
+        let law = self.law(coverage);
+        let (all, wider) = (
+            law.cover_above(least) - law.cover_above(most),
+            law.cover_above(diameter_m.min(most)) - law.cover_above(most),
+        );
+        if self.exact_union { (all - wider) / (1.0 - wider) } else { 1.0 - libm::exp(wider - all) }
+    }
+
     fn law(&self, coverage: f64) -> Law {
         Law { coverage, exact_union: self.exact_union }
     }
@@ -198,19 +221,29 @@ impl Rocks {
         long_axis(widest, AXIS_RATIO_MIN) + 0.36 * widest
     }
 
-    /// The rocks that may lie under a point of the window, largest first; `coverage` tells the share of the ground that all rocks
-    /// cover at a place (lattice units).
-    pub fn find(&self, window: &Window, coverage: impl Fn([f64; 2]) -> f64) -> Vec<Rock> {
-        let near = Near { window, margin: 0.0 };
+    /// The rocks wider than `diameter_min_m` that may lie under a point that is looked at, largest first; `coverage` tells the share of the
+    /// ground that all rocks cover at a place (lattice units).
+    pub fn find(
+        &self,
+        window: &Window,
+        diameter_min_m: f64,
+        cancel: Option<&AtomicBool>,
+        coverage: impl Fn([f64; 2]) -> f64,
+    ) -> Vec<Rock> {
+        let near = Near { window, margin: 0.0, cancel };
         let mut found = Vec::new();
-        for bin in &self.bins {
+        for bin in self.bins.iter().filter(|bin| bin.widest_m() > diameter_min_m) {
             window.visit_diamonds(bin.zoom, self.bin_reach(bin), |i, j| {
+                if near.is_over() {
+                    return;
+                }
                 let diamond = self.counter.at(j).at(i);
                 for n in 0..i64::from(bin.per_diamond.count(diamond.uniform())) {
                     found.extend(self.rock(bin, [i, j, n], diamond.at(n), &near, &coverage));
                 }
             });
         }
+        found.retain(|rock: &Rock| rock.diameter_m > diameter_min_m);
         found.sort_unstable_by(|a, b| b.diameter_m.total_cmp(&a.diameter_m).then_with(|| a.place.cmp(&b.place)));
         found
     }

@@ -6,6 +6,7 @@ mod ground;
 mod potential;
 mod refusals;
 mod rocks;
+mod served;
 mod texture;
 
 use super::levels::Window;
@@ -23,7 +24,7 @@ fn world(processes: Value, seed: u64) -> World {
 }
 
 fn window(zoom: u32, west: i64, south: i64, cols: usize, rows: usize) -> Window {
-    Window { zoom, west, south, cols, rows }
+    Window { zoom, west, south, cols, rows, centred: false }
 }
 
 /// Heights as a grid with cells of `cell_m`.

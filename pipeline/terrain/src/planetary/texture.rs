@@ -34,13 +34,33 @@ impl Amplitudes {
 ///
 /// `anchor` must not be above that of the amplitudes.
 pub fn interpolate(window: &Window, anchor: u32, counter: Counter, scale_m: f64, amplitudes: &Amplitudes) -> Vec<f64> {
-    if window.zoom >= anchor || scale_m == 0.0 {
+    // Grid that the points are of.
+    let zoom = window.zoom - u32::from(window.centred);
+    if zoom >= anchor || scale_m == 0.0 {
         return vec![0.0; window.len()];
     }
     let parents = window.parents();
     let above = interpolate(&parents, anchor, counter, scale_m, amplitudes);
-    let [axis, diagonal] = amplitudes.by_zoom[window.zoom as usize].map(|a| a * scale_m);
+    let [axis, diagonal] = amplitudes.by_zoom[zoom as usize].map(|a| a * scale_m);
+    if window.centred {
+        return centre(window, &above, counter, diagonal);
+    }
     refine(window, &parents, &above, |i, j| counter.at(j << window.zoom).at(i << window.zoom), axis, diagonal)
+}
+
+/// A centred window from the points around its own.
+fn centre(window: &Window, above: &[f64], counter: Counter, diagonal: f64) -> Vec<f64> {
+    let cols = window.cols + 1;
+    let mut field = Vec::with_capacity(window.len());
+    for row in 0..window.rows {
+        let (line, north) = (&above[row * cols..], &above[(row + 1) * cols..]);
+        for col in 0..window.cols {
+            let [i, j] = window.place(col, row);
+            let parents = (line[col] + line[col + 1]) + (north[col] + north[col + 1]);
+            field.push(0.25 * parents + diagonal * counter.at(j).at(i).normal());
+        }
+    }
+    field
 }
 
 /// The window from the points of twice its spacing.

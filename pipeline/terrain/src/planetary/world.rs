@@ -10,6 +10,7 @@ use super::texture::{Amplitudes, interpolate};
 use sastrugi_numeric::Counter;
 use std::cell::RefCell;
 use std::collections::HashMap;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Code of sand in the class map.
 pub const SAND: u8 = 0;
@@ -79,9 +80,23 @@ pub struct Patch {
     pub rock_potential: Vec<f64>,
 }
 
+/// What is asked of a world.
+#[derive(Clone, Copy, Debug)]
+pub struct Request<'a> {
+    /// The points.
+    pub window: Window,
+    /// Craters and rocks that are not wider are left out, m; 0 leaves out none. The craters that stay are not changed by it, since the plane of
+    /// each sees wider ones only; rocks stay where they are, at the height of the ground without the craters that are left out.
+    pub feature_min_m: f64,
+    /// Once true, the patch is no longer wanted.
+    pub cancel: Option<&'a AtomicBool>,
+}
+
 /// What was met on the way to one patch.
 struct Survey<'w> {
     world: &'w World,
+    feature_min_m: f64,
+    cancel: Option<&'w AtomicBool>,
     planes: RefCell<HashMap<Place, Plane>>,
     families: Families,
 }
@@ -89,6 +104,18 @@ struct Survey<'w> {
 impl World {
     /// The samples of a window: a pure function of the world, bit by bit the same whatever else is looked at.
     pub fn patch(&self, window: &Window) -> Patch {
+        self.survey(&Request { window: *window, feature_min_m: 0.0, cancel: None })
+    }
+
+    /// The samples that are asked for, made on this thread; `None` once they are no longer wanted.
+    pub fn patch_for(&self, request: &Request<'_>) -> Option<Patch> {
+        let patch = self.survey(request);
+        (!is_set(request.cancel)).then_some(patch)
+    }
+
+    /// The samples of a request; of one that is no longer wanted any.
+    fn survey(&self, request: &Request<'_>) -> Patch {
+        let window = &request.window;
         let count = window.len();
         let mut patch = Patch {
             window: *window,
@@ -100,8 +127,10 @@ impl World {
         if window.is_empty() {
             return patch;
         }
-        let survey = Survey { world: self, planes: RefCell::default(), families: RefCell::default() };
-        let craters = survey.index(&self.near(window));
+        let Request { feature_min_m, cancel, .. } = *request;
+        let (planes, families) = (RefCell::default(), RefCell::default());
+        let survey = Survey { world: self, feature_min_m, cancel, planes, families };
+        let craters = survey.index(&Near { cancel, ..self.near(window) });
         patch.heights = survey.ground(window, &craters);
         if let Some(albedo) = &self.albedo {
             patch.albedo = albedo.of_sand(window);
@@ -114,7 +143,7 @@ impl World {
 
     /// A window, with what must be known around it to set rocks on its ground.
     fn near<'a>(&self, window: &'a Window) -> Near<'a> {
-        Near { window, margin: self.rocks.as_ref().map_or(0.0, |(rocks, _)| rocks.reach()) }
+        Near { window, margin: self.rocks.as_ref().map_or(0.0, |(rocks, _)| rocks.reach()), cancel: None }
     }
 
     /// Expected number of craters and rocks that a patch holds in memory, not below the true one.
@@ -140,9 +169,9 @@ impl World {
 
 impl Albedo {
     fn of_sand(&self, window: &Window) -> Vec<f64> {
-        let points = (0..window.rows).flat_map(|row| (0..window.cols).map(move |col| (row as i64, col as i64)));
-        let at = |(row, col): (i64, i64)| {
-            let [i, j] = [window.west + col, window.south + row].map(|at| at << window.zoom);
+        let points = (0..window.rows).flat_map(|row| (0..window.cols).map(move |col| (row, col)));
+        let at = |(row, col): (usize, usize)| {
+            let [i, j] = window.place(col, row);
             self.value(self.sand, self.counter.at(j).at(i))
         };
         points.map(at).collect()
@@ -156,10 +185,15 @@ impl Albedo {
 }
 
 impl Survey<'_> {
+    /// Points of which nothing beyond themselves must be known.
+    fn near<'a>(&'a self, window: &'a Window) -> Near<'a> {
+        Near { window, margin: 0.0, cancel: self.cancel }
+    }
+
     /// For every step, the craters that may reach what is looked at.
     fn index(&self, near: &Near<'_>) -> Vec<Index> {
         let of_step = |step: &Step| match step {
-            Step::Bombardment(bombardment) => self.craters(bombardment, near, 0.0),
+            Step::Bombardment(bombardment) => self.craters(bombardment, near, self.feature_min_m),
             _ => Vec::new(),
         };
         self.world.steps.iter().map(|step| Index::new(of_step(step), near)).collect()
@@ -187,7 +221,7 @@ impl Survey<'_> {
         let mut heights = vec![0.0; window.len()];
         for (number, step) in self.world.steps[..=last].iter().enumerate() {
             let mut wider = match step {
-                Step::Bombardment(b) => self.craters(b, &Near { window, margin: 0.0 }, crater.diameter_m),
+                Step::Bombardment(b) => self.craters(b, &self.near(window), crater.diameter_m),
                 _ => Vec::new(),
             };
             wider.retain(|c| number < last || c.order(crater).is_lt());
@@ -211,7 +245,9 @@ impl Survey<'_> {
                 let field = interpolate(window, t.anchor, t.counter, t.roughness_m, &t.amplitudes);
                 heights.iter_mut().zip(field).for_each(|(h, f)| *h += f);
             }
-            Step::Bombardment(b) => craters.for_each(|c| b.strike(window, heights, c, || self.plane(number, c))),
+            Step::Bombardment(b) => craters
+                .take_while(|_| !is_set(self.cancel))
+                .for_each(|c| b.strike(window, heights, c, || self.plane(number, c))),
         }
     }
 
@@ -232,14 +268,16 @@ impl Survey<'_> {
         for (k, potential) in patch.rock_potential.iter_mut().enumerate() {
             *potential = rocks.coverage([window.x(k % window.cols), window.y(k / window.cols)]);
         }
-        later.iter().flat_map(|index| &index.craters).for_each(|crater| change_all(rocks, crater, patch));
+        let wanted = |_: &&Crater| !is_set(self.cancel);
+        later.iter().flat_map(|index| &index.craters).take_while(wanted).for_each(|c| change_all(rocks, c, patch));
         let coverage = |at: [f64; 2]| {
             let alone = rocks.coverage(at);
             later.iter().flat_map(|index| index.at(at)).fold(alone, |f, c| change(rocks, f, c, at))
         };
         let ground = patch.heights.clone();
         let mut tops = vec![f64::NEG_INFINITY; ground.len()];
-        for rock in rocks.find(&window, coverage) {
+        let found = rocks.find(&window, self.feature_min_m, self.cancel, coverage);
+        for rock in found.into_iter().take_while(|_| !is_set(self.cancel)) {
             let (zoom, i, j) = rocks.base(&rock);
             let base = match window.find(zoom, i, j) {
                 Some(k) => ground[k],
@@ -257,6 +295,10 @@ impl Survey<'_> {
             });
         }
     }
+}
+
+fn is_set(cancel: Option<&AtomicBool>) -> bool {
+    cancel.is_some_and(|flag| flag.load(Ordering::Relaxed))
 }
 
 /// The rock coverage at a place after a crater.

@@ -20,7 +20,7 @@ pub struct Index {
 impl Index {
     /// An index of all craters that reach what is looked at.
     pub fn new(craters: Vec<Crater>, near: &Near<'_>) -> Self {
-        let Near { window, margin } = near;
+        let Near { window, margin, .. } = near;
         // A lattice unit more, so that the last points lie inside.
         let origin = [window.x(0) - margin, window.y(0) - margin];
         let span = |count: usize| (count - 1) as f64 * spacing(window.zoom) + 2.0 * margin + 1.0;

@@ -8,6 +8,7 @@ use std::cmp::Ordering;
 use std::collections::HashMap;
 use std::f64::consts::TAU;
 use std::rc::Rc;
+use std::sync::atomic::{AtomicBool, Ordering as Memory};
 
 /// Words below a crater's place.
 const DIAMETER: i64 = 0;
@@ -68,9 +69,16 @@ pub struct Near<'a> {
     pub window: &'a Window,
     /// Beyond the craters' own reach.
     pub margin: f64,
+    /// Once true, nothing more is looked for.
+    pub cancel: Option<&'a AtomicBool>,
 }
 
 impl Near<'_> {
+    /// Whether nothing more is looked for.
+    pub fn is_over(&self) -> bool {
+        self.cancel.is_some_and(|flag| flag.load(Memory::Relaxed))
+    }
+
     /// Whether a point may lie within `reach` of a centre.
     pub fn touches(&self, centre: [f64; 2], reach: f64) -> bool {
         self.window.part(centre, reach + self.margin).is_some()
@@ -169,6 +177,9 @@ impl PowerLaw {
     fn visit(&self, near: &Near<'_>, radii: f64, diameter_min_m: f64, mut f: impl FnMut(Crater)) {
         for bin in self.bins.iter().filter(|bin| bin.diameter_max_m > diameter_min_m) {
             near.window.visit_diamonds(bin.zoom, Self::reach(bin, radii, near), |i, j| {
+                if near.is_over() {
+                    return;
+                }
                 let diamond = self.counter.at(j).at(i);
                 for n in 0..i64::from(bin.per_diamond.count(diamond.uniform())) {
                     let crater = self.crater(bin, [i, j], n, diamond.at(n));

@@ -152,7 +152,7 @@ fn val_small_craters_see_the_wide_ones_below_them() {
 
 fn draw(parameters: &PowerLawParameters, seed: u64, area: &Window) -> Vec<Crater> {
     let law = PowerLaw::new(parameters, 0, 0.01, counter(seed));
-    let near = Near { window: area, margin: 0.0 };
+    let near = Near { window: area, margin: 0.0, cancel: None };
     let mut found = Vec::new();
     law.find(&near, 0.0, &Families::default(), &mut found);
     found.retain(|c| !area.misses(c.centre, 0.0));
@@ -225,7 +225,12 @@ fn val_secondaries_surround_their_primary() {
     let area = window(0, 0, 0, 400_000, 400_000);
     let all = |k: usize| {
         let mut found = Vec::new();
-        b.populations[k].find(&Near { window: &area, margin: 0.0 }, 0.0, &Families::default(), &mut found);
+        b.populations[k].find(
+            &Near { window: &area, margin: 0.0, cancel: None },
+            0.0,
+            &Families::default(),
+            &mut found,
+        );
         found
     };
     let (primaries, secondaries) = (all(0), all(1));
@@ -259,7 +264,7 @@ fn stat_secondaries_follow_their_laws() {
     let [Step::Bombardment(b)] = &made.steps[..] else { panic!("one bombardment") };
     let find = |k: usize, area: &Window| {
         let mut found = Vec::new();
-        b.populations[k].find(&Near { window: area, margin: 0.0 }, 0.0, &Families::default(), &mut found);
+        b.populations[k].find(&Near { window: area, margin: 0.0, cancel: None }, 0.0, &Families::default(), &mut found);
         found
     };
     let primaries = find(0, &window(0, 100_000, 100_000, 200_000, 200_000));
@@ -294,7 +299,7 @@ fn prop_places_tell_craters_apart() {
     for step in &made.steps {
         let Step::Bombardment(b) = step else { continue };
         let mut found = Vec::new();
-        let near = Near { window: &area, margin: 0.0 };
+        let near = Near { window: &area, margin: 0.0, cancel: None };
         b.populations.iter().for_each(|p| p.find(&near, 0.0, &Families::default(), &mut found));
         all += found.len();
         places.extend(found.iter().map(|c| c.place));
@@ -309,13 +314,13 @@ fn prop_places_tell_craters_apart() {
 fn val_expected_objects_hold_those_found() {
     let made = world(families(), 8);
     let area = window(0, 0, 0, 4000, 4000);
-    let near = Near { window: &area, margin: rocks_reach(&made) };
+    let near = Near { window: &area, margin: rocks_reach(&made), cancel: None };
     let (mut found, all) = (Vec::new(), Families::default());
     for step in &made.steps {
         let Step::Bombardment(b) = step else { continue };
         b.populations.iter().for_each(|p| p.find(&near, 0.0, &all, &mut found));
     }
-    let rocks = made.rocks.as_ref().unwrap().0.find(&area, |_| 0.6).len();
+    let rocks = made.rocks.as_ref().unwrap().0.find(&area, 0.0, None, |_| 0.6).len();
     let held = (found.len() + rocks + all.borrow().values().map(|f| f.len()).sum::<usize>()) as f64;
     let (objects, work) = (made.expected_objects(&area), made.expected_work(&area));
     eprintln!("{held} objects held, {objects:.0} expected, {work:.0} with diamonds");
@@ -336,7 +341,7 @@ fn visible(density: f64, seed: u64) -> [f64; 2] {
     let patch = heights(&made.patch(&area), 0.01);
     let [Step::Bombardment(b)] = &made.steps[..] else { panic!("one bombardment") };
     let mut craters = Vec::new();
-    b.populations[0].find(&Near { window: &area, margin: 0.0 }, 0.08, &Families::default(), &mut craters);
+    b.populations[0].find(&Near { window: &area, margin: 0.0, cancel: None }, 0.08, &Families::default(), &mut craters);
     craters.retain(|c| c.diameter_m < 0.32);
     let seen = |c: &Crater, [x, y]: [f64; 2]| {
         let at = |x: f64, y: f64| patch.height(0.01 * (x + 0.5), 0.01 * (y + 0.5));

@@ -37,7 +37,7 @@ pub fn rocks_of(world: &World) -> &Rocks {
 /// All rocks whose centre lies in a square, lattice units.
 pub fn found(world: &World, side: usize, coverage: impl Fn([f64; 2]) -> f64) -> Vec<Rock> {
     let area = window(0, 0, 0, side, side);
-    let mut rocks = rocks_of(world).find(&area, coverage);
+    let mut rocks = rocks_of(world).find(&area, 0.0, None, coverage);
     rocks.retain(|r| !area.misses(r.centre, 0.0));
     rocks
 }
@@ -91,7 +91,7 @@ fn val_craters_clear_and_strew_rocks() {
     let patch = made.patch(&area);
     let [Step::Bombardment(b)] = &made.steps[..] else { panic!("one bombardment") };
     let mut craters = Vec::new();
-    b.populations[0].find(&Near { window: &area, margin: 0.0 }, 0.0, &Families::default(), &mut craters);
+    b.populations[0].find(&Near { window: &area, margin: 0.0, cancel: None }, 0.0, &Families::default(), &mut craters);
     craters.sort_unstable_by(Crater::order);
     let mut checked = [0; 3];
     for k in 0..area.len() {
@@ -153,7 +153,8 @@ fn val_heights_of_rocks() {
     };
     let (clean, dusty) = (flat(json!([])), flat(json!([{"kind": "dust", "thickness_m": 0.05}])));
     let area = window(0, 0, 0, 1000, 1000);
-    let (all, buried) = (rocks_of(&clean).find(&area, |_| 0.176), rocks_of(&dusty).find(&area, |_| 0.176));
+    let (all, buried) =
+        (rocks_of(&clean).find(&area, 0.0, None, |_| 0.176), rocks_of(&dusty).find(&area, 0.0, None, |_| 0.176));
     for rock in &all {
         assert!((rock.height_m - (0.506 * rock.diameter_m + 0.008)).abs() < 1e-4 * rock.diameter_m);
     }

@@ -1,0 +1,115 @@
+//! What a server asks for: samples in the middle of cells, without narrow features, of some of the processes, and no longer.
+
+use super::*;
+use crate::planetary::world::Request;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+fn request(window: Window, feature_min_m: f64) -> Request<'static> {
+    Request { window, feature_min_m, cancel: None }
+}
+
+fn world_of(processes: Value, seed: u64, acts: impl Fn(usize) -> bool) -> World {
+    let processes: Vec<RawProcess> = serde_json::from_value(processes).unwrap();
+    assemble::Assembly::new(0.01, 20).with(&processes, &Streams::for_seed(seed, "terrain"), None, acts)
+}
+
+/// Samples in the middle of cells are those of the grid of half the spacing with both coordinates odd.
+#[test]
+fn prop_centred_samples_are_samples() {
+    let world = world(everything(), 1);
+    for (zoom, west, south) in [(1, -20, 30), (2, 501, -3), (3, 0, 0), (4, -77, 31), (7, 12, -5), (10, -9, 3)] {
+        let (cols, rows) = (37, 30);
+        let centred = world.patch(&Window { centred: true, ..window(zoom, west, south, cols, rows) });
+        let fine = world.patch(&window(zoom - 1, 2 * west, 2 * south, 2 * cols, 2 * rows));
+        let mut rocks = 0;
+        for (row, col) in (0..rows).flat_map(|row| (0..cols).map(move |col| (row, col))) {
+            let (k, of) = (row * cols + col, (2 * row + 1) * 2 * cols + 2 * col + 1);
+            assert_eq!(centred.window.place(col, row), fine.window.place(2 * col + 1, 2 * row + 1));
+            assert_eq!(centred.heights[k].to_bits(), fine.heights[of].to_bits(), "zoom {zoom} ({col}, {row})");
+            assert_eq!(centred.albedo[k].to_bits(), fine.albedo[of].to_bits());
+            assert_eq!(centred.rock_potential[k].to_bits(), fine.rock_potential[of].to_bits());
+            assert_eq!(centred.class[k], fine.class[of]);
+            rocks += usize::from(centred.class[k]);
+        }
+        assert!(rocks > 0);
+    }
+}
+
+/// Without a bound nothing is left out. With one the ground is that of a world without the narrow craters: wider ones, here above 3.2 m, are the
+/// same to the bit, since no bin holds diameters of both sides of it.
+#[test]
+fn prop_narrow_features_are_left_out_and_wide_ones_stay() {
+    let craters = |least: f64| json!([{"kind": "texture"}, {"kind": "primary_craters", "density": 0.05, "diameter_min_m": least, "diameter_max_m": 400.0}]);
+    let whole = world(craters(0.4), 3);
+    // Bins begin at a quarter of a power of 2 of the basic spacing: 0.0025 m 2^k.
+    let bound_m = 0.0025 * 1024.0;
+    let area = window(3, -120, 40, 200, 150);
+    assert_eq!(whole.patch_for(&request(area, 0.0)).unwrap(), whole.patch(&area));
+    let bounded = whole.patch_for(&request(area, bound_m)).unwrap();
+    assert_eq!(bounded, world(craters(bound_m), 3).patch(&area));
+    assert_ne!(bounded, whole.patch(&area));
+}
+
+/// Rocks wider than the bound stand where they stood.
+#[test]
+fn prop_wide_rocks_stay() {
+    let whole = world(json!([{"kind": "texture"}, {"kind": "rocks", "coverage": 0.176}]), 5);
+    let area = window(1, 0, 0, 300, 300);
+    let (all, wide) = (whole.patch(&area), whole.patch_for(&request(area, 0.3)).unwrap());
+    let count = |patch: &Patch| patch.class.iter().filter(|c| **c == 1).count();
+    assert!(count(&wide) > 0 && count(&wide) < count(&all));
+    for k in 0..area.len() {
+        assert!(wide.class[k] <= all.class[k] && wide.heights[k] <= all.heights[k]);
+    }
+    // A share of the ground stays in line with the law: narrow rocks cover what the bound takes away.
+    let parameters = whole.rocks.as_ref().unwrap().0.parameters();
+    let narrow = parameters.cover_below(0.176, 0.3);
+    let measured = (count(&all) - count(&wide)) as f64 / (area.len() - count(&wide)) as f64;
+    assert!((measured / narrow - 1.0).abs() < 0.25, "{measured} {narrow}");
+    assert_eq!(parameters.cover_below(0.176, 0.03), 0.0);
+}
+
+/// A process that does not act leaves the others as they are.
+#[test]
+fn prop_the_others_do_not_change() {
+    let area = window(2, -60, 10, 90, 80);
+    let whole = world(everything(), 4).patch(&area);
+    assert_eq!(world_of(everything(), 4, |_| true).patch(&area), whole);
+    // Without rocks, number 3: their places aside the ground is the same.
+    let bare = world_of(everything(), 4, |n| n != 3).patch(&area);
+    assert!(bare.class.iter().all(|c| *c == 0) && whole.class.contains(&1));
+    for k in (0..area.len()).filter(|k| whole.class[*k] == 0) {
+        assert_eq!(bare.heights[k].to_bits(), whole.heights[k].to_bits());
+        assert_eq!(bare.albedo[k].to_bits(), whole.albedo[k].to_bits());
+    }
+    // The second craters alone are those that a list with the first as thin air has: the plane of each sees its own kind only.
+    let alone = world_of(everything(), 4, |n| n == 4).patch(&area);
+    assert!(alone.heights.iter().any(|z| *z != 0.0) && alone != whole);
+    // Secondaries of primaries that do not act are where they were.
+    let secondaries = world_of(everything(), 4, |n| n == 5).patch(&window(6, -60, 10, 90, 80));
+    assert!(secondaries.heights.iter().any(|z| *z < -0.05));
+    // Nothing acts: the ground is level.
+    assert!(world_of(everything(), 4, |_| false).patch(&area).heights.iter().all(|z| *z == 0.0));
+}
+
+/// A patch that takes seconds ends soon after it is no longer wanted; 0.5 s, ten times what is promised, for a busy machine.
+#[test]
+fn val_a_patch_can_be_stopped() {
+    let world = world(everything(), 6);
+    let cancel = AtomicBool::new(false);
+    let ended = std::thread::scope(|scope| {
+        let making = scope.spawn(|| {
+            let made = world.patch_for(&Request { cancel: Some(&cancel), ..request(window(10, 0, 0, 256, 256), 0.0) });
+            (made.is_none(), Instant::now())
+        });
+        std::thread::sleep(Duration::from_millis(150));
+        let stopped = Instant::now();
+        cancel.store(true, Ordering::Relaxed);
+        let (none, end) = making.join().unwrap();
+        assert!(none);
+        end.saturating_duration_since(stopped)
+    });
+    println!("stopped after {:.1} ms", 1e3 * ended.as_secs_f64());
+    assert!(ended < Duration::from_millis(500));
+}
