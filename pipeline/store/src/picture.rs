@@ -1,4 +1,4 @@
-//! Pictures to look at: 8-bit grey PNG.
+//! Pictures to look at, and map tiles: 8-bit PNG.
 
 use crate::atomic::{self, Target};
 use sastrugi_numeric::Grid;
@@ -13,14 +13,33 @@ pub fn write_grey<'a>(target: impl Into<Target<'a>>, pixels: &Grid<[u8; 2]>) -> 
 }
 
 fn grey_png(pixels: &Grid<[u8; 2]>) -> io::Result<Vec<u8>> {
+    let shape = [pixels.rows(), pixels.cols()];
+    encode(shape, png::ColorType::GrayscaleAlpha, png::Compression::Balanced, pixels.values.as_flattened())
+}
+
+/// The bytes of a PNG of red, green, blue and opacity, rows from the north: packed fast, for pictures that are looked at once.
+///
+/// # Errors
+/// Too many pixels a side for a PNG.
+pub fn rgba_png(shape: [usize; 2], pixels: &[[u8; 4]]) -> io::Result<Vec<u8>> {
+    encode(shape, png::ColorType::Rgba, png::Compression::Fast, pixels.as_flattened())
+}
+
+fn encode(
+    [rows, cols]: [usize; 2],
+    color: png::ColorType,
+    compression: png::Compression,
+    data: &[u8],
+) -> io::Result<Vec<u8>> {
     let side =
         |n: usize| u32::try_from(n).map_err(|_| io::Error::other(format!("{n} pixels a side are too many for a PNG")));
     let mut bytes = Vec::new();
-    let mut encoder = png::Encoder::new(&mut bytes, side(pixels.cols())?, side(pixels.rows())?);
-    encoder.set_color(png::ColorType::GrayscaleAlpha);
+    let mut encoder = png::Encoder::new(&mut bytes, side(cols)?, side(rows)?);
+    encoder.set_color(color);
     encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_compression(compression);
     let mut writer = encoder.write_header().map_err(io::Error::other)?;
-    writer.write_image_data(pixels.values.as_flattened()).map_err(io::Error::other)?;
+    writer.write_image_data(data).map_err(io::Error::other)?;
     writer.finish().map_err(io::Error::other)?;
     Ok(bytes)
 }
@@ -40,5 +59,11 @@ mod tests {
         let info = reader.next_frame(&mut out).unwrap();
         assert_eq!((info.width, info.height, info.color_type), (4, 3, png::ColorType::GrayscaleAlpha));
         assert_eq!(out, levels.as_flattened());
+        let colours: Vec<[u8; 4]> = (0..12).map(|k| [k, 2 * k, 255 - k, if k == 5 { 0 } else { 255 }]).collect();
+        let file = rgba_png([3, 4], &colours).unwrap();
+        let mut reader = png::Decoder::new(io::Cursor::new(file)).read_info().unwrap();
+        let mut out = vec![0; reader.output_buffer_size().unwrap()];
+        reader.next_frame(&mut out).unwrap();
+        assert_eq!(out, colours.as_flattened());
     }
 }

@@ -151,6 +151,14 @@ pub fn write<'a>(
     Ok(notes)
 }
 
+/// The bytes that [`write`] would put into a file of that name, and sentences on what the format lost.
+///
+/// # Errors
+/// [`DemError::Unfit`] when the format cannot hold the grid.
+pub fn encode(name: &Path, grid: &Grid, crs: &Crs, options: &WriteOptions) -> Result<(Vec<u8>, Vec<String>), DemError> {
+    render(name, grid, crs, options).map_err(|refusal| refusal.unfit(name))
+}
+
 /// The bytes of a file, and sentences on what the format lost.
 fn render(path: &Path, grid: &Grid, crs: &Crs, options: &WriteOptions) -> Result<(Vec<u8>, Vec<String>), Refusal> {
     let unknown = || Refusal::new(format!("the ending names no DEM format; {WRITTEN_ENDINGS} do"));
