@@ -1,0 +1,35 @@
+// Builds the page into the folder named on the command line. The same lock file gives the same bytes.
+
+import { build } from 'esbuild';
+import { copyFile, mkdir, readFile, readdir, rm, writeFile } from 'node:fs/promises';
+import { dirname, join, resolve } from 'node:path';
+import { fileURLToPath } from 'node:url';
+
+const room = dirname(fileURLToPath(import.meta.url));
+const out = resolve(process.argv[2] ?? join(room, 'dist'));
+const common = { absWorkingDir: room, bundle: true, minify: true, format: 'esm', target: ['es2022', 'safari16'], charset: 'utf8', legalComments: 'none', metafile: true, logLevel: 'warning' };
+
+await rm(out, { recursive: true, force: true });
+await mkdir(out, { recursive: true });
+// Two bundles: the map comes first, the 3-D view is imported the first time it is wanted.
+const page = await build({ ...common, entryPoints: ['src/main.js'], outfile: join(out, 'page.js'), external: ['./three.js'] });
+const space = await build({ ...common, entryPoints: ['src/three.js'], outfile: join(out, 'three.js') });
+await copyFile(join(room, 'src/index.html'), join(out, 'index.html'));
+await writeFile(join(out, 'licences.txt'), await licences([page, space]));
+
+/** Licence texts of the packages that ended up in the bundles, and of no others. */
+async function licences(results) {
+  const used = new Set();
+  for (const { metafile } of results) for (const output of Object.values(metafile.outputs)) for (const [path, { bytesInOutput }] of Object.entries(output.inputs)) {
+    const name = /node_modules\/((?:@[^/]+\/)?[^/]+)/.exec(path)?.[1];
+    if (name && bytesInOutput) used.add(name);
+  }
+  const parts = [];
+  for (const name of [...used].sort()) {
+    const folder = join(room, 'node_modules', name);
+    const { version, license } = JSON.parse(await readFile(join(folder, 'package.json'), 'utf8'));
+    const file = (await readdir(folder)).sort().find((entry) => /^licen[cs]e/i.test(entry));
+    parts.push(`${name} ${version} (${license})\n\n${file ? (await readFile(join(folder, file), 'utf8')).replaceAll('\r\n', '\n').trim() : 'The package carries no licence file.'}\n`);
+  }
+  return `The page contains these packages.\n\n${parts.join(`\n${'-'.repeat(72)}\n\n`)}`;
+}

@@ -1,0 +1,110 @@
+// The page: puts the parts together and opens what the address asks for.
+
+import './page.css';
+import { map, open, home, moveTo, zoomBy } from './ground.js';
+import { state, set, on } from './state.js';
+import { json } from './api.js';
+import { tell, failed } from './tell.js';
+import { icon, h } from './dom.js';
+import { scaleBar } from './scale.js';
+import { readout } from './readout.js';
+import { keep, read } from './link.js';
+import { pixelsAreTrue } from './pixels.js';
+import { worldsPanel } from './worlds.js';
+import { looksPanel } from './looks.js';
+import { linePanel } from './line.js';
+import { boxPanel } from './box.js';
+import { tracksPanel } from './tracks.js';
+import { open3d, close3d } from './window3d.js';
+
+const $ = (id) => document.getElementById(id);
+const panels = { worlds: worldsPanel((one) => go({ id: one.id, place: null, looks: { phenomena: null, track: null } })), ground: looksPanel(), line: linePanel(), tracks: tracksPanel(), box: boxPanel() };
+const NAMES = { worlds: 'Collections', ground: 'Ground: layers, sun, phenomena', line: 'Profile and distance', tracks: 'Tracks', box: 'Download', relief: '3-D view of the window' };
+let opened = null;
+
+function toggle(name) {
+  if (opened) panels[opened].close();
+  opened = name === opened ? null : name;
+  $('panel').hidden = !opened;
+  document.body.classList.toggle('open', Boolean(opened));
+  for (const button of $('tools').children) button.setAttribute('aria-expanded', String(button.dataset.panel === opened));
+  if (!opened) return;
+  $('panel-title').textContent = panels[opened].title;
+  $('panel-body').replaceChildren(panels[opened].element);
+  panels[opened].open();
+}
+
+function furnish() {
+  for (const name of Object.keys(NAMES)) {
+    $('tools').append(h('button', { type: 'button', 'data-panel': name, title: NAMES[name], 'aria-label': NAMES[name], 'aria-expanded': 'false',
+      onclick: () => (name === 'relief' ? open3d($('space')) : toggle(name)) }, icon(name)));
+  }
+  $('panel-close').append(icon('close'));
+  $('panel-close').addEventListener('click', () => { const name = opened; toggle(name); $('tools').querySelector(`[data-panel=${name}]`).focus(); });
+  for (const [name, label, run] of [['plus', 'Zoom in', () => zoomBy(1)], ['minus', 'Zoom out', () => zoomBy(-1)], ['home', 'Show all', () => home()]]) $('zoom').append(h('button', { type: 'button', title: label, 'aria-label': label, onclick: run }, icon(name)));
+  $('message').querySelector('button').append(icon('close'));
+  $('message').querySelector('button').addEventListener('click', () => { $('message').hidden = true; });
+  $('space').addEventListener('leave', () => { close3d($('space')); });
+  addEventListener('keydown', (event) => {
+    if (event.target.closest?.('input, select, textarea, dialog, pre')) return;
+    if (event.key === 'Escape' && !$('space').hidden) close3d($('space'));
+    else if (event.key === 'Escape' && opened) toggle(opened);
+    else if ($('space').hidden && !event.ctrlKey && !event.metaKey && event.target.id !== 'map' && ['+', '='].includes(event.key)) zoomBy(1);
+    else if ($('space').hidden && !event.ctrlKey && !event.metaKey && event.target.id !== 'map' && event.key === '-') zoomBy(-1);
+  });
+  map.setTarget($('map'));
+  scaleBar($('scale'));
+  on(['collection'], () => {
+    const { title, release, credit, license, tracks } = state.collection;
+    document.title = `${title} - Sastrugi`;
+    $('title').textContent = release ? `${release} / ${title}` : title;
+    $('credit').textContent = [credit, license].filter(Boolean).join(', ');
+    $('tools').querySelector('[data-panel=tracks]').hidden = !tracks;
+    if (!tracks && opened === 'tracks') toggle('tracks');
+  });
+}
+
+/** A thin bar while tiles are outstanding. */
+function progress() {
+  let asked = 0, came = 0;
+  const bar = $('progress');
+  const update = () => {
+    if (came >= asked) { asked = came = 0; bar.style.width = '0'; bar.classList.remove('on'); return; }
+    bar.classList.add('on');
+    bar.style.width = `${10 + 90 * came / asked}%`;
+  };
+  const watch = (source) => {
+    source.on('tileloadstart', () => { asked++; update(); });
+    source.on(['tileloadend', 'tileloaderror'], () => { came++; update(); });
+  };
+  map.getLayers().forEach((layer) => { layer.on('change:source', () => { if (layer.getSource()?.redraw) watch(layer.getSource()); }); });
+}
+
+async function go({ id, place, looks }) {
+  const known = state.collections.find((one) => one.id === id);
+  if (id && !known) tell(`There is no collection ${id} here. The list shows what there is.`);
+  const collection = known ?? state.collections[0];
+  if (!collection) return tell('The server has no collections yet.', true);
+  const same = collection === state.collection;
+  if (!$('space').hidden) close3d($('space'));
+  set(looks);
+  if (same && place) moveTo(place); else open(collection, place);
+  set({ collection });
+  if (same && opened === 'ground') panels.ground.renew();
+}
+
+async function start() {
+  furnish();
+  progress();
+  const { collections } = await json('/v1/collections');
+  set({ collections });
+  await go(read());
+  readout($('readout'));
+  keep(go)();
+  panels.tracks.renew();
+  if (innerWidth >= 700) toggle('ground');
+  if (!(await pixelsAreTrue())) tell('This browser alters the pixels of images it decodes, so colours and downloaded screenshots may be off; allow canvas data for this page.', true);
+}
+const ready = start().catch((error) => { failed(error); throw error; });
+ready.catch(() => {});
+window.sastrugi = { map, state, ready, panels };

@@ -1,0 +1,103 @@
+// Missions and rovers on their terrain: a list, the lines, and a playback of one.
+
+import Feature from 'ol/Feature.js';
+import LineString from 'ol/geom/LineString.js';
+import { map, drawn } from './ground.js';
+import { json, base } from './api.js';
+import { failed } from './tell.js';
+import { state, set, on } from './state.js';
+import { chart } from './chart.js';
+import { h, slider, length, plain } from './dom.js';
+import { line as ink, marker, BLUE, RUST } from './ink.js';
+
+/** Lines that are drawn at once; the others of a long list are drawn when they are chosen. */
+const DRAWN_MAX = 24;
+const known = new Map();
+
+export const trackOf = async (id) => {
+  const path = `${base(state.collection)}/tracks/${encodeURIComponent(id)}`;
+  if (!known.has(path)) known.set(path, json(path).catch((error) => { known.delete(path); throw error; }));
+  return known.get(path);
+};
+export const tracksShown = new Map();
+
+export function tracksPanel() {
+  const list = h('ul', { class: 'list' });
+  const player = h('div', {});
+  const mark = marker(RUST);
+  let lines = [], frame = 0, listed = null;
+
+  async function renew() {
+    if (listed === state.collection) return;
+    listed = state.collection;
+    cancelAnimationFrame(frame);
+    lines = [];
+    tracksShown.clear();
+    list.replaceChildren();
+    player.replaceChildren();
+    if (!state.collection.tracks) { list.append(h('li', { class: 'hint' }, 'Nothing was driven here. Releases list their missions and rovers with each terrain.')); return; }
+    const asked = state.collection;
+    try {
+      const { tracks } = await json(`${base(asked)}/tracks`);
+      if (asked !== state.collection) return;
+      for (const track of tracks) list.append(h('li', {}, h('button', { type: 'button', class: 'item', 'data-track': track.id, onclick: () => set({ track: track.id }) },
+        h('b', {}, track.label), h('span', {}, `${track.kind}, ${track.outcome}, ${length(track.length_m)}, ${plain(track.duration_s, 4)} s`))));
+      await Promise.all(tracks.slice(0, DRAWN_MAX).map(({ id }) => draw(id, asked)));
+      if (state.track) play(state.track);
+    } catch (error) { failed(error); }
+  }
+  async function draw(id, asked = state.collection) {
+    const path = await trackOf(id);
+    if (asked !== state.collection || tracksShown.has(id)) return path;
+    tracksShown.set(id, path);
+    const feature = new Feature(new LineString(path.x_m.map((x, at) => [x, path.y_m[at]])));
+    feature.set('track', id);
+    feature.setStyle(ink(BLUE, 1.6));
+    lines.push(feature);
+    drawn.addFeature(feature);
+    return path;
+  }
+  async function play(id) {
+    cancelAnimationFrame(frame);
+    try {
+      const path = await draw(id);
+      for (const feature of lines) feature.setStyle(ink(feature.get('track') === id ? RUST : BLUE, feature.get('track') === id ? 2.4 : 1.4));
+      for (const button of list.querySelectorAll('button')) button.setAttribute('aria-pressed', String(button.dataset.track === id));
+      controls(path);
+    } catch (error) { failed(error); }
+  }
+  function controls(path) {
+    const { time_s: time, x_m: x, y_m: y, z_m: z, heading_deg: heading, events } = path;
+    const first = time[0], last = time.at(-1);
+    let now = first, speed = 10, playing = false, before = 0;
+    const index = (t) => { let low = 0, high = time.length - 1; while (high - low > 1) { const mid = (low + high) >> 1; if (time[mid] <= t) low = mid; else high = mid; } return low; };
+    const show = (t) => {
+      now = t;
+      const at = index(t);
+      const share = time.length > 1 ? Math.min(1, Math.max(0, (t - time[at]) / (time[at + 1] - time[at] || 1))) : 0;
+      const between = (list) => list[at] + share * ((list[at + 1] ?? list[at]) - list[at]);
+      mark.at([between(x), between(y)], heading[at]);
+      figure.show?.(at);
+      clock.set(t);
+    };
+    const clock = slider('Time', { min: first, max: last, step: (last - first) / 1000 || 1, value: first, show: (t) => `${t.toFixed(1)} s`, onchange: show });
+    const rate = h('select', { 'aria-label': 'Speed', onchange: () => { speed = Number(rate.value); } }, [1, 10, 60, 300].map((k) => h('option', { value: String(k), selected: k === speed }, `${k} ×`)));
+    const button = h('button', { type: 'button', class: 'main', onclick: () => { playing = !playing; if (playing && now >= last) now = first; before = performance.now(); button.textContent = playing ? 'Pause' : 'Play'; frame = requestAnimationFrame(step); } }, 'Play');
+    const step = (stamp) => {
+      if (!playing) return;
+      show(Math.min(last, now + (Math.max(0, stamp - before) / 1000) * speed));
+      before = stamp;
+      if (now >= last) { playing = false; button.textContent = 'Play'; } else frame = requestAnimationFrame(step);
+    };
+    const figure = chart({ along: time, heights: z, label: 'time (s)', hover: (at) => { if (at !== null) show(time[at]); } });
+    player.replaceChildren(figure, clock, h('div', { class: 'row' }, button, rate),
+      h('ul', { class: 'list' }, events.map((event) => h('li', {}, h('button', { type: 'button', class: 'item', onclick: () => show(event.time_s) }, h('b', {}, `${plain(event.time_s, 4)} s`), h('span', {}, event.what))))));
+    show(first);
+  }
+  on(['collection'], renew);
+  on(['track'], () => { if (state.track && listed === state.collection) play(state.track); });
+  const element = h('div', {}, list, player);
+  return {
+    title: 'Tracks', element, renew, open() { renew(); }, close() { cancelAnimationFrame(frame); mark.remove(); },
+  };
+}

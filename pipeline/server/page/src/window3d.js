@@ -1,0 +1,51 @@
+// Fetches the window as heights and hands it to the 3-D view, whose code is loaded the first time.
+
+import { map, windowOf } from './ground.js';
+import { get, query, base } from './api.js';
+import { failed } from './tell.js';
+import { state, phenomena } from './state.js';
+import { tracksShown } from './tracks.js';
+import { getIntersection } from 'ol/extent.js';
+
+const ACROSS_MAX = 384;
+
+/** Spacing of the grid that puts at most 384 samples across: a level of the tile grid, or the finest spacing. */
+function spacing(span, { tile_grid: grid, spacing_m: finest }) {
+  const steps = [...grid.resolutions_m, finest].sort((a, b) => a - b);
+  return steps.find((step) => span / step <= ACROSS_MAX) ?? steps.at(-1);
+}
+
+let view = null;
+export async function open3d(element, done) {
+  const extent = getIntersection(windowOf(), state.collection.bounds_m);
+  const across = Math.max(extent[2] - extent[0], extent[3] - extent[1]);
+  const step = spacing(across, state.collection);
+  const count = (span) => Math.max(4, Math.round(span / step));
+  const size = [count(extent[2] - extent[0]), count(extent[3] - extent[1])];
+  const snap = (value, edge) => edge + Math.round((value - edge) / step) * step;
+  const origin = [snap(extent[0], state.collection.bounds_m[0]), snap(extent[1], state.collection.bounds_m[1])];
+  document.body.classList.add('busy');
+  try {
+    const path = `${base(state.collection)}/patch${query({ origin: origin.join(','), size: size.join(','), resolution_m: step, field: 'elevation', format: 'raw', feature_min_m: state.collection.kind === 'world' ? 2 * step : null, ...phenomena() })}`;
+    const [{ show }, response] = await Promise.all([import('./three.js'), get(path)]);
+    const heights = new Float32Array(await response.arrayBuffer());
+    const columns = Number(response.headers.get('Grid-Columns') ?? size[0]);
+    const rows = Number(response.headers.get('Grid-Rows') ?? size[1]);
+    const cell = Number(response.headers.get('Grid-Cell-M') ?? step);
+    const corner = (response.headers.get('Grid-Origin-M') ?? origin.join(',')).split(',').map(Number);
+    element.hidden = false;
+    view = show(element, { heights, columns, rows, cell, corner, azimuth: state.azimuth, elevation: state.elevation, tracks: [...tracksShown.values()], title: state.collection.title });
+    done?.();
+  } catch (error) {
+    element.hidden = true;
+    failed(error);
+  } finally {
+    document.body.classList.remove('busy');
+  }
+}
+export function close3d(element) {
+  view?.dispose();
+  view = null;
+  element.hidden = true;
+  map.getTargetElement().focus();
+}
