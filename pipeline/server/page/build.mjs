@@ -9,11 +9,34 @@ const room = dirname(fileURLToPath(import.meta.url));
 const out = resolve(process.argv[2] ?? join(room, 'dist'));
 const common = { absWorkingDir: room, bundle: true, minify: true, format: 'esm', target: ['es2022', 'safari16'], charset: 'utf8', legalComments: 'none', metafile: true, logLevel: 'warning' };
 
+/** Shader texts of three.js that the view's materials (basic, with its lines) do not include are left out: a fifth of the bundle. */
+const shaders = {
+  name: 'shaders',
+  setup({ onLoad }) {
+    onLoad({ filter: /three\.module\.js$/ }, async ({ path }) => {
+      const code = await readFile(path, 'utf8');
+      const texts = new Map([...code.matchAll(/^(?:var|const) ([\w$]+) = ("(?:[^"\\]|\\.)*");$/gm)].map(([, name, text]) => [name, text]));
+      const chunks = new Map([...code.matchAll(/^\t(\w+): ([\w$]+),?$/gm)].filter(([, , name]) => texts.has(name)).map(([, chunk, name]) => [chunk, name]));
+      const kept = new Set();
+      const keep = (chunk) => {
+        const name = chunks.get(chunk);
+        if (!name) throw new Error(`three.js has no shader chunk ${chunk}: look at build.mjs`);
+        if (kept.has(name)) return;
+        kept.add(name);
+        for (const [, inner] of texts.get(name).matchAll(/#include <(\w+)>/g)) keep(inner);
+      };
+      ['meshbasic_vert', 'meshbasic_frag'].forEach(keep);
+      const unused = new Set([...chunks.values()].filter((name) => !kept.has(name)));
+      return { contents: code.replace(/^((?:var|const) ([\w$]+) = )"(?:[^"\\]|\\.)*";$/gm, (all, start, name) => (unused.has(name) ? `${start}"";` : all)) };
+    });
+  },
+};
+
 await rm(out, { recursive: true, force: true });
 await mkdir(out, { recursive: true });
 // Two bundles: the map comes first, the 3-D view is imported the first time it is wanted.
 const page = await build({ ...common, entryPoints: ['src/main.js'], outfile: join(out, 'page.js'), external: ['./three.js'] });
-const space = await build({ ...common, entryPoints: ['src/three.js'], outfile: join(out, 'three.js') });
+const space = await build({ ...common, entryPoints: ['src/three.js'], outfile: join(out, 'three.js'), plugins: [shaders] });
 await copyFile(join(room, 'src/index.html'), join(out, 'index.html'));
 await writeFile(join(out, 'licences.txt'), await licences([page, space]));
 

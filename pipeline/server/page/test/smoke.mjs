@@ -1,4 +1,5 @@
 // Smoke test of the page: node test/smoke.mjs URL FOLDER. Needs Chromium (CHROMIUM names it when it is not on the path).
+// SMOKE_ONLY, a regular expression, picks checks by their names; SMOKE_SECONDS is the patience with each.
 // Each check prints one line; the screenshots go into FOLDER; the exit code is 1 when a check failed.
 
 import puppeteer from 'puppeteer-core';
@@ -8,6 +9,7 @@ import { join } from 'node:path';
 const url = (process.argv[2] ?? 'http://127.0.0.1:8080').replace(/\/$/, '');
 const folder = process.argv[3] ?? 'smoke';
 const CHROMIUM = [process.env.CHROMIUM, '/usr/bin/chromium', '/usr/bin/chromium-browser', '/usr/bin/google-chrome'].find((path) => path && existsSync(path));
+const ONLY = process.env.SMOKE_ONLY && new RegExp(process.env.SMOKE_ONLY);
 const PATIENCE = Number(process.env.SMOKE_SECONDS ?? 60) * 1000;
 if (!CHROMIUM) {
   console.error('Chromium was not found: install it or name it in the variable CHROMIUM.');
@@ -26,6 +28,7 @@ page.on('requestfailed', (request) => { const why = request.failure()?.errorText
 
 let failures = 0;
 async function check(name, run) {
+  if (ONLY && !ONLY.test(name)) return;
   try {
     const note = await run();
     console.log(`ok    ${name}${note ? `: ${note}` : ''}`);
@@ -62,11 +65,10 @@ const colour = (x, y, half) => page.evaluate((cx, cy, size) => {
 }, x, y, half);
 
 await page.setViewport({ width: 1280, height: 900 });
-let collection;
+await visit();
+const collection = await page.evaluate(() => window.sastrugi.state.collection);
 await check('the page loads and tiles come', async () => {
-  await visit();
   await shot('home');
-  collection = await page.evaluate(() => window.sastrugi.state.collection);
   const tiles = await page.evaluate(() => performance.getEntriesByType('resource').filter((entry) => entry.name.includes('/map/tiles/')).length);
   must(tiles > 0, 'no tile was asked for');
   return `${collection.id}, ${tiles} tiles`;
