@@ -25,7 +25,7 @@ const shaders = {
         kept.add(name);
         for (const [, inner] of texts.get(name).matchAll(/#include <(\w+)>/g)) keep(inner);
       };
-      ['meshbasic_vert', 'meshbasic_frag'].forEach(keep);
+      ['meshbasic_vert', 'meshbasic_frag', ...[...code.matchAll(/ShaderChunk\[ '(\w+)' \]/g)].map(([, chunk]) => chunk)].forEach(keep);
       const unused = new Set([...chunks.values()].filter((name) => !kept.has(name)));
       return { contents: code.replace(/^((?:var|const) ([\w$]+) = )"(?:[^"\\]|\\.)*";$/gm, (all, start, name) => (unused.has(name) ? `${start}"";` : all)) };
     });

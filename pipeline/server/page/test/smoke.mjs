@@ -191,7 +191,9 @@ await check('the 3-D view opens', async () => {
   await page.click('[data-panel=relief]');
   await page.waitForSelector('#space canvas');
   await new Promise((resolve) => setTimeout(resolve, 2500));
-  await shot('space');
+  const picture = await shot('space');
+  must(!complaints.some((text) => text.includes('THREE')), 'three.js complains of a shader');
+  must(picture.length > 80000, `the picture is empty: ${picture.length} bytes`);
   const words = await page.$eval('.space-bar p', (element) => element.innerText);
   await page.click('.space-bar .main');
   must(await page.$eval('#space', (element) => element.hidden), 'the button back does not lead back');
