@@ -1,6 +1,6 @@
 //! A study read from its file: checked, with the graph of its items.
 
-use crate::builder::{BuildError, Builder, InputPlace, Origin};
+use crate::builder::{BuildError, Builder, Heightfield, InputPlace, Origin};
 use crate::error::{Error, of_build};
 use crate::registry::{self, SECTIONS};
 use crate::runner::graph::Graph;
@@ -23,6 +23,8 @@ pub struct Loaded {
     pub splits: Splits,
     /// The table that each id comes from.
     pub origins: BTreeMap<String, Origin>,
+    /// Its heightfields by id.
+    pub(crate) heightfields: BTreeMap<String, Heightfield>,
 }
 
 /// Reads a study file.
@@ -62,7 +64,14 @@ pub fn load_text(text: &str, name: &str, folder: &Path) -> Result<Loaded, Error>
         return Err(Error::Usage(format!("{name}: the study has no items; add [[terrain]], [[dem]] ...")));
     }
     let released = released_text(text, &study, &plan);
-    Ok(Loaded { study, graph: plan.graph, released, splits: plan.splits, origins: plan.origins })
+    Ok(Loaded {
+        study,
+        graph: plan.graph,
+        released,
+        splits: plan.splits,
+        origins: plan.origins,
+        heightfields: plan.heightfields,
+    })
 }
 
 /// The study with its input files at their places in the release; every other byte stays.
@@ -91,6 +100,8 @@ struct Plan {
     splits: Splits,
     /// The table that each id comes from.
     origins: BTreeMap<String, Origin>,
+    /// Heightfields by id.
+    heightfields: BTreeMap<String, Heightfield>,
 }
 
 /// Builds the graph of a study. Input files are hashed, nothing else is read.
@@ -104,5 +115,5 @@ fn build(study: &Study) -> Result<Plan, BuildError> {
     }
     let splits = splits::draw(study, &builder.heightfields, &builder.graph)?;
     let origins = builder.origins().clone();
-    Ok(Plan { graph: builder.graph, inputs: builder.inputs, splits, origins })
+    Ok(Plan { graph: builder.graph, inputs: builder.inputs, splits, origins, heightfields: builder.heightfields })
 }

@@ -15,6 +15,7 @@ pub mod releases;
 pub mod render;
 pub mod roughness;
 pub mod rover;
+pub mod served;
 pub mod terrain;
 pub mod texture;
 pub mod traverse;

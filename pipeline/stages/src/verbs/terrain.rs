@@ -91,6 +91,26 @@ impl Prepared {
         Ok((generate(self.generator.as_ref(), &self.streams, &inputs)?, crs))
     }
 
+    /// Name of the generator.
+    pub(super) fn kind(&self) -> &str {
+        &self.kind
+    }
+
+    /// Its full parameters.
+    pub(super) fn parameters(&self) -> Value {
+        self.generator.parameters()
+    }
+
+    /// What it takes as input.
+    pub(super) fn inputs(&self) -> Result<Vec<Input>, Error> {
+        Ok(read_inputs(self.generator.as_ref())?.0)
+    }
+
+    /// Its random streams.
+    pub(super) fn streams(&self) -> Streams {
+        self.streams.clone()
+    }
+
     /// Seed of its streams.
     pub(super) fn seed(&self) -> u64 {
         self.seed

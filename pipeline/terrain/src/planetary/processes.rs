@@ -275,6 +275,19 @@ impl RawProcess {
         }
     }
 
+    /// What it is, in a few words.
+    pub fn summary(&self) -> String {
+        match self {
+            Self::BaseSlope(_) => "a smooth slope".to_owned(),
+            Self::Texture(p) => format!("roughness of {} m at 1 m, Hurst exponent {}", p.roughness_m, p.hurst),
+            Self::PrimaryCraters(p) => format!("craters of {} to {} m", p.diameter_min_m, p.diameter_max_m),
+            Self::SecondaryCraters(_) => "craters of what other impacts threw out".to_owned(),
+            Self::Rocks(p) => format!("rocks over {:.1} % of the ground", 100.0 * p.coverage),
+            Self::Albedo(_) => "how bright the ground is".to_owned(),
+            Self::Dust(p) => format!("dust of {} m", p.thickness_m),
+        }
+    }
+
     /// Whether the process is possible by itself on a lattice with points `spacing_m` apart.
     fn check(&self, spacing_m: f64) -> Result<(), ParameterError> {
         match self {

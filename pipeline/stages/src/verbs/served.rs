@@ -1,0 +1,191 @@
+//! `serve`: what there is to serve in a file or a release.
+
+use super::terrain::prepare;
+use crate::error::Error;
+use crate::loaded;
+use crate::revision::Room;
+use sastrugi_numeric::Streams;
+use sastrugi_schemas::manifest::Source;
+use sastrugi_schemas::tables::TerrainRow;
+use sastrugi_store::release::Release;
+use sastrugi_terrain::Generator;
+use sastrugi_terrain::planetary::{self, Planetary, RawPlanetary};
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// A world, at every place of which any patch can be made.
+#[derive(Clone, Debug)]
+pub struct ServedWorld {
+    /// Name of the file, or id of the item in its study.
+    pub id: String,
+    /// The world, with the inputs that it follows.
+    pub world: Planetary,
+    /// Its full parameters.
+    pub parameters: Value,
+    /// Its random streams.
+    pub streams: Streams,
+    /// Licence of the study that it stands in, SPDX.
+    pub license: Option<String>,
+}
+
+/// Heights of a release, with the maps of the same cells.
+#[derive(Clone, Debug)]
+pub struct ServedRaster {
+    /// Id of the terrain.
+    pub id: String,
+    /// `terrain`, `dem` or `texture`.
+    pub stage: String,
+    /// Lowest and highest height, m.
+    pub height_range_m: [f64; 2],
+    /// File of the heights.
+    pub heights: PathBuf,
+    /// Files of its maps by name, as `class`.
+    pub maps: BTreeMap<String, PathBuf>,
+    /// SHA-256 of these files, in order.
+    pub content: String,
+    /// Licence, SPDX: that of its measured data where there is some, else that of the release.
+    pub license: String,
+    /// Whom to name.
+    pub credit: Option<String>,
+}
+
+/// What a file or folder has to serve.
+#[derive(Clone, Debug)]
+pub enum Served {
+    /// Worlds of a file.
+    Worlds(Vec<ServedWorld>),
+    /// Heights of a release.
+    Release(Box<Release>, Vec<ServedRaster>),
+}
+
+/// What there is to serve: the `planetary` world of a terrain file or all those of a study, or the heights of a release.
+///
+/// # Errors
+/// A file that is neither, or wrong; one without anything to serve.
+pub fn served(path: &Path) -> Result<Served, Error> {
+    if path.is_dir() {
+        let release = Release::open(path)?;
+        let rasters = rasters(&release)?;
+        return Ok(Served::Release(Box::new(release), rasters));
+    }
+    let text = loaded::read(path)?;
+    let is_study = text.parse::<toml_edit::DocumentMut>().is_ok_and(|file| file.contains_key("study"));
+    let worlds = if is_study { worlds_of_study(path, &text)? } else { vec![world_of_file(path)?] };
+    if worlds.is_empty() {
+        return Err(Error::Usage(format!(
+            "{}: it has no [[terrain]] of kind `{}`, the kind whose patches are made on demand; run the study and serve its release",
+            path.display(),
+            planetary::KIND
+        )));
+    }
+    Ok(Served::Worlds(worlds))
+}
+
+/// The world of a terrain file: `kind`, `seed` and parameters, as the verb `terrain` reads it.
+fn world_of_file(path: &Path) -> Result<ServedWorld, Error> {
+    let spec = path.display().to_string();
+    if !spec.to_ascii_lowercase().ends_with(".toml") {
+        return Err(Error::Usage(format!(
+            "{spec}: neither a TOML file of a world or a study, nor the folder of a release"
+        )));
+    }
+    let prepared = prepare(&spec, &[], None)?;
+    let (kind, parameters) = (prepared.kind().to_owned(), prepared.parameters());
+    if kind != planetary::KIND {
+        let known = planetary::KIND;
+        return Err(Error::Usage(format!("{spec}: `kind` is `{kind}`; only patches of `{known}` are made on demand")));
+    }
+    let world = world(&parameters)?.with_inputs(&prepared.inputs()?).map_err(|e| Error::Input(e.to_string()))?;
+    let id = path.file_stem().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+    Ok(ServedWorld { id, world, parameters, streams: prepared.streams(), license: None })
+}
+
+fn world(parameters: &Value) -> Result<Planetary, Error> {
+    let raw: RawPlanetary = sastrugi_schemas::kind::read_parameters(parameters)?;
+    Ok(Planetary::try_from(raw)?)
+}
+
+/// The worlds of a study. One that follows the map of another item needs that item's files: it is left out.
+fn worlds_of_study(path: &Path, text: &str) -> Result<Vec<ServedWorld>, Error> {
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let loaded = loaded::load_text(text, &path.display().to_string(), folder)?;
+    let license = Some(loaded.study.head.license.clone());
+    let mut worlds = Vec::new();
+    for (id, field) in &loaded.heightfields {
+        if let (true, Some(streams)) = (field.kind == planetary::KIND, &field.streams) {
+            let (world, parameters) = (world(&field.parameters)?, field.parameters.clone());
+            if !world.inputs().is_empty() {
+                continue;
+            }
+            worlds.push(ServedWorld {
+                id: id.clone(),
+                world,
+                parameters,
+                streams: streams.clone(),
+                license: license.clone(),
+            });
+        }
+    }
+    Ok(worlds)
+}
+
+/// A section `[[terrain]]` of a study: `head` holds the lines of the id.
+///
+/// # Errors
+/// Parameters that TOML cannot hold.
+pub fn section(head: &str, seed: Option<u64>, kind: &str, parameters: &Value) -> Result<String, Error> {
+    let mut text = format!("[[terrain]]\n{head}kind = \"{kind}\"\n");
+    if let Some(seed) = seed {
+        text.push_str(&format!("seed = {seed}\n"));
+    }
+    for (key, value) in parameters.as_object().into_iter().flatten().filter(|(_, v)| !v.is_null()) {
+        text.push_str(&format!("{key} = {}\n", super::parameters::to_toml(value)?.to_string().trim()));
+    }
+    Ok(text)
+}
+
+/// Revision of everything that the samples of worlds and releases depend on: part of what tells answers of a server apart.
+pub fn revision() -> String {
+    crate::revision::revision(&[Room::Roughness, Room::Terrain, Room::Imaging])
+}
+
+/// The heights of a release: every row of its table `terrains` whose file was sealed.
+fn rasters(release: &Release) -> Result<Vec<ServedRaster>, Error> {
+    let manifest = release.manifest();
+    let rows: Vec<TerrainRow> = release.rows()?;
+    let mut rasters = Vec::new();
+    for row in rows {
+        let (stage, id) = (row.stage.clone(), row.terrain_id.clone());
+        let start = format!("{stage}/{id}.");
+        let mut heights = None;
+        let (mut maps, mut content, mut sources) = (BTreeMap::new(), Vec::new(), Vec::new());
+        for artifact in manifest.artifacts.iter().filter(|a| a.origin.stage == stage && a.origin.item == id) {
+            let Some(name) = artifact.path.strip_prefix(&start) else { continue };
+            let file = release.path(&artifact.path);
+            match name.strip_suffix(".tif") {
+                None if name == "tif" => heights = Some(file),
+                Some(map) => drop(maps.insert(map.to_owned(), file)),
+                None => continue,
+            }
+            content.push(artifact.sha256.clone());
+            sources.extend(artifact.origin.sources.iter().cloned());
+        }
+        let Some(heights) = heights else { continue };
+        let measured: Vec<&Source> = manifest.sources.iter().filter(|s| sources.contains(&s.id)).collect();
+        let license = measured.iter().find_map(|s| s.license.clone()).unwrap_or_else(|| manifest.license.clone());
+        let credit = measured.iter().find_map(|s| s.attribution.clone());
+        let height_range_m = [row.height_min_m, row.height_max_m];
+        rasters.push(ServedRaster {
+            id,
+            stage,
+            height_range_m,
+            heights,
+            maps,
+            content: content.join(","),
+            license,
+            credit,
+        });
+    }
+    Ok(rasters)
+}
