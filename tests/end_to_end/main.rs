@@ -9,6 +9,7 @@ mod perturb;
 mod photoclinometry;
 mod route;
 mod rover;
+mod serve;
 mod team;
 mod traverse;
 

@@ -2,6 +2,8 @@
 
 #![allow(clippy::expect_used, reason = "a test may end where it stands")]
 
+pub mod server;
+
 use parquet::file::reader::FileReader;
 use parquet::file::serialized_reader::SerializedFileReader;
 use parquet::record::Field;

@@ -21,7 +21,8 @@ fn allowed() -> BTreeMap<&'static str, BTreeSet<&'static str>> {
         ("store", "numeric schemas"),
         ("report", "statistics store imaging numeric schemas"),
         ("stages", stages),
-        ("cli", "stages report store schemas"),
+        ("server", "stages terrain imaging store numeric schemas"),
+        ("cli", "stages server report store schemas"),
         ("fixtures", "numeric"),
         ("tests", "schemas numeric statistics terrain mobility imaging store stages fixtures"),
         (
@@ -33,7 +34,7 @@ fn allowed() -> BTreeMap<&'static str, BTreeSet<&'static str>> {
 }
 
 /// Crates that only one room may name.
-const SOLE_USERS: [(&str, &str); 13] = [
+const SOLE_USERS: [(&str, &str); 17] = [
     ("arrow-array", "store"),
     ("arrow-schema", "store"),
     ("parquet", "store"),
@@ -44,6 +45,10 @@ const SOLE_USERS: [(&str, &str); 13] = [
     ("geotiff-writer", "store"),
     ("tiff", "store"),
     ("tar", "store"),
+    ("axum", "server"),
+    ("hyper", "server"),
+    ("tokio", "server"),
+    ("tower-http", "server"),
     ("clap", "cli"),
     ("indicatif", "cli"),
     ("miette", "cli"),

@@ -197,6 +197,15 @@ pub enum Verb {
         after_help = "Example:\n  sastrugi completions bash > ~/.local/share/bash-completion/completions/sastrugi"
     )]
     Completions(Completions),
+    /// Serve worlds and releases over HTTP: patches of terrain at any place and resolution, map tiles, and a map page.
+    #[command(
+        after_help = "WORLD.toml is what `terrain` takes, of kind planetary; of a STUDY.toml all its planetary terrains are served; of a RELEASE\n\
+        its terrains with their maps, missions and rovers. With SASTRUGI_TOKEN set, requests must show that token.\n\n\
+        Examples:\n  sastrugi serve fixtures/worlds/planet.toml\n  \
+        sastrugi serve study.toml release --library tiles --library-bytes 10G --listen 127.0.0.1:9000\n  \
+        curl 'http://127.0.0.1:8080/v1/collections/planet/patch?center=0,0&size=512,512&resolution_m=0.02' -o patch.tif"
+    )]
+    Serve(Serve),
 }
 
 impl Verb {
@@ -958,4 +967,54 @@ pub struct Schema {
 pub struct Completions {
     /// Shell.
     pub shell: Shell,
+}
+
+/// `serve`.
+#[derive(Debug, Args)]
+pub struct Serve {
+    /// Worlds, studies and releases.
+    #[arg(required = true, value_name = "WORLD.toml|STUDY.toml|RELEASE")]
+    pub paths: Vec<PathBuf>,
+    /// Address to listen at; port 0 takes a free one.
+    #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:8080")]
+    pub listen: String,
+    /// Folder that keeps tiles, made where there is none; several servers may share it. In memory only when absent.
+    #[arg(long, value_name = "DIR")]
+    pub library: Option<PathBuf>,
+    /// Most bytes of tiles on disk.
+    #[arg(long, value_name = "BYTES", default_value = "10G")]
+    pub library_bytes: String,
+    /// Most bytes of tiles in memory.
+    #[arg(long, value_name = "BYTES", default_value = "512M")]
+    pub memory_bytes: String,
+    /// Most samples of one patch.
+    #[arg(long, value_name = "N", default_value_t = 1 << 22, value_parser = clap::value_parser!(u64).range(1..=1 << 26))]
+    pub samples_max: u64,
+    /// Most requests of one client under way.
+    #[arg(long, value_name = "N", default_value_t = 256)]
+    pub per_client: usize,
+    /// Most connections.
+    #[arg(long, value_name = "N", default_value_t = 2048)]
+    pub connections: usize,
+    /// Longest time of a request, s.
+    #[arg(long, value_name = "S", default_value_t = 60, value_parser = clap::value_parser!(u64).range(1..=3600))]
+    pub request_seconds: u64,
+    /// Origin whose pages may use the server, as https://example.org; may be given several times.
+    #[arg(long, value_name = "ORIGIN")]
+    pub cors: Vec<String>,
+    /// Log every request on stderr; RUST_LOG says more finely what is logged.
+    #[arg(long)]
+    pub log: bool,
+    /// Form of the log.
+    #[arg(long, value_enum, default_value_t = LogFormat::Text)]
+    pub log_format: LogFormat,
+}
+
+/// Form of a log.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum LogFormat {
+    /// Lines to read.
+    Text,
+    /// One JSON object a line.
+    Json,
 }

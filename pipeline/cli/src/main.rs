@@ -36,6 +36,9 @@ fn refuse_arguments(error: &clap::Error) -> ExitCode {
 
 /// Every file appears whole or not at all, so the process may end here and now.
 fn interrupted() {
+    if verbs::serve::interrupted() {
+        return;
+    }
     output::warn(
         "\nsastrugi: interrupted; nothing half-written bears its name, and a run goes on from what it finished",
     );

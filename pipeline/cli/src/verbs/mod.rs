@@ -11,6 +11,7 @@ mod navigate;
 mod photoclinometry;
 mod render;
 mod rover;
+pub mod serve;
 mod shown;
 mod study;
 
@@ -51,6 +52,7 @@ pub fn dispatch(arguments: &Arguments) -> Verdict {
         Verb::Info(args) => files::info(args, common),
         Verb::Kinds(args) => lists::kinds(args, common),
         Verb::Schema(args) => lists::schema(args, common),
+        Verb::Serve(args) => serve::serve(args, common),
         Verb::Completions(args) => lists::completions(args, &arguments.common),
     }
 }

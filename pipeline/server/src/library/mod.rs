@@ -1,1 +1,342 @@
-//! Tiles that were made once, in memory and on disk.
+//! Tiles that were made once, in memory and on disk; each is made once however many ask for it.
+//!
+//! A request is answered from memory, from a record on disk ([`disk`]), or by a making on a worker thread ([`pool`]). All that ask for one tile
+//! while it is on its way share one flight. The flight belongs to none of them: whoever leaves, the others are served, and when the last has
+//! left the making is told to stop.
+
+mod disk;
+mod pool;
+mod record;
+#[cfg(test)]
+mod tests;
+
+pub use pool::Priority;
+
+use crate::samples::Samples;
+use disk::Disk;
+use pool::Pool;
+use quick_cache::Weighter;
+use quick_cache::sync::Cache;
+use std::collections::HashMap;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use tokio::sync::watch;
+
+/// What a tile is, as text that names all that its samples depend on. Its name is the hash of that text.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct TileKey {
+    text: String,
+    digest: [u8; 32],
+}
+
+impl TileKey {
+    /// The key of a canonical text.
+    pub fn new(text: String) -> Self {
+        let digest = *blake3::hash(text.as_bytes()).as_bytes();
+        Self { text, digest }
+    }
+}
+
+/// Where tiles are kept, and how many.
+#[derive(Clone, Debug)]
+pub struct Settings {
+    /// Folder of the records; tiles are kept in memory only without one.
+    pub folder: Option<PathBuf>,
+    /// Most bytes of records.
+    pub disk_bytes: u64,
+    /// Most bytes in memory.
+    pub memory_bytes: u64,
+    /// Threads that make tiles.
+    pub workers: usize,
+    /// Most tiles that wait for a worker.
+    pub queue: usize,
+}
+
+/// Why there is no tile.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Unavailable {
+    /// As many wait as may wait.
+    #[error("too many tiles wait to be made")]
+    Busy,
+    /// Making it failed.
+    #[error("the tile could not be made: {0}")]
+    Failed(String),
+}
+
+/// Why a library was not opened.
+#[derive(Debug, thiserror::Error)]
+pub enum LibraryError {
+    /// The folder holds other things.
+    #[error("{}: not a library of tiles, and not empty; choose another folder with --library", .0.display())]
+    Occupied(PathBuf),
+    /// The folder is of another version of the program.
+    #[error("{}: a library of another version of sastrugi; choose another folder with --library, or remove this one", .0.display())]
+    Version(PathBuf),
+    /// The file system failed.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The folder or file.
+        path: PathBuf,
+        /// What failed.
+        source: std::io::Error,
+    },
+}
+
+/// What a library has done so far.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Statistics {
+    /// Tiles answered from memory.
+    pub memory_hits: u64,
+    /// Tiles read from disk.
+    pub disk_hits: u64,
+    /// Tiles made.
+    pub made: u64,
+    /// Makings that nobody waited for any longer.
+    pub cancelled: u64,
+    /// Makings that failed.
+    pub failed: u64,
+    /// Records that were damaged, and made again.
+    pub damaged: u64,
+    /// Records that made room for others.
+    pub evicted: u64,
+    /// Records that could not be written.
+    pub unwritten: u64,
+    /// Bytes of records on disk, as far as this process knows.
+    pub disk_bytes: u64,
+    /// Bytes of tiles in memory.
+    pub memory_bytes: u64,
+    /// Tiles that wait for a worker.
+    pub queued: u64,
+    /// Workers that are at it.
+    pub running: u64,
+}
+
+#[derive(Default)]
+struct Counts {
+    memory_hits: AtomicU64,
+    disk_hits: AtomicU64,
+    made: AtomicU64,
+    cancelled: AtomicU64,
+    failed: AtomicU64,
+}
+
+fn count(counter: &AtomicU64) {
+    counter.fetch_add(1, Ordering::Relaxed);
+}
+
+type Made = Result<Arc<Samples>, Unavailable>;
+
+/// A tile on its way.
+struct Flight {
+    number: u64,
+    waiters: usize,
+    cancel: Arc<AtomicBool>,
+    landed: watch::Receiver<Option<Made>>,
+}
+
+#[derive(Clone)]
+struct Bytes;
+
+impl Weighter<[u8; 32], Arc<Samples>> for Bytes {
+    fn weight(&self, _: &[u8; 32], tile: &Arc<Samples>) -> u64 {
+        tile.bytes()
+    }
+}
+
+/// Tiles that were made once.
+pub struct Library {
+    memory: Cache<[u8; 32], Arc<Samples>, Bytes>,
+    disk: Option<Disk>,
+    flights: Mutex<HashMap<[u8; 32], Flight>>,
+    flown: AtomicU64,
+    pool: Pool,
+    counts: Counts,
+}
+
+impl Library {
+    /// Opens a library, and makes its folder where there is none.
+    ///
+    /// # Errors
+    /// A folder that holds other things, or cannot be used.
+    pub fn open(settings: &Settings) -> Result<Arc<Self>, LibraryError> {
+        let folder = settings.folder.as_deref().filter(|_| settings.disk_bytes > 0);
+        let disk = folder.map(|folder| Disk::open(folder, settings.disk_bytes)).transpose()?;
+        let typical = (settings.memory_bytes / (1 << 19)).max(16) as usize;
+        Ok(Arc::new(Self {
+            memory: Cache::with_weighter(typical, settings.memory_bytes, Bytes),
+            disk,
+            flights: Mutex::default(),
+            flown: AtomicU64::new(0),
+            pool: Pool::new(settings.workers, settings.queue),
+            counts: Counts::default(),
+        }))
+    }
+
+    /// The tile of a key: kept, or made by `make` on a worker. `make` looks at its flag and ends early, with nothing, once it is set.
+    ///
+    /// # Errors
+    /// See [`Unavailable`].
+    pub async fn tile(
+        self: &Arc<Self>,
+        key: TileKey,
+        priority: Priority,
+        make: impl FnOnce(&AtomicBool) -> Option<Samples> + Send + 'static,
+    ) -> Made {
+        if let Some(tile) = self.memory.get(&key.digest) {
+            count(&self.counts.memory_hits);
+            return Ok(tile);
+        }
+        let (waiter, mut landed) = match self.board(key, priority, make)? {
+            Boarded::Kept(tile) => return Ok(tile),
+            Boarded::Waiting(waiter, landed) => (waiter, landed),
+        };
+        let made = landed.wait_for(Option::is_some).await.map(|made| made.clone());
+        drop(waiter);
+        match made {
+            Ok(Some(made)) => made,
+            _ => Err(Unavailable::Failed("its worker ended".to_owned())),
+        }
+    }
+
+    /// Joins the flight of a key, or starts it.
+    fn board(
+        self: &Arc<Self>,
+        key: TileKey,
+        priority: Priority,
+        make: impl FnOnce(&AtomicBool) -> Option<Samples> + Send + 'static,
+    ) -> Result<Boarded, Unavailable> {
+        let digest = key.digest;
+        let mut flights = self.flights();
+        // A flight may have landed since memory was asked.
+        if let Some(tile) = self.memory.get(&digest) {
+            count(&self.counts.memory_hits);
+            return Ok(Boarded::Kept(tile));
+        }
+        if let Some(flight) = flights.get_mut(&digest) {
+            flight.waiters += 1;
+            let waiter = Waiter { library: Arc::clone(self), digest, number: flight.number };
+            return Ok(Boarded::Waiting(waiter, flight.landed.clone()));
+        }
+        let number = self.flown.fetch_add(1, Ordering::Relaxed);
+        let cancel = Arc::new(AtomicBool::new(false));
+        let (land, landed) = watch::channel(None);
+        let (library, flag) = (Arc::downgrade(self), Arc::clone(&cancel));
+        let fly = move || {
+            if let Some(library) = library.upgrade() {
+                library.fly(&key, number, &flag, make, &land);
+            }
+        };
+        self.pool.push(priority, Arc::clone(&cancel), Box::new(fly)).map_err(|_| Unavailable::Busy)?;
+        flights.insert(digest, Flight { number, waiters: 1, cancel, landed: landed.clone() });
+        Ok(Boarded::Waiting(Waiter { library: Arc::clone(self), digest, number }, landed))
+    }
+
+    /// Brings a tile to those that wait for it, on a worker.
+    fn fly(
+        &self,
+        key: &TileKey,
+        number: u64,
+        cancel: &AtomicBool,
+        make: impl FnOnce(&AtomicBool) -> Option<Samples>,
+        land: &watch::Sender<Option<Made>>,
+    ) {
+        let read = self.disk.as_ref().and_then(|disk| disk.read(key));
+        let from_disk = read.is_some();
+        let made = match read {
+            Some(tile) => {
+                count(&self.counts.disk_hits);
+                Ok(Some(tile))
+            }
+            None => catch_unwind(AssertUnwindSafe(|| make(cancel))),
+        };
+        let made = match made {
+            // What a stopped making gives is not a tile, whatever it is.
+            Ok(_) if !from_disk && cancel.load(Ordering::Relaxed) => {
+                count(&self.counts.cancelled);
+                Err(Unavailable::Failed("nobody waited for it".to_owned()))
+            }
+            Ok(Some(tile)) => Ok(Arc::new(tile)),
+            _ => {
+                count(&self.counts.failed);
+                Err(Unavailable::Failed("its generator failed".to_owned()))
+            }
+        };
+        if let Ok(tile) = &made {
+            // Known in memory before the flight is over: who comes in between finds it.
+            self.memory.insert(key.digest, Arc::clone(tile));
+        }
+        let tile = made.as_ref().ok().cloned();
+        // Nobody may be left to hear it.
+        let _ = land.send(Some(made));
+        if let (Some(tile), false) = (tile, from_disk) {
+            count(&self.counts.made);
+            if let Some(disk) = &self.disk {
+                disk.write(key, &tile);
+            }
+        }
+        // Only now, so that whoever came while the record was written was served too.
+        let mut flights = self.flights();
+        if flights.get(&key.digest).is_some_and(|flight| flight.number == number) {
+            flights.remove(&key.digest);
+        }
+    }
+
+    fn flights(&self) -> MutexGuard<'_, HashMap<[u8; 32], Flight>> {
+        self.flights.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// What it has done so far.
+    pub fn statistics(&self) -> Statistics {
+        let get = |counter: &AtomicU64| counter.load(Ordering::Relaxed);
+        let [damaged, evicted, unwritten, disk_bytes] = self.disk.as_ref().map_or([0; 4], Disk::counts);
+        Statistics {
+            memory_hits: get(&self.counts.memory_hits),
+            disk_hits: get(&self.counts.disk_hits),
+            made: get(&self.counts.made),
+            cancelled: get(&self.counts.cancelled) + self.pool.dropped(),
+            failed: get(&self.counts.failed),
+            damaged,
+            evicted,
+            unwritten,
+            disk_bytes,
+            memory_bytes: self.memory.weight(),
+            queued: self.pool.queued() as u64,
+            running: self.pool.running(),
+        }
+    }
+
+    /// Tells all makings to stop.
+    pub fn stop(&self) {
+        self.flights().values().for_each(|flight| flight.cancel.store(true, Ordering::Relaxed));
+    }
+}
+
+/// What becomes of a request that memory did not answer at once.
+enum Boarded {
+    /// It is answered after all.
+    Kept(Arc<Samples>),
+    /// It waits.
+    Waiting(Waiter, watch::Receiver<Option<Made>>),
+}
+
+/// One that waits for a flight; dropped when it leaves.
+struct Waiter {
+    library: Arc<Library>,
+    digest: [u8; 32],
+    number: u64,
+}
+
+impl Drop for Waiter {
+    fn drop(&mut self) {
+        let mut flights = self.library.flights();
+        let Some(flight) = flights.get_mut(&self.digest).filter(|flight| flight.number == self.number) else { return };
+        flight.waiters -= 1;
+        if flight.waiters == 0 {
+            flight.cancel.store(true, Ordering::Relaxed);
+            // Who comes now starts another flight.
+            flights.remove(&self.digest);
+        }
+    }
+}

@@ -1,0 +1,117 @@
+//! Missions and rovers of a release, on the terrain that they were driven over.
+
+use super::Collection;
+use crate::collections::Ground;
+use crate::http::Problem;
+use sastrugi_schemas::Record;
+use sastrugi_schemas::tables::{MissionRow, RoverRow, RoverSampleRow, SampleRow};
+use sastrugi_store::release::{Release, ReleaseError};
+use serde_json::{Value, json};
+
+/// Most points of a track that are sent.
+const POINTS_MAX: usize = 5000;
+
+/// Where a track leads.
+#[derive(Default)]
+struct Track {
+    time_s: Vec<f64>,
+    x_m: Vec<f64>,
+    y_m: Vec<f64>,
+    z_m: Vec<f64>,
+    heading_deg: Vec<f64>,
+}
+
+impl Track {
+    fn push(&mut self, time_s: f64, [x, y, z]: [f64; 3], heading_deg: f64) {
+        self.time_s.push(time_s);
+        self.x_m.push(x);
+        self.y_m.push(y);
+        self.z_m.push(z);
+        self.heading_deg.push(heading_deg);
+    }
+
+    /// Every n-th point, and the last.
+    fn thinned(self) -> Self {
+        let step = self.time_s.len().div_ceil(POINTS_MAX).max(1);
+        let last = self.time_s.len().saturating_sub(1);
+        let mut thin = Self::default();
+        for k in (0..self.time_s.len()).filter(|k| k % step == 0 || *k == last) {
+            thin.push(self.time_s[k], [self.x_m[k], self.y_m[k], self.z_m[k]], self.heading_deg[k]);
+        }
+        thin
+    }
+}
+
+impl Collection {
+    fn driven_on(&self) -> Option<(&Release, &str)> {
+        match (&self.ground, &self.release) {
+            (Ground::Raster(raster), Some(release)) => Some((release, &raster.files.id)),
+            _ => None,
+        }
+    }
+
+    /// How many missions and rovers there are; 0 where the tables cannot be read.
+    pub fn tracks(&self) -> usize {
+        self.track_list().map_or(0, |list| list.len())
+    }
+
+    /// The missions and rovers. Reads tables: not for the threads of the runtime.
+    ///
+    /// # Errors
+    /// A table that cannot be read.
+    pub fn track_list(&self) -> Result<Vec<Value>, Problem> {
+        let Some((release, terrain)) = self.driven_on() else { return Ok(Vec::new()) };
+        let mut tracks = Vec::new();
+        let mission = |row: MissionRow| {
+            if row.terrain_id == terrain {
+                tracks.push(json!({
+                    "id": row.mission_id, "kind": "mission", "label": format!("{} {}", row.vehicle, row.mission_id),
+                    "outcome": row.outcome, "duration_s": row.time_s, "length_m": row.path_length_m,
+                }));
+            }
+        };
+        rows(release, mission)?;
+        let rover = |row: RoverRow| {
+            if row.terrain_id == terrain {
+                tracks.push(json!({
+                    "id": row.rover_id, "kind": "rover", "label": format!("{} {}", row.navigator, row.rover_id),
+                    "outcome": row.outcome, "duration_s": row.time_s, "length_m": row.distance_m,
+                }));
+            }
+        };
+        rows(release, rover)?;
+        Ok(tracks)
+    }
+
+    /// One track. Reads tables: not for the threads of the runtime.
+    ///
+    /// # Errors
+    /// A table that cannot be read, or no track of that id.
+    pub fn track(&self, id: &str) -> Result<Value, Problem> {
+        let mut track = Track::default();
+        if let Some((release, terrain)) = self.driven_on() {
+            let is = |own: &str, on: &str| own == id && on == terrain;
+            rows(release, |s: SampleRow| {
+                if is(&s.mission_id, &s.terrain_id) {
+                    track.push(s.time_s, [s.x_m, s.y_m, s.z_m], s.yaw_deg);
+                }
+            })?;
+            rows(release, |s: RoverSampleRow| {
+                if is(&s.rover_id, &s.terrain_id) {
+                    track.push(s.time_s, [s.x_m, s.y_m, s.z_m], s.heading_deg);
+                }
+            })?;
+        }
+        if track.time_s.is_empty() {
+            return Err(Problem::not_found(format!("\"{id}\": no such track on this terrain; `tracks` lists them")));
+        }
+        let t = track.thinned();
+        Ok(json!({
+            "id": id, "time_s": t.time_s, "x_m": t.x_m, "y_m": t.y_m, "z_m": t.z_m, "heading_deg": t.heading_deg,
+        }))
+    }
+}
+
+fn rows<R: Record>(release: &Release, f: impl FnMut(R)) -> Result<(), Problem> {
+    release.for_each_row(f).map_err(|e: ReleaseError| Problem::internal(e.to_string()))
+}

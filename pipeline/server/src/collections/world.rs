@@ -1,0 +1,457 @@
+//! A world whose patches are made on demand, in tiles of 256 x 256 samples that the library keeps.
+//!
+//! Patches stand on lattice points, map tiles in the middle between them. In a map tile of samples `s` apart craters and rocks narrower than `2 s`
+//! are left out: they could not be told from noise, a crater's mean over its ground is 0, and the time of a tile is then the same at every
+//! zoom. What the rocks that are left out cover counts in the share of rock.
+
+use crate::grid::{TILE, TileGrid, TileIndex};
+use crate::http::Problem;
+use crate::library::{Library, Priority, TileKey, Unavailable};
+use crate::samples::Samples;
+use sastrugi_stages::Error;
+use sastrugi_stages::verbs::served::ServedWorld;
+use sastrugi_terrain::planetary::{self, Patch, Request, Window};
+use serde_json::{Value, json};
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, PoisonError};
+use tokio::task::JoinSet;
+
+/// Levels of the map: 256 pixels over the whole square to the finest.
+const LEVELS: u32 = 17;
+/// The finest pixels are this many basic spacings wide, so that their middles are lattice points.
+const FINEST_SPACINGS: f64 = 2.0;
+/// In a map tile features narrower than this many pixels are left out.
+pub const FEATURE_PIXELS: f64 = 2.0;
+/// Lattice points are counted up to here.
+const LATTICE_MAX: f64 = (1u64 << 52) as f64;
+/// Coarsest samples that are made, in doublings of the basic spacing.
+const ZOOM_MAX: u32 = 40;
+/// Most sets of processes whose worlds are kept.
+const WORLDS: usize = 32;
+/// Samples along the side of a look at the whole map, for its range of heights.
+const LOOK: usize = 64;
+/// A quotient this near to a whole number is that number.
+const WHOLE: f64 = 1e-6;
+
+/// Which processes act.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Default)]
+pub enum Phenomena {
+    /// All of the list.
+    #[default]
+    All,
+    /// Those at these places of it, from 0, rising.
+    Some(Vec<usize>),
+}
+
+impl Phenomena {
+    fn acts(&self, place: usize) -> bool {
+        match self {
+            Self::All => true,
+            Self::Some(places) => places.contains(&place),
+        }
+    }
+
+    fn name(&self) -> String {
+        match self {
+            Self::All => "all".to_owned(),
+            Self::Some(places) => places.iter().map(ToString::to_string).collect::<Vec<_>>().join(","),
+        }
+    }
+}
+
+/// Which version of a world is asked for.
+#[derive(Clone, Debug, PartialEq, Default)]
+pub struct Version {
+    /// Processes that act.
+    pub phenomena: Phenomena,
+    /// Craters and rocks that are not wider are left out, m.
+    pub feature_min_m: f64,
+}
+
+/// A world.
+pub struct World {
+    served: ServedWorld,
+    /// Its tiles.
+    pub grid: TileGrid,
+    /// What tells it from others: parameters, streams, sources of the generator.
+    identity: String,
+    range_m: [f64; 2],
+    worlds: Mutex<HashMap<Phenomena, Arc<planetary::World>>>,
+}
+
+impl World {
+    /// A world, after a look at all of it.
+    ///
+    /// # Errors
+    /// An input that is missing.
+    pub fn open(served: ServedWorld) -> Result<Self, Error> {
+        let finest_m = FINEST_SPACINGS * served.world.spacing_m();
+        let side = finest_m * TILE as f64 * f64::from(1u32 << (LEVELS - 1));
+        let grid = TileGrid { origin_m: [-0.5 * side, 0.5 * side], size_m: [side; 2], finest_m, levels: LEVELS };
+        // Where it starts does not matter to what it is.
+        let mut parameters = served.parameters.clone();
+        if let Value::Object(map) = &mut parameters {
+            for key in ["size_m", "size_px", "origin_m", "cell_m"] {
+                map.remove(key);
+            }
+        }
+        let identity = format!("{} {} {parameters}", crate::revision(), served.streams.label());
+        let mut world = Self { served, grid, identity, range_m: [0.0; 2], worlds: Mutex::default() };
+        world.range_m = world.look()?;
+        Ok(world)
+    }
+
+    /// Heights that nine tenths of the map lie between, by some of its samples.
+    fn look(&self) -> Result<[f64; 2], Error> {
+        let [west, south, east, _] = self.grid.bounds_m();
+        let zoom = self.zoom_below((east - west) / LOOK as f64);
+        let step = self.step_m(zoom);
+        let at = |m: f64| (m / step).round() as i64;
+        let window = Window { zoom, west: at(west), south: at(south), cols: LOOK, rows: LOOK, centred: false };
+        let request = Request { window, feature_min_m: FEATURE_PIXELS * step, cancel: None };
+        let patch = self.world(&Phenomena::All)?.patch_for(&request);
+        let mut heights = patch.map_or_else(Vec::new, |patch| patch.heights);
+        heights.sort_by(f64::total_cmp);
+        let part = |share: f64| heights.get((share * heights.len() as f64) as usize).copied().unwrap_or_default();
+        Ok([part(0.05), part(0.95)])
+    }
+
+    fn world(&self, phenomena: &Phenomena) -> Result<Arc<planetary::World>, Error> {
+        let mut worlds = self.worlds.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(world) = worlds.get(phenomena) {
+            return Ok(Arc::clone(world));
+        }
+        if worlds.len() >= WORLDS {
+            worlds.clear();
+        }
+        let made = self.served.world.world_of(&self.served.streams, |place| phenomena.acts(place))?;
+        let made = Arc::new(made);
+        worlds.insert(phenomena.clone(), Arc::clone(&made));
+        Ok(made)
+    }
+
+    /// Id in addresses.
+    pub fn id(&self) -> &str {
+        &self.served.id
+    }
+
+    /// What tells it from others.
+    pub fn identity(&self) -> String {
+        self.identity.clone()
+    }
+
+    /// Licence of the study that it stands in.
+    pub fn license(&self) -> Option<&str> {
+        self.served.license.as_deref()
+    }
+
+    /// Basic spacing, m.
+    pub fn spacing_m(&self) -> f64 {
+        self.served.world.spacing_m()
+    }
+
+    /// Distance of samples that its file asks for, m.
+    pub fn cell_m(&self) -> f64 {
+        self.served.world.raw().cell_m
+    }
+
+    /// The window of its file: west, south, east and north, m.
+    pub fn home_m(&self) -> [f64; 4] {
+        let raw = self.served.world.raw();
+        let [west, south] = raw.origin_m;
+        let [cols, rows] = raw.size_px.unwrap_or([512; 2]);
+        [west, south, west + f64::from(cols) * raw.cell_m, south + f64::from(rows) * raw.cell_m]
+    }
+
+    /// Heights that nine tenths of its map lie between, m.
+    pub fn height_range_m(&self) -> [f64; 2] {
+        self.range_m
+    }
+
+    fn kinds(&self) -> impl Iterator<Item = &'static str> {
+        self.served.world.raw().processes.iter().map(planetary::RawProcess::kind)
+    }
+
+    /// Whether a process of a kind is in its list.
+    pub fn has(&self, kind: &str) -> bool {
+        self.kinds().any(|k| k == kind)
+    }
+
+    /// Its processes.
+    pub fn phenomena(&self) -> Value {
+        let process = |(n, process): (usize, &planetary::RawProcess)| json!({ "number": n + 1, "kind": process.kind(), "summary": process.summary() });
+        self.served.world.raw().processes.iter().enumerate().map(process).collect()
+    }
+
+    /// The processes of some numbers, counted from 1.
+    ///
+    /// # Errors
+    /// A number that the list does not have.
+    pub fn choose(&self, numbers: Option<Vec<usize>>) -> Result<Phenomena, Problem> {
+        let Some(mut numbers) = numbers else { return Ok(Phenomena::All) };
+        let count = self.served.world.raw().processes.len();
+        if let Some(n) = numbers.iter().find(|n| !(1..=count).contains(*n)) {
+            return Err(Problem::bad_request(format!(
+                "`phenomena`: there is no process {n}; this world has 1 to {count}: {}",
+                self.kinds().collect::<Vec<_>>().join(", ")
+            )));
+        }
+        numbers.sort_unstable();
+        numbers.dedup();
+        let places: Vec<usize> = numbers.into_iter().map(|n| n - 1).collect();
+        Ok(if places.len() == count { Phenomena::All } else { Phenomena::Some(places) })
+    }
+
+    /// A section of a study that makes the same patch.
+    pub fn snippet(&self, origin_m: [f64; 2], size_px: [usize; 2], cell_m: f64) -> Result<String, Problem> {
+        let failed = |e: Error| Problem::internal(e.to_string());
+        let mut parameters = self.served.parameters.clone();
+        let Value::Object(map) = &mut parameters else { return Err(Problem::internal("parameters are a table")) };
+        map.remove("size_m");
+        map.insert("size_px".to_owned(), json!(size_px));
+        map.insert("cell_m".to_owned(), json!(cell_m));
+        map.insert("origin_m".to_owned(), json!(origin_m));
+        let (head, seed) = seed_lines(&self.served.streams.label(), self.id());
+        sastrugi_stages::verbs::served::section(&head, seed, planetary::KIND, &parameters).map_err(failed)
+    }
+
+    /// Distance of samples after some doublings, m.
+    pub fn step_m(&self, zoom: u32) -> f64 {
+        self.spacing_m() * (1u64 << zoom) as f64
+    }
+
+    /// The doublings after which samples are no farther apart than that.
+    fn zoom_below(&self, step_m: f64) -> u32 {
+        (0..=ZOOM_MAX).take_while(|k| self.step_m(*k) <= step_m * (1.0 + WHOLE)).last().unwrap_or(0)
+    }
+
+    /// Column or row of a lattice window for a place, `None` where it does not stand on one.
+    fn on_lattice(at_m: f64, step_m: f64) -> Option<i64> {
+        let quotient = at_m / step_m;
+        let whole = (quotient - quotient.round()).abs() <= WHOLE + 4.0 * f64::EPSILON * quotient.abs();
+        whole.then(|| quotient.round() as i64)
+    }
+}
+
+/// A comment on how to come to the same draws, and the seed that the section states.
+fn seed_lines(label: &str, id: &str) -> (String, Option<u64>) {
+    let words: Vec<&str> = label.split('/').collect();
+    match words.as_slice() {
+        ["seed", seed, ..] => (format!("id = \"{id}\"\n"), seed.parse().ok()),
+        ["item", seed, _, item, ..] => {
+            (format!("# The same draws need `seed = {seed}` in [study], and this id.\nid = \"{item}\"\n"), None)
+        }
+        _ => (format!("id = \"{id}\"\n"), None),
+    }
+}
+
+/// What a window of samples asks of the library.
+#[derive(Clone)]
+pub struct Maker {
+    /// Where tiles are kept.
+    pub library: Arc<Library>,
+    /// Whether somebody waits.
+    pub priority: Priority,
+}
+
+impl World {
+    /// A tile of the map with one sample more on every side.
+    ///
+    /// # Errors
+    /// A library that has no room for the request.
+    pub async fn map_tile(
+        &self,
+        maker: &Maker,
+        tile: TileIndex,
+        phenomena: &Phenomena,
+    ) -> Result<Arc<Samples>, Problem> {
+        let zoom = LEVELS - tile.level;
+        let half = (TILE as i64 / 2) << tile.level;
+        let (west, north) = (TILE as i64 * i64::from(tile.col) - half, half - TILE as i64 * i64::from(tile.row));
+        let side = TILE + 2;
+        let window =
+            Window { zoom, west: west - 1, south: north - TILE as i64 - 1, cols: side, rows: side, centred: true };
+        let version = Version {
+            phenomena: phenomena.clone(),
+            feature_min_m: FEATURE_PIXELS * self.grid.resolution_m(tile.level),
+        };
+        self.window(maker, window, &version).await
+    }
+
+    /// The samples of one window, as the library keeps them.
+    async fn window(&self, maker: &Maker, window: Window, version: &Version) -> Result<Arc<Samples>, Problem> {
+        let Window { zoom, west, south, cols, rows, centred } = window;
+        let key = TileKey::new(format!(
+            "{} | {} {:?} | {zoom} {west} {south} {cols} {rows} {centred}",
+            self.identity,
+            version.phenomena.name(),
+            version.feature_min_m
+        ));
+        let world = self.world(&version.phenomena).map_err(|e| Problem::internal(e.to_string()))?;
+        let feature_min_m = version.feature_min_m;
+        let make = move |cancel: &std::sync::atomic::AtomicBool| {
+            let request = Request { window, feature_min_m, cancel: Some(cancel) };
+            Some(from_south(&world, &world.patch_for(&request)?, feature_min_m))
+        };
+        maker.library.tile(key, maker.priority, make).await.map_err(|e| match e {
+            Unavailable::Busy => Problem::unavailable("as many tiles wait to be made as may wait; try again soon"),
+            Unavailable::Failed(_) => Problem::internal(e.to_string()),
+        })
+    }
+
+    /// The tiles that a window of the lattice lies in, as `(column, row)` of tiles.
+    pub fn tiles_of(first: [i64; 2], [rows, cols]: [usize; 2]) -> Vec<[i64; 2]> {
+        let side = TILE as i64;
+        let span = |first: i64, count: usize| first.div_euclid(side)..=(first + count as i64 - 1).div_euclid(side);
+        span(first[1], rows).flat_map(|row| span(first[0], cols).map(move |col| [col, row])).collect()
+    }
+
+    /// The samples of one tile of the lattice.
+    ///
+    /// # Errors
+    /// A library that has no room for the request.
+    pub async fn lattice_tile(
+        &self,
+        maker: &Maker,
+        zoom: u32,
+        [col, row]: [i64; 2],
+        version: &Version,
+    ) -> Result<Arc<Samples>, Problem> {
+        let (west, south) = (TILE as i64 * col, TILE as i64 * row);
+        let window = Window { zoom, west, south, cols: TILE, rows: TILE, centred: false };
+        self.window(maker, window, version).await
+    }
+
+    /// Samples `step_m` apart, the south-west one at `origin_m`: lattice points where they stand on them, bilinear between the points of the next
+    /// finer lattice elsewhere.
+    ///
+    /// # Errors
+    /// Places beyond the end of the world; a library that has no room for the request.
+    pub async fn samples(
+        self: &Arc<Self>,
+        maker: &Maker,
+        origin_m: [f64; 2],
+        step_m: f64,
+        shape: [usize; 2],
+        version: &Version,
+    ) -> Result<Samples, Problem> {
+        let zoom = self.zoom_below(step_m);
+        let own_m = self.step_m(zoom);
+        let same = (step_m / own_m - 1.0).abs() <= WHOLE;
+        let [rows, cols] = shape;
+        if let (true, Some(west), Some(south)) =
+            (same, Self::on_lattice(origin_m[0], own_m), Self::on_lattice(origin_m[1], own_m))
+        {
+            return self.lattice(maker, zoom, [west, south], shape, version).await;
+        }
+        let first = origin_m.map(|at| (at / own_m).floor() as i64);
+        let last = |at: f64, count: usize, first: i64| {
+            let end = ((at + (count - 1) as f64 * step_m) / own_m).floor() as i64;
+            (end - first + 2) as usize
+        };
+        let (own_cols, own_rows) = (last(origin_m[0], cols, first[0]), last(origin_m[1], rows, first[1]));
+        let fine = self.lattice(maker, zoom, first, [own_rows, own_cols], version).await?;
+        let across = |c: usize| (origin_m[0] + c as f64 * step_m) / own_m - first[0] as f64;
+        let up = |r: usize| (origin_m[1] + (rows - 1 - r) as f64 * step_m) / own_m - first[1] as f64;
+        Ok(fine.between(shape, |r, c| [(own_rows - 1) as f64 - up(r), across(c)]))
+    }
+
+    /// Samples at lattice points, from the tiles that they lie in.
+    async fn lattice(
+        self: &Arc<Self>,
+        maker: &Maker,
+        zoom: u32,
+        first: [i64; 2],
+        shape: [usize; 2],
+        version: &Version,
+    ) -> Result<Samples, Problem> {
+        let far =
+            |first: i64, count: usize| (first.unsigned_abs() as f64 + (count + TILE) as f64) * (1u64 << zoom) as f64;
+        if far(first[0], shape[1]).max(far(first[1], shape[0])) > LATTICE_MAX {
+            let end = LATTICE_MAX * self.spacing_m();
+            return Err(Problem::unprocessable(format!(
+                "the world ends {end:.3e} m from its origin; ask for a nearer place"
+            )));
+        }
+        let mut tiles = JoinSet::new();
+        for place in Self::tiles_of(first, shape) {
+            let (world, maker, version) = (Arc::clone(self), maker.clone(), version.clone());
+            tiles.spawn(async move { (place, world.lattice_tile(&maker, zoom, place, &version).await) });
+        }
+        let mut made: Option<Samples> = None;
+        while let Some(joined) = tiles.join_next().await {
+            let (place, tile) = joined.map_err(|e| Problem::internal(e.to_string()))?;
+            let tile = tile?;
+            let all = made.get_or_insert_with(|| tile.void_like(shape));
+            all.lay(&tile, first, place);
+        }
+        made.ok_or_else(|| Problem::bad_request("`size`: there is no sample; ask for one at least"))
+    }
+}
+
+impl Samples {
+    /// Without data, with the fields of another.
+    fn void_like(&self, [rows, cols]: [usize; 2]) -> Self {
+        let void = || vec![f32::NAN; rows * cols];
+        let like = |field: &Option<Vec<f32>>| field.as_ref().map(|_| void());
+        Self {
+            rows,
+            cols,
+            heights: void(),
+            albedo: like(&self.albedo),
+            rock: like(&self.rock),
+            rock_potential: like(&self.rock_potential),
+        }
+    }
+
+    /// Lays the part of a tile (in a column and row of tiles) that lies in the window from `first` on; rows of tiles count from the south.
+    fn lay(&mut self, tile: &Self, first: [i64; 2], [col, row]: [i64; 2]) {
+        let side = TILE as i64;
+        let span = |tile: i64, first: i64, count: usize| {
+            let (from, to) = ((side * tile).max(first), (side * (tile + 1)).min(first + count as i64));
+            ((from - first) as usize, (from - side * tile) as usize, (to - from).max(0) as usize)
+        };
+        let (to_col, from_col, width) = span(col, first[0], self.cols);
+        let (to_row, from_row, height) = span(row, first[1], self.rows);
+        let (rows, cols) = (self.rows, self.cols);
+        let copy = |to: &mut [f32], from: &[f32]| {
+            for k in 0..height {
+                let to_line = (rows - 1 - (to_row + k)) * cols + to_col;
+                let from_line = (tile.rows - 1 - (from_row + k)) * tile.cols + from_col;
+                to[to_line..to_line + width].copy_from_slice(&from[from_line..from_line + width]);
+            }
+        };
+        copy(&mut self.heights, &tile.heights);
+        for (to, from) in [
+            (&mut self.albedo, &tile.albedo),
+            (&mut self.rock, &tile.rock),
+            (&mut self.rock_potential, &tile.rock_potential),
+        ] {
+            if let (Some(to), Some(from)) = (to, from) {
+                copy(to, from);
+            }
+        }
+    }
+}
+
+/// A patch with row 0 in the north, in single precision as files hold it; rocks that were left out count by their share.
+fn from_south(world: &planetary::World, patch: &Patch, feature_min_m: f64) -> Samples {
+    let Window { rows, cols, .. } = patch.window;
+    let turned =
+        |values: &[f64]| -> Vec<f32> { values.chunks_exact(cols).rev().flatten().map(|v| *v as f32).collect() };
+    let rock = world.rocks.as_ref().map(|(rocks, _)| {
+        let share = |k: usize| match patch.class[k] {
+            planetary::ROCK => 1.0,
+            _ => rocks.parameters().cover_below(patch.rock_potential[k], feature_min_m),
+        };
+        turned(&(0..rows * cols).map(share).collect::<Vec<f64>>())
+    });
+    Samples {
+        rows,
+        cols,
+        heights: turned(&patch.heights),
+        albedo: world.albedo.is_some().then(|| turned(&patch.albedo)),
+        rock,
+        rock_potential: world.rocks.is_some().then(|| turned(&patch.rock_potential)),
+    }
+}

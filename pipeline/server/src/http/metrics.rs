@@ -1,0 +1,96 @@
+//! Counters, as Prometheus reads them.
+
+use super::service::Service;
+use axum::extract::State;
+use axum::http::header;
+use axum::response::{IntoResponse, Response};
+use prometheus_client::encoding::EncodeLabelSet;
+use prometheus_client::encoding::text::encode;
+use prometheus_client::metrics::counter::Counter;
+use prometheus_client::metrics::family::Family;
+use prometheus_client::metrics::gauge::Gauge;
+use prometheus_client::metrics::histogram::Histogram;
+use prometheus_client::registry::Registry;
+use std::sync::Arc;
+
+/// Bounds of the times of answers, s.
+const SECONDS: [f64; 11] = [0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.3, 1.0, 5.0, 30.0];
+
+#[derive(Clone, Debug, PartialEq, Eq, Hash, EncodeLabelSet)]
+struct Labels {
+    route: String,
+    status: u16,
+}
+
+type Seconds = Family<Vec<(String, String)>, Histogram, fn() -> Histogram>;
+
+/// Counters of requests.
+pub struct Metrics {
+    requests: Family<Labels, Counter>,
+    seconds: Seconds,
+    /// Open connections.
+    pub connections: Gauge,
+}
+
+fn histogram() -> Histogram {
+    Histogram::new(SECONDS)
+}
+
+impl Default for Metrics {
+    fn default() -> Self {
+        Self {
+            requests: Family::default(),
+            seconds: Family::new_with_constructor(histogram),
+            connections: Gauge::default(),
+        }
+    }
+}
+
+impl Metrics {
+    /// Counts an answer.
+    pub fn count(&self, route: &str, status: u16, seconds: f64) {
+        self.requests.get_or_create(&Labels { route: route.to_owned(), status }).inc();
+        self.seconds.get_or_create(&vec![("route".to_owned(), route.to_owned())]).observe(seconds);
+    }
+
+    fn text(&self, service: &Service) -> Result<String, std::fmt::Error> {
+        let mut registry = Registry::with_prefix("sastrugi");
+        registry.register("requests", "Answers by route and status", self.requests.clone());
+        registry.register("request_seconds", "Time of answers", self.seconds.clone());
+        registry.register("connections", "Open connections", self.connections.clone());
+        let s = service.library.statistics();
+        let figures: [(&str, &str, u64); 11] = [
+            ("library_memory_hits", "Tiles answered from memory", s.memory_hits),
+            ("library_disk_hits", "Tiles read from disk", s.disk_hits),
+            ("library_made", "Tiles made", s.made),
+            ("library_cancelled", "Makings that nobody waited for any longer", s.cancelled),
+            ("library_failed", "Makings that failed", s.failed),
+            ("library_damaged", "Damaged records", s.damaged),
+            ("library_evicted", "Records that made room", s.evicted),
+            ("library_unwritten", "Records that could not be written", s.unwritten),
+            ("library_disk_bytes", "Bytes of records", s.disk_bytes),
+            ("library_memory_bytes", "Bytes of tiles in memory", s.memory_bytes),
+            ("library_queued", "Tiles that wait to be made", s.queued),
+        ];
+        for (name, help, value) in figures {
+            let gauge: Gauge = Gauge::default();
+            gauge.set(i64::try_from(value).unwrap_or(i64::MAX));
+            registry.register(name, help, gauge);
+        }
+        let answers: Gauge = Gauge::default();
+        answers.set(i64::try_from(service.answers.bytes()).unwrap_or(i64::MAX));
+        registry.register("answers_bytes", "Bytes of answers in memory", answers);
+        let mut text = String::new();
+        encode(&mut text, &registry)?;
+        Ok(text)
+    }
+}
+
+/// `GET /metrics`
+pub async fn metrics(State(service): State<Arc<Service>>) -> Response {
+    match service.metrics.text(&service) {
+        Ok(text) => ([(header::CONTENT_TYPE, "application/openmetrics-text; version=1.0.0; charset=utf-8")], text)
+            .into_response(),
+        Err(error) => super::Problem::internal(error.to_string()).into_response(),
+    }
+}

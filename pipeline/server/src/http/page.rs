@@ -1,0 +1,41 @@
+//! The map page: files that are part of the program.
+
+use super::Problem;
+use axum::body::Bytes;
+use axum::extract::Path;
+use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
+use axum::response::{IntoResponse, Response};
+
+/// Name, media type and bytes of every file.
+const FILES: &[(&str, &str, &[u8])] = &[
+    ("index.html", "text/html; charset=utf-8", include_bytes!("../../page/dist/index.html")),
+    ("page.css", "text/css; charset=utf-8", include_bytes!("../../page/dist/page.css")),
+    ("page.js", "text/javascript; charset=utf-8", include_bytes!("../../page/dist/page.js")),
+    ("three.js", "text/javascript; charset=utf-8", include_bytes!("../../page/dist/three.js")),
+    ("licences.txt", "text/plain; charset=utf-8", include_bytes!("../../page/dist/licences.txt")),
+];
+
+/// `GET /`
+pub async fn index(headers: HeaderMap) -> Response {
+    send("index.html", &headers).unwrap_or_else(IntoResponse::into_response)
+}
+
+/// `GET /{file}`
+pub async fn file(Path(name): Path<String>, headers: HeaderMap) -> Result<Response, Problem> {
+    send(&name, &headers)
+}
+
+fn send(name: &str, headers: &HeaderMap) -> Result<Response, Problem> {
+    let found = FILES.iter().find(|(own, ..)| *own == name);
+    let (_, media, bytes) = found.ok_or_else(|| Problem::not_found("no such page; the API is below /v1"))?;
+    let tag = format!("\"{}\"", &blake3::hash(bytes).to_hex()[..32]);
+    if headers.get(header::IF_NONE_MATCH).is_some_and(|own| own.as_bytes() == tag.as_bytes()) {
+        return Ok(StatusCode::NOT_MODIFIED.into_response());
+    }
+    let mut response = Bytes::from_static(bytes).into_response();
+    let own = response.headers_mut();
+    own.insert(header::CONTENT_TYPE, HeaderValue::from_static(media));
+    own.insert(header::CACHE_CONTROL, HeaderValue::from_static("no-cache"));
+    own.extend(HeaderValue::from_str(&tag).ok().map(|tag| (header::ETAG, tag)));
+    Ok(response)
+}

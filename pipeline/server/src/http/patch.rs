@@ -1,0 +1,340 @@
+//! `patch`: samples of any place at any resolution, in the format that is asked for.
+
+use super::answer::Answer;
+use super::service::{Service, VERSION, blocking, checked, version};
+use super::{Pairs, Problem, Query};
+use crate::collections::world::Version;
+use crate::collections::{Collection, Ground};
+use crate::samples::{Flip, Samples, Thinning};
+use axum::extract::{Path, State};
+use axum::http::{HeaderMap, HeaderName, HeaderValue, header};
+use axum::response::Response;
+use sastrugi_imaging::{RenderParameters, Scene, Sun, render};
+use sastrugi_numeric::{Geometry, Grid, Streams};
+use sastrugi_store::dem::{self, Crs, Values, WriteOptions};
+use std::sync::Arc;
+
+const KNOWN: [&str; 16] = [
+    "origin",
+    "center",
+    "size",
+    "size_m",
+    "resolution_m",
+    "field",
+    "format",
+    "interpolation",
+    "rotate",
+    "flip",
+    "downsample",
+    "method",
+    "sun_azimuth_deg",
+    "sun_elevation_deg",
+    "phenomena",
+    "feature_min_m",
+];
+/// Names of the fields.
+pub const FIELDS: [&str; 5] = ["elevation", "albedo", "class", "rock_potential", "image"];
+/// Names of the formats.
+pub const FORMATS: [&str; 4] = ["tif", "npy", "raw", "png"];
+/// Blocks of at most 2^12 x 2^12 samples.
+const DOWNSAMPLE_MAX: u32 = 12;
+
+/// Where samples lie.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Window {
+    /// Place of the south-west sample, m.
+    pub origin_m: [f64; 2],
+    /// Rows and columns.
+    pub shape: [usize; 2],
+    /// Distance of the samples, m.
+    pub step_m: f64,
+}
+
+impl Window {
+    /// The window of a request.
+    ///
+    /// # Errors
+    /// Parameters that are missing, exclude each other, or ask for too much.
+    pub fn of(query: &Query, collection: &Collection, most: u64) -> Result<Self, Problem> {
+        let [cell_m, _] = collection.spacings_m();
+        let step_m = query.number("resolution_m", [1e-6, 1e9])?.unwrap_or(cell_m);
+        let shape = match (query.pair("size")?, query.pair("size_m")?) {
+            (Some(size), None) => size,
+            (None, Some(size_m)) => size_m.map(|m| (m / step_m).round()),
+            _ => return Err(Problem::bad_request("give `size` in samples or `size_m` in metres, one of the two")),
+        };
+        if shape.iter().any(|n| !(*n >= 1.0 && n.fract() == 0.0)) {
+            return Err(Problem::bad_request(format!(
+                "`size`: {} x {} samples; it must be whole numbers of at least 1",
+                shape[0], shape[1]
+            )));
+        }
+        if shape[0] * shape[1] > most as f64 {
+            return Err(Problem::too_large(
+                format!(
+                    "{} x {} samples are too many: this server makes at most {most} at once; ask for fewer, or for parts",
+                    shape[0], shape[1]
+                ),
+                "samples_max",
+                most,
+            ));
+        }
+        let [cols, rows] = shape.map(|n| n as usize);
+        let origin_m = match (query.pair("origin")?, query.pair("center")?) {
+            (Some(origin), None) => origin,
+            (None, Some(center)) => {
+                let half = [cols, rows].map(|n| 0.5 * (n - 1) as f64 * step_m);
+                settled(collection, [center[0] - half[0], center[1] - half[1]], step_m)
+            }
+            _ => {
+                return Err(Problem::bad_request(
+                    "give `origin`, the place of the south-west sample, or `center`, one of the two",
+                ));
+            }
+        };
+        Ok(Self { origin_m, shape: [rows, cols], step_m })
+    }
+
+    /// Shape and place with each sample in the middle of its cell.
+    pub fn geometry(&self) -> Geometry {
+        let origin = self.origin_m.map(|at| at - 0.5 * self.step_m);
+        Geometry { rows: self.shape[0], cols: self.shape[1], cell: [self.step_m; 2], origin }
+    }
+}
+
+/// The nearest place that has samples of its own: a window about a centre may move by half a sample.
+fn settled(collection: &Collection, at: [f64; 2], step_m: f64) -> [f64; 2] {
+    match &collection.ground {
+        Ground::World(_) => at.map(|m| (m / step_m).round() * step_m),
+        Ground::Raster(raster) => {
+            let g = &raster.geometry;
+            [0, 1].map(|a| ((at[a] - g.origin[a]) / step_m - 0.5).round() * step_m + g.origin[a] + 0.5 * step_m)
+        }
+    }
+}
+
+/// What becomes of the samples.
+struct Treatment {
+    field: &'static str,
+    format: &'static str,
+    quarters: u32,
+    flip: Option<Flip>,
+    downsample: u32,
+    method: Thinning,
+    sun: Sun,
+}
+
+impl Treatment {
+    fn of(query: &Query, collection: &Collection) -> Result<Self, Problem> {
+        let field = query.word("field", &FIELDS, "elevation")?;
+        if !collection.fields().contains(&field) {
+            let fields = collection.fields().join(", ");
+            return Err(Problem::bad_request(format!(
+                "`field`: \"{}\" has no {field}; it has {fields}",
+                collection.id
+            )));
+        }
+        query.word("interpolation", &["bilinear"], "bilinear")?;
+        let quarters = match query.word("rotate", &["0", "90", "180", "270"], "0")? {
+            "90" => 1,
+            "180" => 2,
+            "270" => 3,
+            _ => 0,
+        };
+        let flip = match query.word("flip", &["none", "horizontal", "vertical"], "none")? {
+            "horizontal" => Some(Flip::Horizontal),
+            "vertical" => Some(Flip::Vertical),
+            _ => None,
+        };
+        let method = match query.word("method", &["point", "mean"], "point")? {
+            "mean" => Thinning::Mean,
+            _ => Thinning::Point,
+        };
+        let downsample = query.whole("downsample", [0, DOWNSAMPLE_MAX])?.unwrap_or(0);
+        let format = query.word("format", &FORMATS, "tif")?;
+        Ok(Self { field, format, quarters, flip, downsample, method, sun: sun(query)? })
+    }
+
+    /// True where the result does not lie as the ground does.
+    fn is_displaced(&self) -> bool {
+        self.quarters > 0 || self.flip.is_some()
+    }
+
+    fn apply(&self, samples: Samples, window: &Window, crs: &Crs) -> Result<Answer, Problem> {
+        let samples = samples.thinned(self.downsample, self.method)?;
+        let step_m = window.step_m * f64::from(1u32 << self.downsample);
+        // A mean stands in the middle of its block.
+        let middle = if self.method == Thinning::Mean { 0.5 * (step_m - window.step_m) } else { 0.0 };
+        let origin_m = window.origin_m.map(|at| at + middle);
+        let thinned = Window { origin_m, shape: [samples.rows, samples.cols], step_m };
+        let mut geometry = thinned.geometry();
+        let values = self.values(&samples, geometry)?;
+        let field = Samples { heights: values, ..Samples::empty(samples.rows, samples.cols) };
+        let field = field.turned(self.quarters);
+        let field = match self.flip {
+            Some(flip) => field.flipped(flip),
+            None => field,
+        };
+        (geometry.rows, geometry.cols) = (field.rows, field.cols);
+        let crs = if self.is_displaced() {
+            geometry.origin = [0.0; 2];
+            Crs::default()
+        } else {
+            crs.clone()
+        };
+        self.encode(&Grid::new(geometry, field.heights), &crs)
+    }
+
+    /// Values of the field.
+    fn values(&self, samples: &Samples, geometry: Geometry) -> Result<Vec<f32>, Problem> {
+        let there = |field: &Option<Vec<f32>>| field.clone().ok_or_else(|| Problem::internal("the field is not there"));
+        match self.field {
+            "albedo" => there(&samples.albedo),
+            "class" => there(&samples.rock),
+            "rock_potential" => there(&samples.rock_potential),
+            "image" => self.image(samples, geometry),
+            _ => Ok(samples.heights.clone()),
+        }
+    }
+
+    /// The ground from straight above under the sun; ground beyond the patch casts no shadow into it.
+    fn image(&self, samples: &Samples, geometry: Geometry) -> Result<Vec<f32>, Problem> {
+        let grid = |values: &Vec<f32>| Grid::new(geometry, values.iter().map(|v| f64::from(*v)).collect());
+        let (heights, albedo) = (grid(&samples.heights), samples.albedo.as_ref().map(grid));
+        let parameters = RenderParameters { sun: self.sun, ..RenderParameters::default() };
+        let scene = Scene { heights: &heights, albedo: albedo.as_ref() };
+        let made = render(&scene, &parameters, &Streams::for_seed(0, "image"))
+            .map_err(|e| Problem::unprocessable(format!("there is no image: {e}")))?;
+        Ok(made.image().values.iter().map(|v| *v as f32).collect())
+    }
+
+    fn encode(&self, grid: &Grid<f32>, crs: &Crs) -> Result<Answer, Problem> {
+        let g = grid.geometry;
+        let double = || Grid::new(g, grid.values.iter().map(|v| f64::from(*v)).collect());
+        let mut notes = Vec::new();
+        let mut answer = match self.format {
+            "raw" => {
+                let bytes: Vec<u8> = grid.values.iter().flat_map(|v| v.to_le_bytes()).collect();
+                Answer::new("application/octet-stream", bytes)
+            }
+            format => {
+                let name = format!("patch.{format}");
+                let options =
+                    WriteOptions { cloud_optimised: format == "tif", values: self.kind(), ..WriteOptions::default() };
+                let (bytes, said) = dem::encode(std::path::Path::new(&name), &double(), crs, &options)
+                    .map_err(|e| Problem::unprocessable(e.to_string()))?;
+                notes = said;
+                Answer::new(media(format), bytes)
+            }
+        };
+        let named = [
+            ("grid-rows", g.rows.to_string()),
+            ("grid-columns", g.cols.to_string()),
+            ("grid-cell-m", format!("{:?}", g.cell[0])),
+            ("grid-origin-m", format!("{:?},{:?}", g.origin[0], g.origin[1])),
+            ("grid-note", notes.join("; ")),
+        ];
+        for (name, value) in named.into_iter().filter(|(_, value)| !value.is_empty()) {
+            if let Ok(value) = HeaderValue::from_str(&value) {
+                answer.more.push((HeaderName::from_static(name), value));
+            }
+        }
+        let file =
+            format!("inline; filename=\"{}.{}\"", self.field, if self.format == "raw" { "f32" } else { self.format });
+        answer.more.extend(HeaderValue::from_str(&file).ok().map(|value| (header::CONTENT_DISPOSITION, value)));
+        Ok(answer)
+    }
+
+    fn kind(&self) -> Values {
+        let figures = |description: &'static str| Values::Figures { unit: "1".into(), description: description.into() };
+        match self.field {
+            "albedo" => figures("share of the light that the ground gives back"),
+            "class" => figures("share of the cell that rocks cover"),
+            "rock_potential" => figures("share of the ground that all rocks may cover"),
+            "image" => figures("brightness, I/F"),
+            _ => Values::default(),
+        }
+    }
+}
+
+fn media(format: &str) -> &'static str {
+    match format {
+        "tif" => "image/tiff; application=geotiff; profile=cloud-optimized",
+        "png" => "image/png",
+        _ => "application/octet-stream",
+    }
+}
+
+/// The sun of a request.
+///
+/// # Errors
+/// One that is not above the horizon.
+pub fn sun(query: &Query) -> Result<Sun, Problem> {
+    let default = Sun::default();
+    Ok(Sun {
+        azimuth_deg: query.number("sun_azimuth_deg", [-360.0, 720.0])?.unwrap_or(default.azimuth_deg),
+        elevation_deg: query.number("sun_elevation_deg", [0.1, 90.0])?.unwrap_or(default.elevation_deg),
+    })
+}
+
+/// `GET /v1/collections/{id}/patch`
+pub async fn patch(
+    State(service): State<Arc<Service>>,
+    Path(id): Path<String>,
+    pairs: Pairs,
+    headers: HeaderMap,
+) -> Result<Response, Problem> {
+    let collection = Arc::clone(service.collection(&id)?);
+    let query = checked(pairs, &[&KNOWN])?;
+    let window = Window::of(&query, &collection, service.limits.samples)?;
+    let treatment = Treatment::of(&query, &collection)?;
+    let version = version(&collection, &query)?;
+    let what = format!("patch {} {}", collection.digest, query.canonical());
+    let make = async {
+        let samples = ground(&service, &collection, &window, &version).await?;
+        let crs = match &collection.ground {
+            Ground::World(_) => Crs::default(),
+            Ground::Raster(raster) => raster.crs.clone(),
+        };
+        blocking(move || treatment.apply(samples, &window, &crs)).await.map(Some)
+    };
+    service.answers.answer(&headers, &what, make).await
+}
+
+async fn ground(
+    service: &Service,
+    collection: &Collection,
+    window: &Window,
+    version: &Version,
+) -> Result<Samples, Problem> {
+    let samples = service.samples(collection, window.origin_m, window.step_m, window.shape, version).await?;
+    if samples.is_void() {
+        let [west, south, east, north] = collection.grid().bounds_m();
+        return Err(Problem::not_found(format!(
+            "there is no data in this window; \"{}\" lies between x = {west} and {east} m, y = {south} and {north} m",
+            collection.id
+        )));
+    }
+    Ok(samples)
+}
+
+/// `GET /v1/collections/{id}/study`: a section of a study that makes the same patch.
+pub async fn snippet(
+    State(service): State<Arc<Service>>,
+    Path(id): Path<String>,
+    pairs: Pairs,
+) -> Result<String, Problem> {
+    let collection = service.collection(&id)?;
+    let query = checked(pairs, &[&["origin", "center", "size", "size_m", "resolution_m"]])?;
+    let Ground::World(world) = &collection.ground else {
+        return Err(Problem::bad_request(format!("\"{id}\" is a raster; its release holds the study that made it")));
+    };
+    let window = Window::of(&query, collection, service.limits.samples)?;
+    let [rows, cols] = window.shape;
+    world.snippet(window.origin_m, [cols, rows], window.step_m)
+}
+
+/// Parameters of the version of a ground, and a sun.
+pub const LIT: [&str; 3] = ["sun_azimuth_deg", "sun_elevation_deg", "exaggeration"];
+/// The parameters that tiles take.
+pub const TILE_PARAMETERS: [&[&str]; 2] = [&LIT, &VERSION];

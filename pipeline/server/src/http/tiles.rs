@@ -1,0 +1,188 @@
+//! Map tiles: by level, row and column of the collection's own grid, and by z, x, y for clients of the web-Mercator kind.
+
+use super::answer::Answer;
+use super::patch::{TILE_PARAMETERS, sun};
+use super::service::{Service, blocking, checked, version};
+use super::{Pairs, Problem, Query};
+use crate::collections::{Collection, Ground};
+use crate::grid::{TileIndex, WINDOW_TILE, WINDOW_ZOOM, of_web_mercator};
+use crate::layers::{Layer, STEP_M, Style};
+use axum::Json;
+use axum::extract::{Path, State};
+use axum::http::HeaderMap;
+use axum::response::Response;
+use serde_json::{Value, json};
+use std::sync::Arc;
+
+/// Levels of [`Layer::Elevation`].
+const LEVELS: f64 = 16_777_216.0;
+
+/// `GET /v1/collections/{id}/styles/{layer}/map/tiles/{tms}/{level}/{row}/{col}`
+pub async fn tile(
+    State(service): State<Arc<Service>>,
+    Path((id, layer, grid, level, row, col)): Path<(String, String, String, String, String, String)>,
+    pairs: Pairs,
+    headers: HeaderMap,
+) -> Result<Response, Problem> {
+    let collection = Arc::clone(service.collection(&id)?);
+    if grid != id {
+        return Err(Problem::not_found(format!("the tiles of \"{id}\" lie in the tile matrix set \"{id}\"")));
+    }
+    let [level, row, col] = whole([&level, &row, &col])?;
+    send(&service, &collection, &layer, TileIndex { level, row, col }, pairs, &headers).await
+}
+
+/// `GET /v1/collections/{id}/xyz/{layer}/{z}/{x}/{y}.png`
+pub async fn xyz(
+    State(service): State<Arc<Service>>,
+    Path((id, layer, z, x, y)): Path<(String, String, String, String, String)>,
+    pairs: Pairs,
+    headers: HeaderMap,
+) -> Result<Response, Problem> {
+    let collection = Arc::clone(service.collection(&id)?);
+    let y = y.strip_suffix(".png").unwrap_or(&y);
+    let [z, x, y] = whole([&z, &x, y])?;
+    let tile = of_web_mercator(z, x, y).ok_or_else(|| {
+        let [col, row] = WINDOW_TILE;
+        Problem::not_found(format!("the map is the tile {WINDOW_ZOOM}/{col}/{row} and those within it"))
+    })?;
+    send(&service, &collection, &layer, tile, pairs, &headers).await
+}
+
+fn whole<const N: usize>(texts: [&str; N]) -> Result<[u32; N], Problem> {
+    let mut numbers = [0; N];
+    for (number, text) in numbers.iter_mut().zip(texts) {
+        *number = text.parse().map_err(|_| Problem::not_found("level, row and column of a tile are whole numbers"))?;
+    }
+    Ok(numbers)
+}
+
+fn layer_of(collection: &Collection, name: &str) -> Result<Layer, Problem> {
+    let known = collection.layers();
+    Layer::of_name(name).filter(|layer| known.contains(&layer.name())).ok_or_else(|| {
+        Problem::not_found(format!("\"{}\" has no such layer; it has {}", collection.id, known.join(", ")))
+    })
+}
+
+async fn send(
+    service: &Service,
+    collection: &Arc<Collection>,
+    layer: &str,
+    tile: TileIndex,
+    pairs: Pairs,
+    headers: &HeaderMap,
+) -> Result<Response, Problem> {
+    let layer = layer_of(collection, layer)?;
+    let query = checked(pairs, &TILE_PARAMETERS)?;
+    let grid = collection.grid();
+    if !grid.has(tile) {
+        let levels = grid.levels - 1;
+        return Err(Problem::not_found(format!(
+            "there is no such tile; levels are 0 to {levels}, and tiles end with the ground"
+        )));
+    }
+    let version = version(collection, &query)?;
+    if version.feature_min_m > 0.0 {
+        return Err(Problem::bad_request(
+            "`feature_min_m` goes with the level of a tile: two pixels; `patch` takes any",
+        ));
+    }
+    let style = style(collection, &query, tile.level)?;
+    let what = format!("tile {} {} {tile:?} {}", collection.digest, layer.name(), query.canonical());
+    let make = async {
+        let samples = match &collection.ground {
+            Ground::World(world) => world.map_tile(&service.maker(), tile, &version.phenomena).await?,
+            Ground::Raster(raster) => {
+                let raster = Arc::clone(raster);
+                blocking(move || raster.tile(tile).map(Arc::new)).await?
+            }
+        };
+        if samples.is_void() {
+            return Ok(None);
+        }
+        let drawn = blocking(move || Ok(layer.draw(&samples, &style))).await?;
+        let png = drawn.ok_or_else(|| {
+            Problem::not_found(format!(
+                "heights of this tile lie beyond what `{}` can hold; `patch` has them",
+                layer.name()
+            ))
+        })?;
+        Ok(Some(Answer::new("image/png", png)))
+    };
+    service.answers.answer(headers, &what, make).await
+}
+
+fn style(collection: &Collection, query: &Query, level: u32) -> Result<Style, Problem> {
+    let range_m = range_m(collection);
+    Ok(Style {
+        sun: sun(query)?,
+        exaggeration: query.number("exaggeration", [0.1, 100.0])?.unwrap_or(1.0),
+        range_m,
+        offset_m: offset_m(range_m),
+        cell_m: collection.grid().resolution_m(level),
+    })
+}
+
+fn range_m(collection: &Collection) -> [f64; 2] {
+    match &collection.ground {
+        Ground::World(world) => world.height_range_m(),
+        Ground::Raster(raster) => raster.files.height_range_m,
+    }
+}
+
+/// Height of level 0 of [`Layer::Elevation`]: whole metres, the home of the collection in the middle.
+fn offset_m([low, high]: [f64; 2]) -> f64 {
+    (0.5 * (low + high) - 0.5 * LEVELS * STEP_M).round()
+}
+
+/// `GET /v1/collections/{id}/xyz/{layer}/tilejson.json`
+pub async fn tilejson(
+    State(service): State<Arc<Service>>,
+    Path((id, layer)): Path<(String, String)>,
+    pairs: Pairs,
+    headers: HeaderMap,
+) -> Result<Json<Value>, Problem> {
+    let collection = service.collection(&id)?;
+    let layer = layer_of(collection, &layer)?;
+    checked(pairs, &[])?;
+    let host = super::ogc::base(&headers);
+    let mut json = json!({
+        "tilejson": "3.0.0",
+        "name": format!("{id}: {}", layer.summary()),
+        "tiles": [format!("{host}/v1/collections/{id}/xyz/{}/{{z}}/{{x}}/{{y}}.png", layer.name())],
+        "minzoom": WINDOW_ZOOM,
+        "maxzoom": WINDOW_ZOOM + collection.grid().levels - 1,
+        "bounds": window_degrees(collection),
+        "scheme": "xyz",
+        "description": "A plane in the place of one tile of the web-Mercator map: distances and areas that a client works out from longitude \
+                        and latitude are not those of the ground; `metres_per_pixel` are.",
+        "metres_per_pixel": (0..collection.grid().levels).map(|l| collection.grid().resolution_m(l)).collect::<Vec<_>>(),
+    });
+    let encoding = match layer {
+        Layer::Terrarium => Some(json!({ "encoding": "terrarium" })),
+        Layer::TerrainRgb => Some(json!({ "encoding": "mapbox" })),
+        Layer::Elevation => Some(json!({
+            "encoding": "custom", "redFactor": 65536.0 * STEP_M, "greenFactor": 256.0 * STEP_M, "blueFactor": STEP_M,
+            "baseShift": -offset_m(range_m(collection)), "offset_m": offset_m(range_m(collection)), "step_m": STEP_M,
+        })),
+        _ => None,
+    };
+    if let (Value::Object(json), Some(Value::Object(encoding))) = (&mut json, encoding) {
+        json.extend(encoding);
+    }
+    Ok(Json(json))
+}
+
+/// West, south, east and north of the tiles of level 0 in a web-Mercator client, degrees.
+fn window_degrees(collection: &Collection) -> [f64; 4] {
+    let [cols, rows] = collection.grid().matrix(0);
+    let side = 360.0 / f64::from(1u32 << WINDOW_ZOOM);
+    let [west, north] = [WINDOW_TILE[0], WINDOW_TILE[1]].map(f64::from);
+    // At the equator degrees of latitude are as long as those of longitude, to a part in 10 000.
+    let latitude = |row: f64| {
+        let y = std::f64::consts::PI * (1.0 - 2.0 * row / f64::from(1u32 << WINDOW_ZOOM));
+        libm::atan(libm::sinh(y)).to_degrees()
+    };
+    let longitude = |col: f64| col * side - 180.0;
+    [longitude(west), latitude(north + f64::from(rows)), longitude(west + f64::from(cols)), latitude(north)]
+}

@@ -1,0 +1,174 @@
+//! Values at points and along lines, and the tracks of a release.
+
+use super::service::{Service, VERSION, blocking, checked, version};
+use super::{Pairs, Problem};
+use crate::collections::Collection;
+use crate::collections::world::{FEATURE_PIXELS, Version};
+use crate::samples::Samples;
+use axum::Json;
+use axum::extract::{Path, State};
+use serde_json::{Value, json};
+use std::sync::Arc;
+use tokio::task::JoinSet;
+
+/// Most samples of a profile.
+const SAMPLES_MAX: u32 = 4096;
+/// Samples of a profile unasked.
+const SAMPLES: u32 = 256;
+/// Most corners of a line.
+const CORNERS_MAX: usize = 1000;
+/// Parts of a profile that are made side by side.
+const PARTS: usize = 16;
+
+/// `GET /v1/collections/{id}/point`
+pub async fn point(
+    State(service): State<Arc<Service>>,
+    Path(id): Path<String>,
+    pairs: Pairs,
+) -> Result<Json<Value>, Problem> {
+    let collection = service.collection(&id)?;
+    let query = checked(pairs, &[&["x", "y", "resolution_m"], &VERSION])?;
+    query.required("x")?;
+    query.required("y")?;
+    let far = [-1e12, 1e12];
+    let (x, y) = (query.number("x", far)?.unwrap_or_default(), query.number("y", far)?.unwrap_or_default());
+    let [_, finest_m] = collection.spacings_m();
+    let step_m = query.number("resolution_m", [1e-6, 1e9])?.unwrap_or(finest_m);
+    let version = version(collection, &query)?;
+    let s = service.samples(collection, [x, y], step_m, [1, 1], &version).await?;
+    let first = |field: &Option<Vec<f32>>| field.as_ref().map(|v| v[0]).filter(|v| v.is_finite());
+    Ok(Json(json!({
+        "x_m": x,
+        "y_m": y,
+        "elevation_m": finite(s.heights[0]),
+        "class": first(&s.rock).map(|share| if share >= 0.5 { "rock" } else { "sand" }),
+        "rock_share": first(&s.rock),
+        "albedo": first(&s.albedo),
+        "rock_potential": first(&s.rock_potential),
+        "resolution_m": step_m,
+    })))
+}
+
+fn finite(value: f32) -> Option<f32> {
+    value.is_finite().then_some(value)
+}
+
+/// `GET /v1/collections/{id}/profile`
+pub async fn profile(
+    State(service): State<Arc<Service>>,
+    Path(id): Path<String>,
+    pairs: Pairs,
+) -> Result<Json<Value>, Problem> {
+    let collection = Arc::clone(service.collection(&id)?);
+    let query = checked(pairs, &[&["line", "samples", "resolution_m"], &VERSION])?;
+    let line = query.line("line", CORNERS_MAX)?;
+    let count = query.whole("samples", [2, SAMPLES_MAX])?.unwrap_or(SAMPLES) as usize;
+    let (distances_m, places) = along(&line, count)
+        .ok_or_else(|| Problem::bad_request("`line`: its places are all the same; it must lead somewhere"))?;
+    let apart_m = distances_m[count - 1] / (count - 1) as f64;
+    let [_, finest_m] = collection.spacings_m();
+    let step_m = query.number("resolution_m", [1e-6, 1e9])?.unwrap_or_else(|| apart_m.max(finest_m));
+    let mut version = version(&collection, &query)?;
+    let is_world = matches!(collection.ground, crate::collections::Ground::World(_));
+    if is_world && query.text("feature_min_m").is_none() && step_m > finest_m {
+        // As the map has it at that resolution.
+        version.feature_min_m = FEATURE_PIXELS * step_m;
+    }
+    let feature_min_m = version.feature_min_m;
+    let heights = heights(&service, &collection, &places, step_m, &version).await?;
+    Ok(Json(json!({
+        "distance_m": distances_m,
+        "x_m": places.iter().map(|p| p[0]).collect::<Vec<_>>(),
+        "y_m": places.iter().map(|p| p[1]).collect::<Vec<_>>(),
+        "elevation_m": heights.into_iter().map(finite).collect::<Vec<_>>(),
+        "resolution_m": step_m,
+        "feature_min_m": feature_min_m,
+    })))
+}
+
+async fn heights(
+    service: &Arc<Service>,
+    collection: &Arc<Collection>,
+    places: &[[f64; 2]],
+    step_m: f64,
+    version: &Version,
+) -> Result<Vec<f32>, Problem> {
+    let mut parts = JoinSet::new();
+    let size = places.len().div_ceil(PARTS);
+    for (n, part) in places.chunks(size).enumerate() {
+        let (service, collection, version) = (Arc::clone(service), Arc::clone(collection), version.clone());
+        let part = part.to_vec();
+        parts.spawn(async move {
+            let mut heights = Vec::with_capacity(part.len());
+            for place in part {
+                let made: Result<Samples, Problem> =
+                    service.samples(&collection, place, step_m, [1, 1], &version).await;
+                heights.push(made?.heights[0]);
+            }
+            Ok::<_, Problem>((n, heights))
+        });
+    }
+    let mut all = vec![f32::NAN; places.len()];
+    while let Some(joined) = parts.join_next().await {
+        let (n, heights) = joined.map_err(|e| Problem::internal(e.to_string()))??;
+        all[n * size..n * size + heights.len()].copy_from_slice(&heights);
+    }
+    Ok(all)
+}
+
+/// Places evenly along a line, and how far they are from its start; `None` where it has no length.
+fn along(line: &[[f64; 2]], count: usize) -> Option<(Vec<f64>, Vec<[f64; 2]>)> {
+    let mut ends = vec![0.0];
+    for pair in line.windows(2) {
+        let [dx, dy] = [pair[1][0] - pair[0][0], pair[1][1] - pair[0][1]];
+        ends.push(ends[ends.len() - 1] + libm::hypot(dx, dy));
+    }
+    let length = ends[ends.len() - 1];
+    if length <= 0.0 {
+        return None;
+    }
+    let distances: Vec<f64> = (0..count).map(|k| length * k as f64 / (count - 1) as f64).collect();
+    let place = |at: &f64| {
+        let leg = ends.partition_point(|end| end <= at).clamp(1, line.len() - 1);
+        let span = ends[leg] - ends[leg - 1];
+        let w = if span > 0.0 { ((at - ends[leg - 1]) / span).clamp(0.0, 1.0) } else { 0.0 };
+        [0, 1].map(|a| line[leg - 1][a] + (line[leg][a] - line[leg - 1][a]) * w)
+    };
+    let places = distances.iter().map(place).collect();
+    Some((distances, places))
+}
+
+/// `GET /v1/collections/{id}/tracks`
+pub async fn tracks(
+    State(service): State<Arc<Service>>,
+    Path(id): Path<String>,
+    pairs: Pairs,
+) -> Result<Json<Value>, Problem> {
+    checked(pairs, &[])?;
+    let collection = Arc::clone(service.collection(&id)?);
+    blocking(move || Ok(Json(json!({ "tracks": collection.track_list()? })))).await
+}
+
+/// `GET /v1/collections/{id}/tracks/{track}`
+pub async fn track(
+    State(service): State<Arc<Service>>,
+    Path((id, track)): Path<(String, String)>,
+    pairs: Pairs,
+) -> Result<Json<Value>, Problem> {
+    checked(pairs, &[])?;
+    let collection = Arc::clone(service.collection(&id)?);
+    blocking(move || collection.track(&track).map(Json)).await
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn val_places_lie_evenly_along_a_line() {
+        let (distances, places) = along(&[[0.0, 0.0], [3.0, 4.0], [3.0, 9.0]], 5).unwrap();
+        assert_eq!(distances, [0.0, 2.5, 5.0, 7.5, 10.0]);
+        assert_eq!(places, [[0.0, 0.0], [1.5, 2.0], [3.0, 4.0], [3.0, 6.5], [3.0, 9.0]]);
+        assert_eq!(along(&[[1.0, 1.0], [1.0, 1.0]], 5), None);
+    }
+}

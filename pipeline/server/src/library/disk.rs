@@ -1,0 +1,203 @@
+//! Records on disk: one file a tile, `ab/<hash>.tile`.
+//!
+//! A record appears under its name only when it is whole and on disk, and is believed only when its checksum and its key are right: a damaged one is
+//! removed and made again. Files of the folder are its index. Several processes may use one folder: each may add and remove records at any time,
+//! one at a time makes room, and a record that is gone is made again. The least recently used go first, by the times of the files.
+
+use super::record;
+use super::{LibraryError, TileKey};
+use crate::samples::Samples;
+use sastrugi_store::atomic;
+use std::fs::{self, File, TryLockError};
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::Once;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, SystemTime};
+
+/// Says what the folder is.
+const MARKER: &str = "sastrugi-library.json";
+const MARKER_TEXT: &str = "{\"program\":\"sastrugi\",\"library\":1}\n";
+/// Tells backup programs that everything here can be made again.
+const CACHE_TAG: &str = "CACHEDIR.TAG";
+const CACHE_TAG_TEXT: &str = "Signature: 8a477f597d28d172789f06886806bc55\n";
+/// Held by the process that makes room.
+const LOCK: &str = "lock";
+const ENDING: &str = "tile";
+/// The time of a record is brought up to date at most this often.
+const TOUCH: Duration = Duration::from_secs(60);
+
+/// The records of a folder.
+pub struct Disk {
+    folder: PathBuf,
+    limit: u64,
+    bytes: AtomicU64,
+    pub(super) damaged: AtomicU64,
+    evicted: AtomicU64,
+    unwritten: AtomicU64,
+    warned: Once,
+}
+
+struct Record {
+    path: PathBuf,
+    bytes: u64,
+    used: SystemTime,
+}
+
+impl Disk {
+    /// Opens a folder, or makes it.
+    pub fn open(folder: &Path, limit: u64) -> Result<Self, LibraryError> {
+        let at = |path: &Path| {
+            let path = path.to_owned();
+            move |source| LibraryError::Io { path, source }
+        };
+        fs::create_dir_all(folder).map_err(at(folder))?;
+        let marker = folder.join(MARKER);
+        if !marker.is_file() {
+            let mut entries = fs::read_dir(folder).map_err(at(folder))?;
+            let foreign = |entry: &io::Result<fs::DirEntry>| {
+                // Another process may be writing the marker.
+                entry.as_ref().is_ok_and(|e| {
+                    !atomic::is_temporary(&e.file_name()) && e.file_name() != MARKER && e.file_name() != CACHE_TAG
+                })
+            };
+            if entries.any(|entry| foreign(&entry)) {
+                return Err(LibraryError::Occupied(folder.to_owned()));
+            }
+            atomic::write(&folder.join(CACHE_TAG), CACHE_TAG_TEXT.as_bytes()).map_err(at(folder))?;
+            atomic::write(&marker, MARKER_TEXT.as_bytes()).map_err(at(&marker))?;
+        }
+        if fs::read(&marker).map_err(at(&marker))? != MARKER_TEXT.as_bytes() {
+            return Err(LibraryError::Version(folder.to_owned()));
+        }
+        atomic::clear_leftovers(&marker);
+        for shelf in shelves(folder) {
+            atomic::clear_leftovers(&shelf.join("any"));
+        }
+        let bytes = records(folder).iter().map(|r| r.bytes).sum();
+        let zero = || AtomicU64::new(0);
+        let disk = Self {
+            folder: folder.to_owned(),
+            limit,
+            bytes: AtomicU64::new(bytes),
+            damaged: zero(),
+            evicted: zero(),
+            unwritten: zero(),
+            warned: Once::new(),
+        };
+        disk.make_room();
+        Ok(disk)
+    }
+
+    pub(super) fn path(&self, key: &TileKey) -> PathBuf {
+        let name = blake3::Hash::from(key.digest).to_hex();
+        self.folder.join(&name[..2]).join(format!("{name}.{ENDING}"))
+    }
+
+    /// The tile of a key, if its record is there, whole and undamaged.
+    pub fn read(&self, key: &TileKey) -> Option<Samples> {
+        let path = self.path(key);
+        let bytes = fs::read(&path).ok()?;
+        let tile = record::decode(&key.text, &bytes);
+        if tile.is_none() {
+            self.damaged.fetch_add(1, Ordering::Relaxed);
+            tracing::warn!(record = %path.display(), "a damaged record is made again");
+            if fs::remove_file(&path).is_ok() {
+                self.forget(bytes.len() as u64);
+            }
+            return None;
+        }
+        touch(&path);
+        tile
+    }
+
+    /// Keeps a tile. A record that cannot be written is left out: the tile is made again when it is asked for.
+    pub fn write(&self, key: &TileKey, tile: &Samples) {
+        let bytes = record::encode(&key.text, tile);
+        if bytes.len() as u64 > self.limit {
+            return;
+        }
+        match atomic::write(&self.path(key), &bytes) {
+            Ok(()) => {
+                self.bytes.fetch_add(bytes.len() as u64, Ordering::Relaxed);
+                self.make_room();
+            }
+            Err(error) => {
+                self.unwritten.fetch_add(1, Ordering::Relaxed);
+                let folder = self.folder.display();
+                self.warned.call_once(
+                    || tracing::warn!(%folder, %error, "tiles cannot be kept on disk; they are served all the same"),
+                );
+            }
+        }
+    }
+
+    fn forget(&self, bytes: u64) {
+        // Another process may have counted it differently.
+        let less = |known: u64| Some(known.saturating_sub(bytes));
+        let _ = self.bytes.fetch_update(Ordering::Relaxed, Ordering::Relaxed, less);
+    }
+
+    /// Removes the records that were not used for longest, down to nine tenths of the limit, once they pass it. One process at a time does it.
+    fn make_room(&self) {
+        if self.bytes.load(Ordering::Relaxed) <= self.limit {
+            return;
+        }
+        let Ok(lock) = File::options().create(true).truncate(false).write(true).open(self.folder.join(LOCK)) else {
+            return;
+        };
+        match lock.try_lock() {
+            // Without locks on this file system two may make room at once, which removes more than need be.
+            Ok(()) | Err(TryLockError::Error(_)) => {}
+            Err(TryLockError::WouldBlock) => return,
+        }
+        let mut all = records(&self.folder);
+        all.sort_by(|a, b| a.used.cmp(&b.used).then_with(|| a.path.cmp(&b.path)));
+        let mut bytes: u64 = all.iter().map(|r| r.bytes).sum();
+        if bytes > self.limit {
+            for record in &all {
+                if bytes <= self.limit / 10 * 9 {
+                    break;
+                }
+                if fs::remove_file(&record.path).is_ok() {
+                    self.evicted.fetch_add(1, Ordering::Relaxed);
+                }
+                bytes -= record.bytes;
+            }
+        }
+        self.bytes.store(bytes, Ordering::Relaxed);
+    }
+
+    /// Damaged, evicted and unwritten records, and bytes.
+    pub fn counts(&self) -> [u64; 4] {
+        [&self.damaged, &self.evicted, &self.unwritten, &self.bytes].map(|n| n.load(Ordering::Relaxed))
+    }
+}
+
+/// Brings the time of a record up to date.
+fn touch(path: &Path) {
+    let now = SystemTime::now();
+    let stale = |used: SystemTime| now.duration_since(used).is_ok_and(|age| age > TOUCH);
+    if fs::metadata(path).and_then(|m| m.modified()).is_ok_and(stale) {
+        // A record that cannot be touched only goes sooner.
+        let _ = File::options().write(true).open(path).and_then(|file| file.set_modified(now));
+    }
+}
+
+/// The folders of records.
+fn shelves(folder: &Path) -> Vec<PathBuf> {
+    let is_shelf = |name: &str| name.len() == 2 && name.bytes().all(|b| b.is_ascii_hexdigit());
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    entries.filter(|e| e.file_name().to_str().is_some_and(is_shelf)).map(|e| e.path()).collect()
+}
+
+fn records(folder: &Path) -> Vec<Record> {
+    let entries = shelves(folder).into_iter().flat_map(|shelf| fs::read_dir(shelf).into_iter().flatten().flatten());
+    let record = |entry: fs::DirEntry| {
+        let path = entry.path();
+        let is_record = path.extension().is_some_and(|e| e == ENDING);
+        let meta = entry.metadata().ok().filter(|m| is_record && m.is_file())?;
+        Some(Record { path, bytes: meta.len(), used: meta.modified().ok()? })
+    };
+    entries.filter_map(record).collect()
+}

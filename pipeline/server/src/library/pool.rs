@@ -1,0 +1,145 @@
+//! Threads that make tiles, and the tiles that wait for them.
+
+use std::collections::VecDeque;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+
+/// What is made first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Priority {
+    /// Somebody waits for it.
+    Answer,
+    /// It is made ahead, when nobody waits.
+    Background,
+}
+
+/// The queue is full.
+#[derive(Debug)]
+pub struct Full;
+
+type Work = Box<dyn FnOnce() + Send>;
+
+struct Waiting {
+    cancel: Arc<AtomicBool>,
+    work: Work,
+}
+
+#[derive(Default)]
+struct Queue {
+    answers: VecDeque<Waiting>,
+    background: VecDeque<Waiting>,
+    closed: bool,
+}
+
+struct Shared {
+    queue: Mutex<Queue>,
+    changed: Condvar,
+    dropped: AtomicU64,
+    running: AtomicU64,
+}
+
+/// A fixed number of threads and a bounded queue.
+pub struct Pool {
+    shared: Arc<Shared>,
+    limit: usize,
+}
+
+impl Shared {
+    fn queue(&self) -> MutexGuard<'_, Queue> {
+        self.queue.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The next work, once there is some; `None` when the pool is closed.
+    fn next(&self) -> Option<Work> {
+        let mut queue = self.queue();
+        loop {
+            if queue.closed {
+                return None;
+            }
+            let next = queue.answers.pop_front();
+            match next.or_else(|| queue.background.pop_front()) {
+                Some(waiting) if waiting.cancel.load(Ordering::Relaxed) => {
+                    self.dropped.fetch_add(1, Ordering::Relaxed);
+                }
+                Some(waiting) => {
+                    self.running.fetch_add(1, Ordering::Relaxed);
+                    return Some(waiting.work);
+                }
+                None => queue = self.changed.wait(queue).unwrap_or_else(PoisonError::into_inner),
+            }
+        }
+    }
+}
+
+impl Pool {
+    /// `workers` threads; at most `limit` works wait in each of two queues.
+    pub fn new(workers: usize, limit: usize) -> Self {
+        let shared = Arc::new(Shared {
+            queue: Mutex::default(),
+            changed: Condvar::new(),
+            dropped: AtomicU64::new(0),
+            running: AtomicU64::new(0),
+        });
+        for number in 0..workers.max(1) {
+            let shared = Arc::clone(&shared);
+            let run = move || {
+                while let Some(work) = shared.next() {
+                    work();
+                    shared.running.fetch_sub(1, Ordering::Relaxed);
+                }
+            };
+            let started = std::thread::Builder::new().name(format!("tiles-{number}")).spawn(run);
+            if let Err(error) = started {
+                tracing::warn!(%error, "a worker could not be started");
+            }
+        }
+        Self { shared, limit }
+    }
+
+    /// Queues work; a cancelled one is dropped unseen.
+    ///
+    /// # Errors
+    /// As many wait as may wait.
+    pub fn push(&self, priority: Priority, cancel: Arc<AtomicBool>, work: Work) -> Result<(), Full> {
+        let mut queue = self.shared.queue();
+        let line = match priority {
+            Priority::Answer => &mut queue.answers,
+            Priority::Background => &mut queue.background,
+        };
+        if line.len() >= self.limit {
+            let before = line.len();
+            line.retain(|waiting| !waiting.cancel.load(Ordering::Relaxed));
+            self.shared.dropped.fetch_add((before - line.len()) as u64, Ordering::Relaxed);
+        }
+        if line.len() >= self.limit {
+            return Err(Full);
+        }
+        line.push_back(Waiting { cancel, work });
+        self.shared.changed.notify_one();
+        Ok(())
+    }
+
+    /// How many wait.
+    pub fn queued(&self) -> usize {
+        let queue = self.shared.queue();
+        let wanted = |line: &VecDeque<Waiting>| line.iter().filter(|w| !w.cancel.load(Ordering::Relaxed)).count();
+        wanted(&queue.answers) + wanted(&queue.background)
+    }
+
+    /// How many workers are at it.
+    pub fn running(&self) -> u64 {
+        self.shared.running.load(Ordering::Relaxed)
+    }
+
+    /// How many were dropped unseen.
+    pub fn dropped(&self) -> u64 {
+        self.shared.dropped.load(Ordering::Relaxed)
+    }
+}
+
+impl Drop for Pool {
+    fn drop(&mut self) {
+        self.shared.queue().closed = true;
+        self.shared.changed.notify_all();
+    }
+}

@@ -1,0 +1,363 @@
+//! Flights, bounds, damage and kills.
+
+use super::*;
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::sync::mpsc;
+use std::time::{Duration, Instant};
+
+const WRITER: &str = "SASTRUGI_TEST_LIBRARY_WRITER";
+
+fn mix(state: &mut u64) -> u64 {
+    *state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+    (*state ^ (*state >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9) >> 16
+}
+
+/// A tile that its number decides.
+fn tile_of(number: u64, size: usize) -> Samples {
+    let count = size * size;
+    let values = |salt: u64| (0..count as u64).map(|k| ((number * 31 + salt + k) % 9973) as f32).collect::<Vec<_>>();
+    let (albedo, rock, rock_potential) = (Some(values(1)), Some(values(3)), Some(values(2)));
+    Samples { rows: size, cols: size, heights: values(0), albedo, rock, rock_potential }
+}
+
+fn key_of(number: u64) -> TileKey {
+    TileKey::new(format!("{{\"tile\":{number}}}"))
+}
+
+fn settings(folder: Option<&Path>) -> Settings {
+    let folder = folder.map(Path::to_owned);
+    Settings { folder, disk_bytes: 1 << 30, memory_bytes: 1 << 20, workers: 2, queue: 256 }
+}
+
+fn open(settings: Settings) -> Arc<Library> {
+    Library::open(&settings).unwrap()
+}
+
+fn runtime() -> tokio::runtime::Runtime {
+    tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build().unwrap()
+}
+
+async fn ask(library: &Arc<Library>, number: u64) -> Arc<Samples> {
+    library.tile(key_of(number), Priority::Answer, move |_| Some(tile_of(number, 8))).await.unwrap()
+}
+
+async fn until(mut condition: impl FnMut() -> bool) {
+    let start = Instant::now();
+    while !condition() {
+        assert!(start.elapsed() < Duration::from_secs(20), "waited too long");
+        tokio::time::sleep(Duration::from_millis(1)).await;
+    }
+}
+
+/// Waits until the writes behind the answers are done.
+async fn idle(library: &Arc<Library>) {
+    until(|| library.statistics().running == 0 && library.statistics().queued == 0).await;
+}
+
+/// All files below a folder whose name passes.
+fn files(folder: &Path, wanted: &dyn Fn(&str) -> bool) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    for entry in fs::read_dir(folder).unwrap().flatten() {
+        if entry.path().is_dir() {
+            found.extend(files(&entry.path(), wanted));
+        } else if wanted(&entry.file_name().to_string_lossy()) {
+            found.push(entry.path());
+        }
+    }
+    found
+}
+
+/// The first of a hundred leaves; the others are served by one making.
+#[test]
+fn val_a_hundred_requests_make_once_without_their_leader() {
+    runtime().block_on(async {
+        let library = open(settings(None));
+        let (go, wait) = mpsc::channel::<()>();
+        let leader = tokio::spawn({
+            let library = library.clone();
+            async move {
+                let make = move |_: &AtomicBool| wait.recv().ok().map(|()| tile_of(7, 8));
+                library.tile(key_of(7), Priority::Answer, make).await
+            }
+        });
+        until(|| library.statistics().running == 1).await;
+        let followers: Vec<_> = (0..99)
+            .map(|_| {
+                let library = library.clone();
+                tokio::spawn(async move { library.tile(key_of(7), Priority::Answer, |_| panic!("again")).await })
+            })
+            .collect();
+        until(|| library.flights().get(&key_of(7).digest).is_some_and(|f| f.waiters == 100)).await;
+        leader.abort();
+        assert!(leader.await.unwrap_err().is_cancelled());
+        go.send(()).unwrap();
+        for follower in followers {
+            assert_eq!(*follower.await.unwrap().unwrap(), tile_of(7, 8));
+        }
+        let statistics = library.statistics();
+        assert_eq!((statistics.made, statistics.cancelled), (1, 0));
+    });
+}
+
+/// The last to leave cancels; who comes while the cancelled making ends gets a right answer of its own.
+#[test]
+fn val_the_last_waiter_cancels_and_a_later_one_starts_anew() {
+    runtime().block_on(async {
+        let library = open(settings(None));
+        let (go, wait) = mpsc::channel::<()>();
+        let (told, seen) = mpsc::channel();
+        let make = move |cancel: &AtomicBool| {
+            while !cancel.load(Ordering::SeqCst) {
+                std::thread::yield_now();
+            }
+            told.send(()).unwrap();
+            wait.recv().unwrap();
+            Some(tile_of(666, 8))
+        };
+        let first = tokio::spawn({
+            let library = library.clone();
+            async move { library.tile(key_of(1), Priority::Answer, make).await }
+        });
+        until(|| library.statistics().running == 1).await;
+        first.abort();
+        let _ = first.await;
+        seen.recv_timeout(Duration::from_secs(20)).unwrap();
+        assert_eq!(*ask(&library, 1).await, tile_of(1, 8));
+        go.send(()).unwrap();
+        idle(&library).await;
+        assert_eq!(*ask(&library, 1).await, tile_of(1, 8));
+        assert_eq!((library.statistics().made, library.statistics().cancelled), (1, 1));
+    });
+}
+
+/// One worker, held: the queue is bounded, what is left is taken off, answers go before background jobs.
+#[test]
+fn val_the_queue_is_bounded_ordered_and_left() {
+    runtime().block_on(async {
+        let library = open(Settings { workers: 1, queue: 2, ..settings(None) });
+        let (go, wait) = mpsc::channel::<()>();
+        let order = Arc::new(Mutex::new(Vec::new()));
+        let spawn = |number: u64, priority| {
+            let (library, order) = (library.clone(), order.clone());
+            tokio::spawn(async move {
+                let make = move |_: &AtomicBool| {
+                    order.lock().unwrap().push(number);
+                    Some(tile_of(number, 8))
+                };
+                library.tile(key_of(number), priority, make).await
+            })
+        };
+        let held = tokio::spawn({
+            let library = library.clone();
+            async move {
+                library.tile(key_of(0), Priority::Answer, move |_| wait.recv().ok().map(|()| tile_of(0, 8))).await
+            }
+        });
+        until(|| library.statistics().running == 1).await;
+        let mut waiting = Vec::new();
+        let line = [(1, Priority::Background), (2, Priority::Answer), (3, Priority::Answer)];
+        for (place, (number, priority)) in line.into_iter().enumerate() {
+            waiting.push(spawn(number, priority));
+            until(|| library.statistics().queued == place as u64 + 1).await;
+        }
+        assert_eq!(spawn(4, Priority::Answer).await.unwrap(), Err(Unavailable::Busy));
+        waiting[1].abort();
+        until(|| library.statistics().queued == 2).await;
+        go.send(()).unwrap();
+        held.await.unwrap().unwrap();
+        waiting.remove(1);
+        for request in waiting {
+            request.await.unwrap().unwrap();
+        }
+        assert_eq!(*order.lock().unwrap(), [3, 1]);
+    });
+}
+
+#[test]
+fn val_failures_reach_who_waits_and_the_pool_lives() {
+    runtime().block_on(async {
+        let library = open(Settings { workers: 1, ..settings(None) });
+        let panicked =
+            library.tile(key_of(1), Priority::Answer, |_| panic!("a broken kernel, as this test has it")).await;
+        assert!(matches!(panicked, Err(Unavailable::Failed(_))));
+        assert!(matches!(library.tile(key_of(1), Priority::Answer, |_| None).await, Err(Unavailable::Failed(_))));
+        assert_eq!(*ask(&library, 1).await, tile_of(1, 8));
+        assert_eq!(library.statistics().failed, 2);
+    });
+}
+
+/// A tile larger than the memory is served and not kept.
+#[test]
+fn val_memory_is_bounded() {
+    runtime().block_on(async {
+        let bytes = tile_of(0, 8).bytes();
+        let library = open(Settings { memory_bytes: 20 * bytes, ..settings(None) });
+        for number in 0..200 {
+            ask(&library, number).await;
+        }
+        assert!(library.statistics().memory_bytes <= 20 * bytes);
+        let large = library.tile(key_of(1000), Priority::Answer, |_| Some(tile_of(1000, 100))).await.unwrap();
+        assert_eq!(*large, tile_of(1000, 100));
+        assert!(library.statistics().memory_bytes <= 20 * bytes);
+    });
+}
+
+/// Any flipped byte and any truncation is found, deleted and made again.
+#[test]
+fn prop_damaged_records_are_never_served() {
+    runtime().block_on(async {
+        let folder = tempfile::tempdir().unwrap();
+        let library = open(Settings { memory_bytes: 0, ..settings(Some(folder.path())) });
+        let path = library.disk.as_ref().unwrap().path(&key_of(5));
+        let mut state = 5;
+        for round in 0..400_u64 {
+            ask(&library, 5).await;
+            idle(&library).await;
+            let mut bytes = fs::read(&path).unwrap();
+            let place = if round < 60 { round as usize } else { mix(&mut state) as usize % bytes.len() };
+            if round % 4 == 3 {
+                bytes.truncate(place);
+            } else {
+                bytes[place] ^= 1 << (mix(&mut state) % 8);
+            }
+            fs::write(&path, bytes).unwrap();
+            assert_eq!(*ask(&library, 5).await, tile_of(5, 8));
+            idle(&library).await;
+            assert_eq!(library.statistics().damaged, round + 1);
+        }
+        let other = library.disk.as_ref().unwrap().path(&key_of(6));
+        fs::create_dir_all(other.parent().unwrap()).unwrap();
+        fs::copy(&path, &other).unwrap();
+        assert_eq!(*ask(&library, 6).await, tile_of(6, 8));
+        assert_eq!(library.statistics().damaged, 401);
+    });
+}
+
+#[test]
+fn val_foreign_folders_are_refused_and_left_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("thesis.tex"), "mine").unwrap();
+    let refused = Library::open(&settings(Some(folder.path()))).err().unwrap();
+    assert!(matches!(refused, LibraryError::Occupied(_)), "{refused}");
+    assert_eq!(files(folder.path(), &|_| true).len(), 1);
+    let other = tempfile::tempdir().unwrap();
+    fs::write(other.path().join("sastrugi-library.json"), "{\"program\":\"sastrugi\",\"library\":2}\n").unwrap();
+    assert!(matches!(Library::open(&settings(Some(other.path()))), Err(LibraryError::Version(_))));
+    let fresh = tempfile::tempdir().unwrap();
+    drop(Library::open(&Settings { disk_bytes: 0, ..settings(Some(fresh.path())) }).unwrap());
+    assert_eq!(files(fresh.path(), &|_| true).len(), 0);
+}
+
+/// A shelf that is a file: the tile cannot be written and is served all the same.
+#[test]
+fn val_write_errors_do_not_fail_the_answer() {
+    runtime().block_on(async {
+        let folder = tempfile::tempdir().unwrap();
+        let library = open(settings(Some(folder.path())));
+        let path = library.disk.as_ref().unwrap().path(&key_of(1));
+        fs::write(path.parent().unwrap(), "in the way").unwrap();
+        assert_eq!(*ask(&library, 1).await, tile_of(1, 8));
+        idle(&library).await;
+        assert_eq!(*ask(&library, 1).await, tile_of(1, 8));
+        assert_eq!((library.statistics().unwritten, library.statistics().memory_hits), (1, 1));
+    });
+}
+
+/// Two libraries on one folder that holds a fraction of what is asked for.
+#[test]
+fn prop_two_libraries_share_a_small_folder() {
+    runtime().block_on(async {
+        let folder = tempfile::tempdir().unwrap();
+        let small = || Settings { memory_bytes: 3000, disk_bytes: 20_000, ..settings(Some(folder.path())) };
+        let libraries = [open(small()), open(small())];
+        let asking = (0..4_u64).map(|task| {
+            let library = libraries[task as usize % 2].clone();
+            tokio::spawn(async move {
+                let mut state = task;
+                for _ in 0..400 {
+                    let number = mix(&mut state) % 60;
+                    assert_eq!(*ask(&library, number).await, tile_of(number, 8));
+                }
+            })
+        });
+        for task in asking.collect::<Vec<_>>() {
+            task.await.unwrap();
+        }
+        idle(&libraries[0]).await;
+        idle(&libraries[1]).await;
+        let all = [libraries[0].statistics(), libraries[1].statistics()];
+        assert!(all.iter().all(|s| s.damaged == 0 && s.evicted > 0 && s.disk_hits > 0), "{all:?}");
+        drop(Library::open(&small()).unwrap());
+        let left = files(folder.path(), &|name| name.ends_with(".tile"));
+        assert!(left.iter().map(|path| fs::metadata(path).unwrap().len()).sum::<u64>() <= 20_000);
+    });
+}
+
+/// The child of the test below: writes records until it is killed.
+#[test]
+fn val_child_writes_until_it_is_killed() {
+    let Some(folder) = std::env::var_os(WRITER) else { return };
+    let disk = Disk::open(Path::new(&folder), 1 << 30).unwrap();
+    std::thread::scope(|scope| {
+        for thread in 0..4_u64 {
+            let disk = &disk;
+            scope.spawn(move || {
+                let (start, mut state) = (Instant::now(), u64::from(std::process::id()) + thread);
+                while start.elapsed() < Duration::from_secs(20) {
+                    let number = mix(&mut state) % 200;
+                    disk.write(&key_of(number), &tile_of(number, 64));
+                }
+            });
+        }
+    });
+}
+
+/// Writers killed at any instant leave whole records only, and no temporary file stays after the next opening.
+#[test]
+fn prop_killed_writers_leave_whole_records() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut state, mut leftovers) = (3, 0);
+    for _ in 0..30 {
+        let mut child = Command::new(std::env::current_exe().unwrap())
+            .args(["--exact", "library::tests::val_child_writes_until_it_is_killed"])
+            .env(WRITER, folder.path())
+            .stdout(Stdio::null())
+            .spawn()
+            .unwrap();
+        std::thread::sleep(Duration::from_millis(20 + mix(&mut state) % 80));
+        child.kill().unwrap();
+        child.wait().unwrap();
+        leftovers += files(folder.path(), &|name| name.starts_with(".sastrugi-partial")).len();
+        let disk = Disk::open(folder.path(), 1 << 30).unwrap();
+        assert_eq!(files(folder.path(), &|name| name.starts_with(".sastrugi-partial")).len(), 0);
+        let there = (0..200).filter(|number| disk.path(&key_of(*number)).exists());
+        there.for_each(|number| assert_eq!(disk.read(&key_of(number)), Some(tile_of(number, 64))));
+        assert_eq!(disk.damaged.load(Ordering::Relaxed), 0);
+    }
+    let records = files(folder.path(), &|name| name.ends_with(".tile")).len();
+    println!("{records} records, {leftovers} leftovers cleared");
+    assert!(records > 0);
+}
+
+/// Prints what hits cost; asserts nothing about time.
+#[test]
+fn val_hits_cost() {
+    runtime().block_on(async {
+        let folder = tempfile::tempdir().unwrap();
+        let library = open(Settings { memory_bytes: 1 << 24, ..settings(Some(folder.path())) });
+        let make = |_: &AtomicBool| Some(tile_of(1, 256));
+        library.tile(key_of(1), Priority::Answer, make).await.unwrap();
+        idle(&library).await;
+        let start = Instant::now();
+        for _ in 0..10_000 {
+            library.tile(key_of(1), Priority::Answer, make).await.unwrap();
+        }
+        println!("memory hit {:?}", start.elapsed() / 10_000);
+        let disk = library.disk.as_ref().unwrap();
+        let start = Instant::now();
+        (0..100).for_each(|_| assert!(disk.read(&key_of(1)).is_some()));
+        println!("disk hit {:?}", start.elapsed() / 100);
+    });
+}

@@ -1,0 +1,254 @@
+//! Samples of ground on a regular grid, and what can be done with them on their way to a client.
+
+use crate::http::Problem;
+
+/// Samples, row 0 in the north; NaN without data.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Samples {
+    /// Rows.
+    pub rows: usize,
+    /// Columns.
+    pub cols: usize,
+    /// Heights, m.
+    pub heights: Vec<f32>,
+    /// Albedo, 0 to 1.
+    pub albedo: Option<Vec<f32>>,
+    /// Share of the cell that rocks cover: 0 or 1 at a point.
+    pub rock: Option<Vec<f32>>,
+    /// Share of the ground that all rocks may cover, 0 to 1.
+    pub rock_potential: Option<Vec<f32>>,
+}
+
+/// A value from four samples, the north-west one at `(0, 0)`, and how far from it the place lies down and right.
+type Rule = fn(&dyn Fn(usize, usize) -> f32, [f64; 2]) -> f32;
+
+/// How samples are thinned.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Thinning {
+    /// The south-west sample of each block.
+    Point,
+    /// The mean of each block; NaN where a sample has no data.
+    Mean,
+}
+
+/// Mirror images.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Flip {
+    /// West becomes east.
+    Horizontal,
+    /// North becomes south.
+    Vertical,
+}
+
+impl Samples {
+    /// Samples without data.
+    pub fn empty(rows: usize, cols: usize) -> Self {
+        Self { rows, cols, heights: vec![f32::NAN; rows * cols], albedo: None, rock: None, rock_potential: None }
+    }
+
+    /// Heights, albedo, rock and rock potential.
+    pub fn fields(&self) -> [Option<&[f32]>; 4] {
+        [Some(&self.heights), self.albedo.as_deref(), self.rock.as_deref(), self.rock_potential.as_deref()]
+    }
+
+    /// Memory, bytes.
+    pub fn bytes(&self) -> u64 {
+        let values: usize = self.fields().into_iter().flatten().map(<[f32]>::len).sum();
+        128 + 4 * values as u64
+    }
+
+    /// True where no sample has data.
+    pub fn is_void(&self) -> bool {
+        self.heights.iter().all(|z| z.is_nan())
+    }
+
+    /// The same samples, each field by `f`.
+    fn each(&self, [rows, cols]: [usize; 2], f: impl Fn(&[f32]) -> Vec<f32>) -> Self {
+        Self {
+            rows,
+            cols,
+            heights: f(&self.heights),
+            albedo: self.albedo.as_deref().map(&f),
+            rock: self.rock.as_deref().map(&f),
+            rock_potential: self.rock_potential.as_deref().map(&f),
+        }
+    }
+
+    /// The samples at other rows and columns: `from(row, col)` tells which one comes there.
+    fn rearranged(&self, [rows, cols]: [usize; 2], from: impl Fn(usize, usize) -> [usize; 2]) -> Self {
+        self.each([rows, cols], |values| {
+            let at = |k: usize| from(k / cols, k % cols);
+            (0..rows * cols).map(|k| values[at(k)[0] * self.cols + at(k)[1]]).collect()
+        })
+    }
+
+    /// Turned counterclockwise by quarters.
+    pub fn turned(self, quarters: u32) -> Self {
+        let (rows, cols) = (self.rows, self.cols);
+        match quarters % 4 {
+            1 => self.rearranged([cols, rows], |r, c| [c, cols - 1 - r]),
+            2 => self.rearranged([rows, cols], |r, c| [rows - 1 - r, cols - 1 - c]),
+            3 => self.rearranged([cols, rows], |r, c| [rows - 1 - c, r]),
+            _ => self,
+        }
+    }
+
+    /// Mirrored.
+    pub fn flipped(self, flip: Flip) -> Self {
+        let (rows, cols) = (self.rows, self.cols);
+        match flip {
+            Flip::Horizontal => self.rearranged([rows, cols], |r, c| [r, cols - 1 - c]),
+            Flip::Vertical => self.rearranged([rows, cols], |r, c| [rows - 1 - r, c]),
+        }
+    }
+
+    /// One sample for each block of `2^m` x `2^m`, counted from the south-west.
+    ///
+    /// # Errors
+    /// A number of rows or columns that the blocks do not fill.
+    pub fn thinned(self, m: u32, by: Thinning) -> Result<Self, Problem> {
+        let side = 1usize << m;
+        if !self.rows.is_multiple_of(side) || !self.cols.is_multiple_of(side) {
+            return Err(Problem::bad_request(format!(
+                "`downsample`: {} x {} samples are no whole number of blocks of {side} x {side}; \
+                 choose `size` as a multiple of {side}",
+                self.cols, self.rows
+            )));
+        }
+        if m == 0 {
+            return Ok(self);
+        }
+        let shape = [self.rows / side, self.cols / side];
+        Ok(match by {
+            Thinning::Point => self.rearranged(shape, |r, c| [side * (r + 1) - 1, side * c]),
+            Thinning::Mean => self.each(shape, |values| {
+                let of_block = |k: usize| {
+                    let (row, col) = (side * (k / shape[1]), side * (k % shape[1]));
+                    let lines =
+                        (row..row + side).flat_map(|r| &values[r * self.cols + col..r * self.cols + col + side]);
+                    (lines.map(|v| f64::from(*v)).sum::<f64>() / (side * side) as f64) as f32
+                };
+                (0..shape[0] * shape[1]).map(of_block).collect()
+            }),
+        })
+    }
+
+    /// A part.
+    pub fn part(&self, [row, col]: [usize; 2], shape: [usize; 2]) -> Self {
+        self.rearranged(shape, |r, c| [row + r, col + c])
+    }
+
+    /// Bilinear values at places counted in samples from the north-west one; rock by the nearest sample. Places lie inside.
+    pub fn between(&self, shape: [usize; 2], place: impl Fn(usize, usize) -> [f64; 2]) -> Self {
+        let made = self.each(shape, |values| self.values_at(values, shape, &place, bilinear));
+        let rock = self.rock.as_deref().map(|values| self.values_at(values, shape, &place, nearest));
+        Self { rock, ..made }
+    }
+
+    /// Without data at some samples.
+    pub fn without(mut self, at: impl Fn(usize) -> bool) -> Self {
+        let fields = [Some(&mut self.heights), self.albedo.as_mut(), self.rock.as_mut(), self.rock_potential.as_mut()];
+        for values in fields.into_iter().flatten() {
+            values.iter_mut().enumerate().filter(|(k, _)| at(*k)).for_each(|(_, v)| *v = f32::NAN);
+        }
+        self
+    }
+
+    fn values_at(
+        &self,
+        values: &[f32],
+        [rows, cols]: [usize; 2],
+        place: impl Fn(usize, usize) -> [f64; 2],
+        rule: Rule,
+    ) -> Vec<f32> {
+        let at = |k: usize| {
+            let [down, right] = place(k / cols, k % cols);
+            let before = |at: f64, count: usize| (at.max(0.0) as usize).min(count.saturating_sub(2));
+            let (r, c) = (before(down, self.rows), before(right, self.cols));
+            rule(&|dr, dc| values[(r + dr) * self.cols + c + dc], [down - r as f64, right - c as f64])
+        };
+        (0..rows * cols).map(at).collect()
+    }
+}
+
+/// Between four samples; one that has no weight need not have data.
+fn bilinear(value: &dyn Fn(usize, usize) -> f32, [down, right]: [f64; 2]) -> f32 {
+    let mix = |a: f64, b: &dyn Fn() -> f64, w: f64| if w == 0.0 { a } else { a + (b() - a) * w };
+    let v = |dr, dc| f64::from(value(dr, dc));
+    let north = || mix(v(0, 0), &|| v(0, 1), right);
+    let south = || mix(v(1, 0), &|| v(1, 1), right);
+    // From the south, as [`sastrugi_numeric::GroundGrid`] does.
+    let up = 1.0 - down;
+    (if up == 0.0 {
+        south()
+    } else if down == 0.0 {
+        north()
+    } else {
+        let (low, high) = (south(), north());
+        low + (high - low) * up
+    }) as f32
+}
+
+fn nearest(value: &dyn Fn(usize, usize) -> f32, [down, right]: [f64; 2]) -> f32 {
+    value(usize::from(down > 0.5), usize::from(right >= 0.5))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn numbered(rows: usize, cols: usize) -> Samples {
+        let heights: Vec<f32> = (0..rows * cols).map(|k| (k * k % 31) as f32).collect();
+        Samples { rock: Some(heights.iter().map(|z| z % 2.0).collect()), heights, ..Samples::empty(rows, cols) }
+    }
+
+    /// Acceptance 14: four quarter turns, and two mirrors, change nothing; a turn carries the east edge to the north.
+    #[test]
+    fn prop_turns_and_mirrors_come_back() {
+        for (rows, cols) in [(1, 1), (3, 5), (4, 4), (1, 7)] {
+            let s = numbered(rows, cols);
+            assert_eq!(s.clone().turned(1).turned(1).turned(1).turned(1), s);
+            assert_eq!(s.clone().turned(1).turned(3), s);
+            assert_eq!(s.clone().turned(2), s.clone().turned(1).turned(1));
+            for flip in [Flip::Horizontal, Flip::Vertical] {
+                assert_eq!(s.clone().flipped(flip).flipped(flip), s);
+            }
+            let turned = s.clone().turned(1);
+            assert_eq!(turned.heights[0], s.heights[cols - 1]);
+            assert_eq!(s.clone().flipped(Flip::Horizontal).flipped(Flip::Vertical), s.turned(2));
+        }
+    }
+
+    /// Acceptance 14: exact on planes, within a rounding of single precision.
+    #[test]
+    fn prop_bilinear_is_exact_on_planes() {
+        let (rows, cols) = (6, 9);
+        let plane = |down: f64, right: f64| 3.0 - 0.25 * down + 0.5 * right;
+        let heights = (0..rows * cols).map(|k| plane((k / cols) as f64, (k % cols) as f64) as f32).collect();
+        let s = Samples { heights, ..Samples::empty(rows, cols) };
+        let place = |r: usize, c: usize| [0.3 + 0.9 * r as f64, 0.1 + 0.77 * c as f64];
+        let made = s.between([5, 10], place);
+        for (k, z) in made.heights.iter().enumerate() {
+            let [down, right] = place(k / 10, k % 10);
+            assert!((f64::from(*z) - plane(down, right)).abs() < 1e-6);
+        }
+    }
+
+    /// A sample itself comes back beside a hole; anything between the two does not.
+    #[test]
+    fn val_holes_stay_holes() {
+        let mut s = numbered(3, 3);
+        s.heights[4] = f32::NAN;
+        assert_eq!(s.between([1, 1], |_, _| [1.0, 0.0]).heights[0], s.heights[3]);
+        assert!(s.between([1, 1], |_, _| [1.0, 0.2]).heights[0].is_nan());
+        assert!(s.clone().thinned(0, Thinning::Mean).unwrap().heights[4].is_nan());
+        assert!(s.thinned(1, Thinning::Mean).is_err());
+    }
+
+    #[test]
+    fn val_blocks_are_thinned_by_point_or_mean() {
+        let s = Samples { heights: (0..16).map(|k| k as f32).collect(), ..Samples::empty(4, 4) };
+        assert_eq!(s.clone().thinned(1, Thinning::Point).unwrap().heights, [4.0, 6.0, 12.0, 14.0]);
+        assert_eq!(s.thinned(1, Thinning::Mean).unwrap().heights, [2.5, 4.5, 10.5, 12.5]);
+    }
+}

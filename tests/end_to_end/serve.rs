@@ -1,0 +1,341 @@
+//! The terrain server: what it answers is what the program makes, whoever asks and however often, and what cannot be answered is refused.
+
+use sastrugi_store::dem;
+use sastrugi_tests::server::Server;
+use sastrugi_tests::{area, sastrugi_in, write};
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::Path;
+
+const WORLD: &str = r#"
+kind = "planetary"
+seed = 11
+size_px = [300, 200]
+cell_m = 0.02
+basic_spacing_m = 0.005
+origin_m = [-1.0, 2.0]
+processes = [
+    { kind = "texture" },
+    { kind = "primary_craters", diameter_max_m = 200.0 },
+    { kind = "rocks", coverage = 0.118 },
+    { kind = "albedo" },
+]
+"#;
+const PATCH: &str = "/v1/collections/world/patch?origin=-1,2&size=300,200&resolution_m=0.02";
+const TILES: &str = "/v1/collections/world/styles";
+
+fn world(folder: &Path) {
+    write(folder, "world.toml", WORLD);
+}
+
+/// Acceptance 14: the patch is that of `terrain`, bit for bit; the second answer is a hit with the same bytes, also after the server was killed; what
+/// is asked for a hundred times at once is made once.
+#[test]
+fn val_patches_are_those_of_the_program() {
+    let folder = area();
+    world(folder.path());
+    let call = sastrugi_in(folder.path(), &["terrain", "world.toml", "-o", "made.tif"]);
+    assert_eq!(call.code, 0, "{}", call.stderr);
+    let made = dem::read(&folder.path().join("made.tif")).unwrap().grid;
+    let albedo = dem::read(&folder.path().join("made.albedo.tif")).unwrap().grid;
+    let mut server = Server::start(folder.path(), &["world.toml", "--library", "tiles"], &[]);
+    let raw = format!("{PATCH}&format=raw");
+    let bodies: Vec<Vec<u8>> = std::thread::scope(|scope| {
+        let asking: Vec<_> = (0..100).map(|_| scope.spawn(|| server.get(&raw))).collect();
+        asking.into_iter().map(|a| a.join().unwrap()).map(|a| (assert_eq!(a.status, 200), a.body).1).collect()
+    });
+    assert!(bodies.iter().all(|body| *body == bodies[0]));
+    let heights = server.get(&raw).floats();
+    assert!(made.values.iter().zip(&heights).all(|(a, b)| (*a as f32).to_bits() == b.to_bits()));
+    // The window lies in 2 x 2 tiles.
+    let library = || server.get("/v1/library").json();
+    assert_eq!(library()["made"], 4, "{}", library());
+    let of_albedo = server.get(&format!("{raw}&field=albedo")).floats();
+    assert!(albedo.values.iter().zip(&of_albedo).all(|(a, b)| *a as f32 == *b));
+    assert_eq!(library()["made"], 4);
+    let file = server.get(PATCH);
+    fs::write(folder.path().join("patch.tif"), &file.body).unwrap();
+    assert_eq!(dem::read(&folder.path().join("patch.tif")).unwrap().grid, made);
+    std::thread::sleep(std::time::Duration::from_millis(300));
+    server.kill();
+    let again = Server::start(folder.path(), &["world.toml", "--library", "tiles"], &[]);
+    assert_eq!(again.get(&raw).body, bodies[0]);
+    let library = again.get("/v1/library").json();
+    assert_eq!((&library["made"], &library["disk_hits"]), (&0.into(), &4.into()), "{library}");
+}
+
+/// A pixel of a map tile is the ground at the middle of its cell, without features narrower than two pixels, at every level.
+#[test]
+fn val_pixels_are_the_ground_at_their_middles() {
+    let folder = area();
+    world(folder.path());
+    let server = Server::start(folder.path(), &["world.toml"], &[]);
+    let described = server.get("/v1/collections/world").json();
+    let grid = &described["tile_grid"];
+    let [west, north] = [0, 1].map(|k| grid["origin_m"][k].as_f64().unwrap());
+    let offset = server.get("/v1/collections/world/xyz/elevation/tilejson.json").json()["offset_m"].as_f64().unwrap();
+    let mut seen = 0;
+    for level in [16, 13, 9, 3, 0] {
+        let step = grid["resolutions_m"][level].as_f64().unwrap();
+        let side = 256.0 * step;
+        let [col, row] = [((3.0 - west) / side) as u32, ((north - 4.0) / side) as u32];
+        let tile = server.get(&format!("{TILES}/elevation/map/tiles/world/{level}/{row}/{col}"));
+        if tile.status == 404 {
+            continue;
+        }
+        let pixels = rgba(&tile.body);
+        for (r, c) in [(0, 0), (17, 200), (128, 128), (255, 3)] {
+            let [red, green, blue, _] = pixels[256 * r + c];
+            let height = offset + 5e-5 * (f64::from(red) * 65536.0 + f64::from(green) * 256.0 + f64::from(blue));
+            let x = west + (256.0 * f64::from(col) + c as f64 + 0.5) * step;
+            let y = north - (256.0 * f64::from(row) + r as f64 + 0.5) * step;
+            let point = server.get(&format!("/v1/collections/world/point?x={x}&y={y}&feature_min_m={}", 2.0 * step));
+            let exact = point.json()["elevation_m"].as_f64().unwrap();
+            // Half a step of the encoding, and single precision.
+            assert!((height - exact).abs() < 2.6e-5 + 1e-7 * exact.abs(), "level {level}: {height} {exact}");
+            seen += 1;
+        }
+        // The same tile by z, x, y.
+        let window = format!(
+            "/v1/collections/world/xyz/elevation/{}/{}/{}.png",
+            8 + level,
+            (128 << level) + col,
+            (127 << level) + row
+        );
+        assert_eq!(server.get(&window).body, tile.body);
+    }
+    assert!(seen >= 12, "{seen}");
+}
+
+fn rgba(png: &[u8]) -> Vec<[u8; 4]> {
+    let mut reader = png::Decoder::new(std::io::Cursor::new(png)).read_info().unwrap();
+    let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
+    reader.next_frame(&mut bytes).unwrap();
+    bytes.chunks_exact(4).map(|p| [p[0], p[1], p[2], p[3]]).collect()
+}
+
+/// What cannot be answered is refused in a sentence, with the status that says whose fault it is.
+#[test]
+fn val_wrong_requests_are_refused() {
+    let folder = area();
+    world(folder.path());
+    fs::write(folder.path().join("secret.txt"), "not for clients").unwrap();
+    let server = Server::start(folder.path(), &["world.toml", "--samples-max", "100000"], &[]);
+    let c = "/v1/collections/world";
+    let long = format!("{c}/patch?{}", "x".repeat(9000));
+    let cases = [
+        (400, format!("{c}/patch")),
+        (400, format!("{c}/patch?origin=0,0")),
+        (400, format!("{c}/patch?origin=0,0&size=0,5")),
+        (400, format!("{c}/patch?origin=0,0&size=2.5,5")),
+        (400, format!("{c}/patch?origin=0,0&center=0,0&size=5,5")),
+        (400, format!("{c}/patch?origin=nan,0&size=5,5")),
+        (400, format!("{c}/patch?origin=0,0&size=5,5&resolution_m=0")),
+        (400, format!("{c}/patch?origin=0,0&size=5,5&rotate=45")),
+        (400, format!("{c}/patch?origin=0,0&size=5,5&downsample=1")),
+        (400, format!("{c}/patch?origin=0,0&size=5,5&phenomena=9")),
+        (400, format!("{c}/patch?origin=0,0&size=5,5&fromat=npy")),
+        (400, format!("{c}/patch?origin=0,0&origin=1,1&size=5,5")),
+        (400, format!("{c}/point?x=1")),
+        (400, format!("{c}/profile?line=0,0")),
+        (400, format!("{c}/profile?line=1,1;1,1")),
+        (404, "/v1/collections/moon".to_owned()),
+        (404, format!("{c}/styles/relief/map/tiles/world/17/0/0")),
+        (404, format!("{c}/styles/relief/map/tiles/world/2/4/0")),
+        (404, format!("{c}/styles/gold/map/tiles/world/2/0/0")),
+        (404, format!("{c}/styles/relief/map/tiles/world/-1/0/0")),
+        (404, format!("{c}/xyz/relief/7/64/63.png")),
+        (404, format!("{c}/tracks/none")),
+        (404, "/v1/jobs/99".to_owned()),
+        (404, "/secret.txt".to_owned()),
+        (404, "/../secret.txt".to_owned()),
+        (404, "/%2e%2e/secret.txt".to_owned()),
+        (404, "/v1/collections/..%2f..%2fetc%2fpasswd".to_owned()),
+        (413, format!("{c}/patch?origin=0,0&size=1000,1000")),
+        (414, long),
+        (422, format!("{c}/patch?origin=1e14,0&size=5,5&resolution_m=0.005")),
+    ];
+    for (status, path) in &cases {
+        let answer = server.get(path);
+        assert_eq!(answer.status, *status, "{path}: {}", String::from_utf8_lossy(&answer.body));
+        assert_eq!(answer.header("content-type"), Some("application/problem+json"), "{path}");
+        assert!(answer.json()["detail"].as_str().unwrap().len() > 10, "{path}");
+    }
+    assert_eq!(server.get(&cases[27].1).json()["samples_max"], 100_000);
+    assert_eq!(server.send("POST", "/v1/jobs", &[], "{").status, 400);
+    assert_eq!(server.send("POST", "/v1/jobs", &[], &" ".repeat(100_000)).status, 413);
+    assert_eq!(server.send("PUT", "/v1/jobs", &[], "").status, 405);
+}
+
+/// Tags, ranges and encodings; a smooth version of the same ground; quarter turns come back.
+#[test]
+fn val_answers_are_named_parted_and_packed() {
+    let folder = area();
+    world(folder.path());
+    let server = Server::start(folder.path(), &["world.toml"], &[]);
+    let whole = server.get(PATCH);
+    let tag = whole.header("etag").unwrap().to_owned();
+    assert_eq!(server.get_with(PATCH, &[&format!("If-None-Match: {tag}")]).status, 304);
+    let part = server.get_with(PATCH, &["Range: bytes=100-199"]);
+    assert_eq!((part.status, part.body.as_slice()), (206, &whole.body[100..200]));
+    assert_eq!(server.get_with(PATCH, &["Range: bytes=99999999-"]).status, 416);
+    let json = server.get_with("/v1/collections", &["Accept-Encoding: gzip"]);
+    assert_eq!(json.header("content-encoding"), Some("gzip"));
+    let raw = |more: &str| server.get(&format!("{PATCH}&format=raw{more}")).floats();
+    let turned = raw("&rotate=90");
+    let plain = raw("");
+    assert!((0..200).all(|r| (0..300).all(|c| plain[300 * r + c] == turned[200 * (299 - c) + r])));
+    let (smooth, bare) = (raw("&phenomena=1"), raw("&phenomena=1,2,4"));
+    assert!(smooth != plain && bare != plain && bare != smooth);
+    assert_eq!(raw("&phenomena=1,2,3,4"), plain);
+    let mean = raw("&downsample=1&method=mean");
+    let first: f64 = [0, 1, 300, 301].iter().map(|k| f64::from(plain[*k])).sum::<f64>() / 4.0;
+    assert!((f64::from(mean[0]) - first).abs() < 1e-6);
+    let point = server.get("/v1/collections/world/point?x=-1&y=2&resolution_m=0.02").json();
+    assert_eq!(point["elevation_m"].as_f64().unwrap() as f32, plain[300 * 199]);
+    let line =
+        server.get("/v1/collections/world/profile?line=-1,2;3,2&samples=201&resolution_m=0.02&feature_min_m=0").json();
+    let profile = line["elevation_m"].as_array().unwrap();
+    assert!((0..201).all(|k| (profile[k].as_f64().unwrap() - f64::from(plain[300 * 199 + k])).abs() < 1e-5));
+    let section = String::from_utf8(server.get("/v1/collections/world/study?origin=-1,2&size=300,200").body).unwrap();
+    let study = format!(
+        "[study]\nname = \"s\"\nseed = 1\ndate = \"2026-11-25\"\nlicense = \"CC-BY-4.0\"\ncreators = [\"x\"]\n\n{section}"
+    );
+    write(folder.path(), "study.toml", &study);
+    let call = sastrugi_in(folder.path(), &["run", "study.toml", "-o", "release", "--quiet"]);
+    assert_eq!(call.code, 0, "{}", call.stderr);
+    let made = dem::read(&folder.path().join("release/terrain/world.tif")).unwrap().grid;
+    assert!(made.values.iter().zip(&plain).all(|(a, b)| *a as f32 == *b));
+}
+
+/// A token, a limit for each client, and the end in good order.
+#[test]
+fn val_the_door_is_kept() {
+    let folder = area();
+    world(folder.path());
+    let mut server =
+        Server::start(folder.path(), &["world.toml", "--per-client", "1"], &[("SASTRUGI_TOKEN", "a-secret")]);
+    assert_eq!(server.get("/v1/collections").status, 401);
+    assert_eq!(server.get_with("/v1/collections", &["Authorization: Bearer wrong"]).status, 401);
+    assert_eq!(server.get_with("/v1/collections", &["Authorization: Bearer a-secret"]).status, 200);
+    assert_eq!(server.get("/v1/collections?token=a-secret").status, 200);
+    assert_eq!((server.get("/").status, server.get("/healthz").status), (200, 200));
+    // A coarse patch of everything takes seconds.
+    let slow = "/v1/collections/world/patch?origin=0,0&size=512,512&resolution_m=5.12&token=a-secret";
+    let busy = std::thread::scope(|scope| {
+        scope.spawn(|| server.get(slow));
+        std::thread::sleep(std::time::Duration::from_millis(200));
+        server.get("/v1/collections?token=a-secret")
+    });
+    assert_eq!((busy.status, busy.header("retry-after")), (429, Some("1")));
+    let metrics = String::from_utf8(server.get("/metrics").body).unwrap();
+    assert!(metrics.contains("sastrugi_requests_total{route=\"/v1/collections\",status=\"401\"} 2"), "{metrics}");
+    assert_eq!(server.terminate(), Some(0));
+}
+
+/// Work ahead: done, listed, cancelled.
+#[test]
+fn val_jobs_make_tiles_ahead() {
+    let folder = area();
+    world(folder.path());
+    let server = Server::start(folder.path(), &["world.toml"], &[]);
+    let order = |bounds: &str| {
+        let body = format!("{{\"collection\": \"world\", \"bounds_m\": {bounds}, \"resolution_m\": 0.02}}");
+        server.send("POST", "/v1/jobs", &["Content-Type: application/json"], &body)
+    };
+    let taken = order("[-1, 2, 5, 6]");
+    assert_eq!((taken.status, taken.header("location")), (202, Some("/v1/jobs/1")));
+    let state = |path: &str, wanted: &str| {
+        for _ in 0..600 {
+            let job = server.get(path).json();
+            if job["state"] == wanted {
+                return job;
+            }
+            std::thread::sleep(std::time::Duration::from_millis(50));
+        }
+        panic!("{path} is not {wanted}: {}", server.get(path).json());
+    };
+    let job = state("/v1/jobs/1", "done");
+    assert_eq!(job["tiles"], job["tiles_made"]);
+    let made = server.get("/v1/library").json()["made"].clone();
+    assert_eq!(server.get(PATCH).status, 200);
+    assert_eq!(server.get("/v1/library").json()["made"], made);
+    assert_eq!(order("[0, 0, 3000, 3000]").status, 202);
+    assert_eq!(server.send("DELETE", "/v1/jobs/2", &[], "").status, 200);
+    state("/v1/jobs/2", "cancelled");
+    assert_eq!(server.send("DELETE", "/v1/jobs/2", &[], "").status, 409);
+    assert_eq!(order("[0, 0, 1e9, 1e9]").status, 413);
+    assert_eq!(order("[5, 0, 1, 1]").status, 400);
+    assert_eq!(server.get("/v1/jobs").json()["jobs"].as_array().unwrap().len(), 2);
+}
+
+/// Ten kills and restarts while clients ask: nothing wrong is ever answered with 200.
+#[test]
+fn val_nothing_half_written_is_served() {
+    let folder = area();
+    world(folder.path());
+    let truth = Server::start(folder.path(), &["world.toml"], &[]);
+    let path = |k: u64| {
+        format!(
+            "/v1/collections/world/patch?origin={},0&size=64,64&resolution_m=0.02&format=raw",
+            1.28 * (k % 40) as f64
+        )
+    };
+    let right: Vec<Vec<u8>> = (0..40).map(|k| truth.get(&path(k)).body).collect();
+    let mut bodies = BTreeSet::new();
+    for kill in 0..10u64 {
+        let mut server =
+            Server::start(folder.path(), &["world.toml", "--library", "tiles", "--memory-bytes", "0"], &[]);
+        for k in 0..(3 * kill + 2) {
+            let answer = server.get(&path(7 * kill + k));
+            assert_eq!(answer.status, 200);
+            assert_eq!(answer.body, right[((7 * kill + k) % 40) as usize]);
+            bodies.insert((7 * kill + k) % 40);
+        }
+        server.kill();
+    }
+    assert!(bodies.len() > 30);
+}
+
+/// The terrains of a release are served with their maps and tracks; their pixels at the finest level are their cells.
+#[test]
+fn val_releases_are_served() {
+    let folder = area();
+    write(folder.path(), "study.toml", &sastrugi_tests::small_study());
+    let call = sastrugi_in(folder.path(), &["run", "study.toml", "-o", "release", "--quiet"]);
+    assert_eq!(call.code, 0, "{}", call.stderr);
+    let server = Server::start(folder.path(), &["release"], &[]);
+    let all = server.get("/v1/collections").json();
+    let collections = all["collections"].as_array().unwrap();
+    assert!(!collections.is_empty());
+    let mut tracks = 0;
+    for collection in collections {
+        let id = collection["id"].as_str().unwrap();
+        let (own, _) = (&collection["tile_grid"], ());
+        let name = id.split_once('.').unwrap().1;
+        let file = ["terrain", "dem", "texture"].map(|stage| folder.path().join(format!("release/{stage}/{name}.tif")));
+        let grid = dem::read(file.iter().find(|f| f.is_file()).unwrap()).unwrap().grid;
+        let g = grid.geometry;
+        let (rows, cols) = (g.rows.min(40), g.cols.min(50));
+        let patch = server.get(&format!(
+            "/v1/collections/{id}/patch?origin={},{}&size={cols},{rows}&format=raw",
+            g.x(0),
+            g.y(g.rows - 1)
+        ));
+        if g.cell[0] == g.cell[1] {
+            let heights = patch.floats();
+            for (r, c) in (0..rows).flat_map(|r| (0..cols).map(move |c| (r, c))) {
+                let (a, b) = (grid.at(g.rows - rows + r, c) as f32, heights[r * cols + c]);
+                assert!(a.to_bits() == b.to_bits() || (a.is_nan() && b.is_nan()), "{id} {r} {c}: {a} {b}");
+            }
+        }
+        let level = own["levels"].as_u64().unwrap() - 1;
+        assert_eq!(server.get(&format!("/v1/collections/{id}/styles/relief/map/tiles/{id}/{level}/0/0")).status, 200);
+        for track in server.get(&format!("/v1/collections/{id}/tracks")).json()["tracks"].as_array().unwrap() {
+            let one = server.get(&format!("/v1/collections/{id}/tracks/{}", track["id"].as_str().unwrap())).json();
+            assert!(one["x_m"].as_array().unwrap().len() > 1);
+            tracks += 1;
+        }
+    }
+    assert!(tracks > 0);
+}
