@@ -8,6 +8,7 @@
 
 mod photoclinometry;
 mod rover;
+mod server;
 mod team;
 
 use sastrugi_tests::{Called, area, called, program, sastrugi_in, small_study, write};

@@ -1,0 +1,15 @@
+//! What independent clients see of the terrain server.
+
+use super::{called, python};
+use sastrugi_tests::server::Server;
+use std::process::Command;
+
+/// GDAL reads the COG by ranges and map tiles by its TMS driver, numpy and Pillow the other formats: all the same ground.
+#[test]
+fn val_clients_read_the_server() {
+    let Some(python) = python() else { return };
+    let root = sastrugi_fixtures::workspace_root();
+    let server = Server::start(&root, &["fixtures/worlds/planet.toml"], &[]);
+    let call = called(Command::new(python).arg(root.join("tests/interop/check_server.py")).arg(&server.address));
+    assert_eq!(call.code, 0, "{}{}", call.stdout, call.stderr);
+}
