@@ -999,7 +999,7 @@ pub struct Serve {
     /// Longest time of a request, s.
     #[arg(long, value_name = "S", default_value_t = 60, value_parser = clap::value_parser!(u64).range(1..=3600))]
     pub request_seconds: u64,
-    /// Origin whose pages may use the server, as https://example.org; may be given several times.
+    /// Origin whose pages may use the server, as `https://example.org`; may be given several times.
     #[arg(long, value_name = "ORIGIN")]
     pub cors: Vec<String>,
     /// Log every request on stderr; RUST_LOG says more finely what is logged.

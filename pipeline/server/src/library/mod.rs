@@ -1,6 +1,6 @@
 //! Tiles that were made once, in memory and on disk; each is made once however many ask for it.
 //!
-//! A request is answered from memory, from a record on disk ([`disk`]), or by a making on a worker thread ([`pool`]). All that ask for one tile
+//! A request is answered from memory, from a record on disk (`disk`), or by a making on a worker thread (`pool`). All that ask for one tile
 //! while it is on its way share one flight. The flight belongs to none of them: whoever leaves, the others are served, and when the last has
 //! left the making is told to stop.
 
