@@ -151,7 +151,7 @@ pub fn write<'a>(
     Ok(notes)
 }
 
-/// The bytes that [`write`] would put into a file of that name, and sentences on what the format lost.
+/// The bytes that [`write()`] would put into a file of that name, and sentences on what the format lost.
 ///
 /// # Errors
 /// [`DemError::Unfit`] when the format cannot hold the grid.
