@@ -14,6 +14,9 @@ use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+/// Name of the heights in metres beside a DEM that is in degrees.
+const METRIC: &str = "metric";
+
 /// A world, at every place of which any patch can be made.
 #[derive(Clone, Debug)]
 pub struct ServedWorld {
@@ -171,7 +174,8 @@ fn rasters(release: &Release) -> Result<Vec<ServedRaster>, Error> {
             content.push(artifact.sha256.clone());
             sources.extend(artifact.origin.sources.iter().cloned());
         }
-        let Some(heights) = heights else { continue };
+        // A DEM in degrees is studied, and served, in metres.
+        let Some(heights) = maps.remove(METRIC).or(heights) else { continue };
         let measured: Vec<&Source> = manifest.sources.iter().filter(|s| sources.contains(&s.id)).collect();
         let license = measured.iter().find_map(|s| s.license.clone()).unwrap_or_else(|| manifest.license.clone());
         let credit = measured.iter().find_map(|s| s.attribution.clone());
