@@ -65,6 +65,8 @@ pub fn serve(args: &Serve, common: &Common) -> Verdict {
             per_client: args.per_client,
             connections: args.connections,
             request: Duration::from_secs(args.request_seconds),
+            // Half of what the cores can do in that time: the expectation is rough, and clients share them.
+            work_s: 0.5 * args.request_seconds as f64 * workers as f64,
             ..defaults
         },
         token,

@@ -32,6 +32,8 @@ const WORLDS: usize = 32;
 const LOOK: usize = 64;
 /// A quotient this near to a whole number is that number.
 const WHOLE: f64 = 1e-6;
+/// Most processor time that a tile may be expected to take, s; the craters and rocks of such a tile hold up to 3 GB.
+const TILE_SECONDS: f64 = 10.0;
 
 /// Which processes act.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Default)]
@@ -252,6 +254,8 @@ pub struct Maker {
     pub library: Arc<Library>,
     /// Whether somebody waits.
     pub priority: Priority,
+    /// Most processor time that all tiles of one request may be expected to take, s.
+    pub seconds_max: f64,
 }
 
 impl World {
@@ -287,7 +291,8 @@ impl World {
             version.phenomena.name(),
             version.feature_min_m
         ));
-        let world = self.world(&version.phenomena).map_err(|e| Problem::internal(e.to_string()))?;
+        let world = self.made_of(&version.phenomena)?;
+        self.check_seconds(&world, &window, version.feature_min_m, [1.0, TILE_SECONDS])?;
         let feature_min_m = version.feature_min_m;
         let make = move |cancel: &std::sync::atomic::AtomicBool| {
             let request = Request { window, feature_min_m, cancel: Some(cancel) };
@@ -297,6 +302,47 @@ impl World {
             Unavailable::Busy => Problem::unavailable("as many tiles wait to be made as may wait; try again soon"),
             Unavailable::Failed(_) => Problem::internal(e.to_string()),
         })
+    }
+
+    /// The world of some of its processes.
+    fn made_of(&self, phenomena: &Phenomena) -> Result<Arc<planetary::World>, Problem> {
+        self.world(phenomena).map_err(|e| Problem::internal(e.to_string()))
+    }
+
+    /// Refuses tiles of the lattice that are expected to take too long: all of them together, or one.
+    ///
+    /// # Errors
+    /// A sentence with a `feature_min_m` that would do.
+    pub fn check_work(&self, zoom: u32, tiles: u64, version: &Version, seconds_max: f64) -> Result<(), Problem> {
+        let world = self.made_of(&version.phenomena)?;
+        let window = Window { zoom, west: 0, south: 0, cols: TILE, rows: TILE, centred: false };
+        self.check_seconds(&world, &window, version.feature_min_m, [1.0, TILE_SECONDS])?;
+        self.check_seconds(&world, &window, version.feature_min_m, [tiles as f64, seconds_max])
+    }
+
+    /// Refuses a number of tiles like a window that are expected to take longer than a limit on one core.
+    fn check_seconds(
+        &self,
+        world: &planetary::World,
+        window: &Window,
+        feature_min_m: f64,
+        [tiles, limit_s]: [f64; 2],
+    ) -> Result<(), Problem> {
+        let expected_s = |feature_min_m: f64| {
+            tiles * world.expected_seconds(&Request { window: *window, feature_min_m, cancel: None })
+        };
+        let wanted_s = expected_s(feature_min_m);
+        if wanted_s <= limit_s {
+            return Ok(());
+        }
+        let mut wider = (0..64).map(|k| self.step_m(window.zoom) * (1u64 << k) as f64).filter(|m| *m > feature_min_m);
+        let advice = wider.find(|m| expected_s(*m) <= limit_s).map_or_else(String::new, |m| {
+            format!(", or `feature_min_m={m}` to leave out craters and rocks up to that width")
+        });
+        let detail = format!(
+            "this takes about {wanted_s:.0} s of processor time; the limit is {limit_s:.0} s. Ask for a smaller area{advice}"
+        );
+        Err(Problem::too_large(detail, "processor_seconds_max", limit_s as u64))
     }
 
     /// The tiles that a window of the lattice lies in, as `(column, row)` of tiles.
@@ -373,8 +419,10 @@ impl World {
                 "the world ends {end:.3e} m from its origin; ask for a nearer place"
             )));
         }
+        let places = Self::tiles_of(first, shape);
+        self.check_work(zoom, places.len() as u64, version, maker.seconds_max)?;
         let mut tiles = JoinSet::new();
-        for place in Self::tiles_of(first, shape) {
+        for place in places {
             let (world, maker, version) = (Arc::clone(self), maker.clone(), version.clone());
             tiles.spawn(async move { (place, world.lattice_tile(&maker, zoom, place, &version).await) });
         }

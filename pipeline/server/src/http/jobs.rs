@@ -165,6 +165,7 @@ impl Area {
         }
         let phenomena: Phenomena = world.choose(order.phenomena.clone())?;
         let version = Version { phenomena, feature_min_m: order.feature_min_m };
+        world.check_work(zoom, tiles, &version, f64::INFINITY)?;
         Ok(Self { world: Arc::clone(world), zoom, first, count, version })
     }
 
@@ -190,7 +191,7 @@ pub async fn order(State(service): State<Arc<Service>>, pairs: Pairs, body: Byte
 
 /// Makes the tiles of a job, a few at a time.
 async fn work(service: Arc<Service>, job: Arc<Job>, area: Area) {
-    let maker = Maker { library: Arc::clone(&service.library), priority: Priority::Background };
+    let maker = Maker { priority: Priority::Background, seconds_max: f64::INFINITY, ..service.maker() };
     let area = Arc::new(area);
     let mut under_way = tokio::task::JoinSet::new();
     let mut places = area.places();

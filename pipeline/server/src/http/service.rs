@@ -18,6 +18,8 @@ use std::time::Duration;
 pub struct Limits {
     /// Most samples of a patch.
     pub samples: u64,
+    /// Most processor time that a request may be expected to take, s.
+    pub work_s: f64,
     /// Most tiles of a job.
     pub job_tiles: u64,
     /// Most requests of one client under way.
@@ -36,6 +38,7 @@ impl Default for Limits {
     fn default() -> Self {
         Self {
             samples: 1 << 22,
+            work_s: 40.0,
             job_tiles: 1 << 20,
             per_client: 256,
             connections: 2048,
@@ -80,7 +83,7 @@ impl Service {
 
     /// Makes tiles for somebody who waits.
     pub fn maker(&self) -> Maker {
-        Maker { library: Arc::clone(&self.library), priority: Priority::Answer }
+        Maker { library: Arc::clone(&self.library), priority: Priority::Answer, seconds_max: self.limits.work_s }
     }
 
     /// Samples `step_m` apart, the south-west one at `origin_m`; bilinear between those that there are.

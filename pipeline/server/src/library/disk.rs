@@ -94,6 +94,11 @@ impl Disk {
         self.folder.join(&name[..2]).join(format!("{name}.{ENDING}"))
     }
 
+    /// Whether there is a record of a key, whole or not.
+    pub fn has(&self, key: &TileKey) -> bool {
+        self.path(key).is_file()
+    }
+
     /// The tile of a key, if its record is there, whole and undamaged.
     pub fn read(&self, key: &TileKey) -> Option<Samples> {
         let path = self.path(key);

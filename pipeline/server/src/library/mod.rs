@@ -1,7 +1,7 @@
 //! Tiles that were made once, in memory and on disk; each is made once however many ask for it.
 //!
-//! A request is answered from memory, from a record on disk (`disk`), or by a making on a worker thread (`pool`). All that ask for one tile
-//! while it is on its way share one flight. The flight belongs to none of them: whoever leaves, the others are served, and when the last has
+//! A request is answered from memory, from a record on disk (`disk`), or by generating the tile on a worker thread (`pool`). Records are read
+//! by threads of their own, so that they do not queue behind tiles that take long. All that ask for one tile while it is on its way share one flight. The flight belongs to none of them: whoever leaves, the others are served, and when the last has
 //! left the making is told to stop.
 
 mod disk;
@@ -23,6 +23,11 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use tokio::sync::watch;
+
+/// Threads that read records.
+const READERS: usize = 4;
+/// Most records that wait for a reader.
+const READS: usize = 4096;
 
 /// What a tile is, as text that names all that its samples depend on. Its name is the hash of that text.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -151,7 +156,8 @@ pub struct Library {
     disk: Option<Disk>,
     flights: Mutex<HashMap<[u8; 32], Flight>>,
     flown: AtomicU64,
-    pool: Pool,
+    workers: Pool,
+    readers: Pool,
     counts: Counts,
 }
 
@@ -169,7 +175,8 @@ impl Library {
             disk,
             flights: Mutex::default(),
             flown: AtomicU64::new(0),
-            pool: Pool::new(settings.workers, settings.queue),
+            workers: Pool::new("tiles", settings.workers, settings.queue),
+            readers: Pool::new("records", READERS, READS),
             counts: Counts::default(),
         }))
     }
@@ -216,9 +223,13 @@ impl Library {
         }
         if let Some(flight) = flights.get_mut(&digest) {
             flight.waiters += 1;
+            if priority == Priority::Answer {
+                self.workers.promote(&flight.cancel);
+            }
             let waiter = Waiter { library: Arc::clone(self), digest, number: flight.number };
             return Ok(Boarded::Waiting(waiter, flight.landed.clone()));
         }
+        let pool = if self.disk.as_ref().is_some_and(|disk| disk.has(&key)) { &self.readers } else { &self.workers };
         let number = self.flown.fetch_add(1, Ordering::Relaxed);
         let cancel = Arc::new(AtomicBool::new(false));
         let (land, landed) = watch::channel(None);
@@ -228,7 +239,7 @@ impl Library {
                 library.fly(&key, number, &flag, make, &land);
             }
         };
-        self.pool.push(priority, Arc::clone(&cancel), Box::new(fly)).map_err(|_| Unavailable::Busy)?;
+        pool.push(priority, Arc::clone(&cancel), Box::new(fly)).map_err(|_| Unavailable::Busy)?;
         flights.insert(digest, Flight { number, waiters: 1, cancel, landed: landed.clone() });
         Ok(Boarded::Waiting(Waiter { library: Arc::clone(self), digest, number }, landed))
     }
@@ -295,15 +306,15 @@ impl Library {
             memory_hits: get(&self.counts.memory_hits),
             disk_hits: get(&self.counts.disk_hits),
             made: get(&self.counts.made),
-            cancelled: get(&self.counts.cancelled) + self.pool.dropped(),
+            cancelled: get(&self.counts.cancelled) + self.workers.dropped() + self.readers.dropped(),
             failed: get(&self.counts.failed),
             damaged,
             evicted,
             unwritten,
             disk_bytes,
             memory_bytes: self.memory.weight(),
-            queued: self.pool.queued() as u64,
-            running: self.pool.running(),
+            queued: (self.workers.queued() + self.readers.queued()) as u64,
+            running: self.workers.running() + self.readers.running(),
         }
     }
 

@@ -72,8 +72,8 @@ impl Shared {
 }
 
 impl Pool {
-    /// `workers` threads; at most `limit` works wait in each of two queues.
-    pub fn new(workers: usize, limit: usize) -> Self {
+    /// `workers` threads, called `name`; at most `limit` works wait in each of two queues.
+    pub fn new(name: &str, workers: usize, limit: usize) -> Self {
         let shared = Arc::new(Shared {
             queue: Mutex::default(),
             changed: Condvar::new(),
@@ -88,7 +88,7 @@ impl Pool {
                     shared.running.fetch_sub(1, Ordering::Relaxed);
                 }
             };
-            let started = std::thread::Builder::new().name(format!("tiles-{number}")).spawn(run);
+            let started = std::thread::Builder::new().name(format!("{name}-{number}")).spawn(run);
             if let Err(error) = started {
                 tracing::warn!(%error, "a worker could not be started");
             }
@@ -117,6 +117,15 @@ impl Pool {
         line.push_back(Waiting { cancel, work });
         self.shared.changed.notify_one();
         Ok(())
+    }
+
+    /// Puts waiting background work, known by its flag, in line with the answers: somebody now waits for it.
+    pub fn promote(&self, cancel: &Arc<AtomicBool>) {
+        let mut queue = self.shared.queue();
+        let place = queue.background.iter().position(|waiting| Arc::ptr_eq(&waiting.cancel, cancel));
+        if let Some(waiting) = place.and_then(|place| queue.background.remove(place)) {
+            queue.answers.push_back(waiting);
+        }
     }
 
     /// How many wait.

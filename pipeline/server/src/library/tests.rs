@@ -361,3 +361,63 @@ fn val_hits_cost() {
         println!("disk hit {:?}", start.elapsed() / 100);
     });
 }
+
+/// A library whose only worker waits for the sender.
+async fn busy(folder: Option<&Path>) -> (Arc<Library>, mpsc::Sender<()>) {
+    let library = open(Settings { workers: 1, ..settings(folder) });
+    let (go, wait) = mpsc::channel::<()>();
+    let blocker = Arc::clone(&library);
+    tokio::spawn(async move {
+        let make = move |_: &AtomicBool| wait.recv().ok().map(|()| tile_of(0, 8));
+        blocker.tile(key_of(0), Priority::Answer, make).await
+    });
+    until(|| library.statistics().running == 1).await;
+    (library, go)
+}
+
+/// A tile that waits to be made ahead is made first once somebody waits for it.
+#[test]
+fn val_an_answer_overtakes_what_is_made_ahead() {
+    runtime().block_on(async {
+        let (library, go) = busy(None).await;
+        let order = Arc::new(Mutex::new(Vec::new()));
+        let request = |number: u64, priority: Priority| {
+            let (library, order) = (Arc::clone(&library), Arc::clone(&order));
+            tokio::spawn(async move {
+                let make = move |_: &AtomicBool| {
+                    order.lock().unwrap().push(number);
+                    Some(tile_of(number, 8))
+                };
+                library.tile(key_of(number), priority, make).await.unwrap()
+            })
+        };
+        let mut all = Vec::new();
+        for number in 1..4 {
+            all.push(request(number, Priority::Background));
+            until(|| library.statistics().queued == number).await;
+        }
+        all.push(request(3, Priority::Answer));
+        until(|| library.flights().get(&key_of(3).digest).is_some_and(|f| f.waiters == 2)).await;
+        go.send(()).unwrap();
+        for one in all {
+            one.await.unwrap();
+        }
+        assert_eq!(*order.lock().unwrap(), [3, 1, 2]);
+    });
+}
+
+/// Records are read while every worker is busy.
+#[test]
+fn val_records_do_not_wait_for_workers() {
+    let folder = tempfile::tempdir().unwrap();
+    runtime().block_on(async {
+        let library = open(settings(Some(folder.path())));
+        ask(&library, 5).await;
+        idle(&library).await;
+        let (library, go) = busy(Some(folder.path())).await;
+        let read = library.tile(key_of(5), Priority::Answer, |_| panic!("made again")).await.unwrap();
+        assert_eq!(*read, tile_of(5, 8));
+        assert_eq!((library.statistics().disk_hits, library.statistics().made), (1, 0));
+        go.send(()).unwrap();
+    });
+}

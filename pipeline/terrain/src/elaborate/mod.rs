@@ -411,7 +411,7 @@ impl Generator for Elaborate {
     }
 
     fn seconds(&self) -> f64 {
-        planetary::seconds(&self.window, &self.work)
+        planetary::seconds(self.window.len(), self.work.visits)
     }
 
     fn notes(&self) -> Vec<String> {

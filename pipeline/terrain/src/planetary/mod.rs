@@ -79,6 +79,11 @@ const BYTES_PER_TILE: u64 = 1 << 20;
 const TILES_AT_WORK: usize = 64;
 
 impl World {
+    /// Rough time of [`World::patch_for`] on one core, s.
+    pub fn expected_seconds(&self, request: &Request<'_>) -> f64 {
+        seconds(request.window.len(), self.expected_visits(&request.window, request.feature_min_m))
+    }
+
     /// A patch, made in tiles side by side.
     pub fn tiled_patch(&self, window: &Window) -> Patch {
         let tiles: Vec<(usize, usize)> =
@@ -131,8 +136,8 @@ fn widest_tile(window: &Window) -> Window {
 }
 
 /// Rough time of a patch on one core, s.
-pub(crate) fn seconds(window: &Window, work: &Work) -> f64 {
-    SECONDS_PER_SAMPLE * window.len() as f64 + SECONDS_PER_VISIT * work.visits
+pub(crate) fn seconds(samples: usize, visits: f64) -> f64 {
+    SECONDS_PER_SAMPLE * samples as f64 + SECONDS_PER_VISIT * visits
 }
 
 /// Peak memory of making a patch and of its grids, bytes.
@@ -192,7 +197,7 @@ impl Generator for Planetary {
     }
 
     fn seconds(&self) -> f64 {
-        seconds(&self.window, &self.work)
+        seconds(self.window.len(), self.work.visits)
     }
 
     fn notes(&self) -> Vec<String> {

@@ -235,7 +235,7 @@ pub fn window_in_reach(processes: &[RawProcess], spacing_m: f64, window: &Window
     // How many there are does not depend on the seed.
     let world = assemble::world(processes, spacing_m, 0, &Streams::for_seed(0, "terrain"), None);
     let tile = widest_tile(window);
-    let visits = world.expected_work(&tile) * tiles(window) as f64;
+    let visits = world.expected_visits(&tile, 0.0) * tiles(window) as f64;
     if visits <= OBJECTS_MAX {
         return Ok(Work { tile_objects: world.expected_objects(&tile), visits });
     }

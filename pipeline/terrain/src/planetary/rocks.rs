@@ -335,9 +335,10 @@ impl Rocks {
         (zoom, i, j)
     }
 
-    /// Expected number of rocks and diamonds looked at for a window.
-    pub fn work(&self, window: &Window) -> f64 {
-        self.bins.iter().map(|bin| (1.0 + bin.mean) * window.diamonds(bin.zoom, self.bin_reach(bin))).sum()
+    /// Expected number of rocks and diamonds that [`Self::find`] looks at.
+    pub fn work(&self, window: &Window, diameter_min_m: f64) -> f64 {
+        let wide = self.bins.iter().filter(|bin| bin.widest_m() > diameter_min_m);
+        wide.map(|bin| (1.0 + bin.mean) * window.diamonds(bin.zoom, self.bin_reach(bin))).sum()
     }
 
     /// Expected number of rocks found for a window, were each as wide as the widest of its bin and did all candidates stay.

@@ -153,12 +153,12 @@ impl World {
         self.populations().map(|p| p.held(&near)).sum::<f64>() + rocks
     }
 
-    /// Expected number of craters and rocks that a patch draws, and of the places where it looks for them; time goes with it and
-    /// with the number of points.
-    pub fn expected_work(&self, window: &Window) -> f64 {
+    /// Expected number of craters and rocks wider than `feature_min_m` that a patch draws, and of the places where it looks for them; time
+    /// goes with it and with the number of points.
+    pub fn expected_visits(&self, window: &Window, feature_min_m: f64) -> f64 {
         let near = self.near(window);
-        let rocks = self.rocks.as_ref().map_or(0.0, |(rocks, _)| rocks.work(window));
-        self.populations().map(|p| p.work(&near)).sum::<f64>() + rocks
+        let rocks = self.rocks.as_ref().map_or(0.0, |(rocks, _)| rocks.work(window, feature_min_m));
+        self.populations().map(|p| p.work(&near, feature_min_m)).sum::<f64>() + rocks
     }
 
     fn populations(&self) -> impl Iterator<Item = &dyn Population> {

@@ -94,7 +94,7 @@ pub trait Population: Send + Sync {
     fn find(&self, near: &Near<'_>, diameter_min_m: f64, families: &Families, found: &mut Vec<Crater>);
 
     /// Expected number of craters and diamonds that [`Self::find`] looks at.
-    fn work(&self, near: &Near<'_>) -> f64;
+    fn work(&self, near: &Near<'_>, diameter_min_m: f64) -> f64;
 
     /// Expected number of craters that it holds in memory, not below the true one.
     fn held(&self, near: &Near<'_>) -> f64;
@@ -225,8 +225,8 @@ impl Population for PowerLaw {
         self.visit(near, EJECTA_RADII, diameter_min_m, |crater| found.push(crater));
     }
 
-    fn work(&self, near: &Near<'_>) -> f64 {
-        self.work_of_visit(near, EJECTA_RADII, 0.0, 1.0)
+    fn work(&self, near: &Near<'_>, diameter_min_m: f64) -> f64 {
+        self.work_of_visit(near, EJECTA_RADII, diameter_min_m, 1.0)
     }
 
     fn held(&self, near: &Near<'_>) -> f64 {
@@ -271,6 +271,11 @@ impl SecondaryParameters {
     fn reach_radii(&self) -> f64 {
         self.ring_radii[1] + EJECTA_RADII * self.largest_ratio
     }
+
+    /// The primaries that may have a secondary wider than `diameter_min_m` are wider than this, m.
+    fn parent_min_m(&self, diameter_min_m: f64) -> f64 {
+        self.primary_min_m.max(diameter_min_m / self.largest_ratio)
+    }
 }
 
 impl Secondaries {
@@ -310,8 +315,7 @@ impl Secondaries {
 impl Population for Secondaries {
     fn find(&self, near: &Near<'_>, diameter_min_m: f64, families: &Families, found: &mut Vec<Crater>) {
         let p = &self.parameters;
-        let parent_min_m = p.primary_min_m.max(diameter_min_m / p.largest_ratio);
-        self.primaries.visit(near, p.reach_radii(), parent_min_m, |primary| {
+        self.primaries.visit(near, p.reach_radii(), p.parent_min_m(diameter_min_m), |primary| {
             let (_, bin, j, i, n, _) = primary.place;
             let key = (self.process, bin, j, i, n, 0);
             let family = families.borrow_mut().entry(key).or_insert_with(|| self.family(&primary)).clone();
@@ -320,9 +324,9 @@ impl Population for Secondaries {
         });
     }
 
-    fn work(&self, near: &Near<'_>) -> f64 {
+    fn work(&self, near: &Near<'_>, diameter_min_m: f64) -> f64 {
         let p = &self.parameters;
-        self.primaries.work_of_visit(near, p.reach_radii(), p.primary_min_m, 1.0 + f64::from(p.count))
+        self.primaries.work_of_visit(near, p.reach_radii(), p.parent_min_m(diameter_min_m), 1.0 + f64::from(p.count))
     }
 
     fn held(&self, near: &Near<'_>) -> f64 {

@@ -1,7 +1,8 @@
 //! What a server asks for: samples in the middle of cells, without narrow features, of some of the processes, and no longer.
 
 use super::*;
-use crate::planetary::world::Request;
+use crate::planetary::craters::population::{Families, Near};
+use crate::planetary::world::{Request, Step};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
@@ -113,4 +114,26 @@ fn val_a_patch_can_be_stopped() {
     });
     println!("stopped after {:.1} ms", 1e3 * ended.as_secs_f64());
     assert!(ended < Duration::from_secs(2));
+}
+
+/// What is looked at on the way to a patch, by count: no fewer than the craters and rocks found, and fewer the wider they must be.
+#[test]
+fn val_expected_visits_follow_the_bound() {
+    let whole = world(everything(), 7);
+    let area = window(4, 0, 0, 200, 200);
+    let mut last = f64::INFINITY;
+    for bound_m in [0.0, 0.3, 1.0, 5.0, 40.0, 1e5] {
+        let visits = whole.expected_visits(&area, bound_m);
+        let near = Near { window: &area, margin: 0.0, cancel: None };
+        let mut found = Vec::new();
+        for step in &whole.steps {
+            let Step::Bombardment(b) = step else { continue };
+            b.populations.iter().for_each(|p| p.find(&near, bound_m, &Families::default(), &mut found));
+        }
+        let rocks = whole.rocks.as_ref().unwrap().0.find(&area, bound_m, None, |_| 0.6).len();
+        println!("wider than {bound_m} m: {} found, {visits:.0} visits expected", found.len() + rocks);
+        assert!(visits >= (found.len() + rocks) as f64 && visits < last);
+        last = visits;
+    }
+    assert_eq!(last, 0.0);
 }
