@@ -5,6 +5,7 @@ use sastrugi_tests::server::Server;
 use sastrugi_tests::{area, sastrugi_in, write};
 use std::collections::BTreeSet;
 use std::fs;
+use std::io::{Read, Write};
 use std::path::Path;
 
 const WORLD: &str = r#"
@@ -161,10 +162,73 @@ fn val_wrong_requests_are_refused() {
         assert_eq!(answer.header("content-type"), Some("application/problem+json"), "{path}");
         assert!(answer.json()["detail"].as_str().unwrap().len() > 10, "{path}");
     }
-    assert_eq!(server.get(&cases[27].1).json()["samples_max"], 100_000);
-    assert_eq!(server.send("POST", "/v1/jobs", &[], "{").status, 400);
-    assert_eq!(server.send("POST", "/v1/jobs", &[], &" ".repeat(100_000)).status, 413);
+    let post = |media: &str, body: &str| {
+        let answer = server.send("POST", "/v1/jobs", &[&format!("Content-Type: {media}")], body);
+        assert_eq!(answer.header("content-type"), Some("application/problem+json"), "{body}");
+        answer.status
+    };
+    let json = "application/json";
+    assert_eq!((post(json, "{"), post(json, "[\"world\", [0, 0, 1, 1]]"), post(json, "{\"x\": 1}")), (400, 400, 400));
+    assert_eq!(post(json, &" ".repeat(100_000)), 413);
+    // What pages of other sites may send unasked.
+    assert_eq!(post("text/plain", "{\"collection\": \"world\", \"bounds_m\": [0, 0, 1, 1]}"), 415);
     assert_eq!(server.send("PUT", "/v1/jobs", &[], "").status, 405);
+    assert_eq!(server.get_with("/v1", &["Host: evil.example"]).status, 400);
+    let called = |host: &str| {
+        let mut stream = std::net::TcpStream::connect(&server.address).unwrap();
+        write!(stream, "GET /v1 HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\r\n").unwrap();
+        let mut text = String::new();
+        stream.read_to_string(&mut text).unwrap();
+        text[9..12].to_owned()
+    };
+    assert_eq!((called("evil.example"), called("evil.example:80")), ("421".to_owned(), "421".to_owned()));
+    assert_eq!((called("localhost:8080"), called("[::1]:8080")), ("200".to_owned(), "200".to_owned()));
+}
+
+/// Work that would take too long is refused beforehand, with a bound on features that would do; and that one does.
+#[test]
+fn val_too_much_work_is_refused_with_a_way_out() {
+    let folder = area();
+    world(folder.path());
+    let server = Server::start(folder.path(), &["world.toml"], &[]);
+    for window in ["size=256,256&resolution_m=40.96", "size=5000,1&resolution_m=5.12", "size=1000000,1"] {
+        let path = format!("/v1/collections/world/patch?origin=0,0&{window}&format=raw");
+        let refused = server.get(&path);
+        let detail = refused.json()["detail"].as_str().unwrap().to_owned();
+        assert_eq!(refused.status, 413, "{window}: {detail}");
+        let Some((_, bound)) = detail.split_once("feature_min_m=") else { continue };
+        let bound = bound.split('`').next().unwrap();
+        assert_eq!(server.get(&format!("{path}&feature_min_m={bound}")).status, 200, "{detail}");
+    }
+    // A point of the same ground costs little.
+    assert_eq!(server.get("/v1/collections/world/point?x=0&y=0&resolution_m=5.12").status, 200);
+}
+
+/// What a request asks for when it leaves something unsaid is part of what its answer is kept by: two files of one world are two.
+#[test]
+fn val_worlds_of_other_cells_are_others() {
+    let folder = area();
+    world(folder.path());
+    write(folder.path(), "coarse.toml", &WORLD.replace("cell_m = 0.02", "cell_m = 0.04"));
+    let server = Server::start(folder.path(), &["world.toml", "coarse.toml"], &[]);
+    let patch = |id: &str, more: &str| {
+        server.get(&format!("/v1/collections/{id}/patch?origin=0,4&size=50,40&format=raw{more}"))
+    };
+    let (fine, coarse) = (patch("world", ""), patch("coarse", ""));
+    assert_ne!((&fine.body, fine.header("etag")), (&coarse.body, coarse.header("etag")));
+    assert_eq!(coarse.header("grid-resolution-m"), Some("0.04"));
+    assert_eq!(coarse.header("grid-origin-m"), Some("0.0,4.0"));
+    assert_eq!(patch("world", "&resolution_m=0.04").body, coarse.body);
+    assert_eq!(patch("coarse", "&rotate=90").header("grid-origin-m"), None);
+    // The same in other words.
+    let (a, b) = (patch("world", "&resolution_m=0.02"), patch("world", "&resolution_m=2e-2&rotate=0"));
+    assert_eq!((a.header("etag"), fine.header("etag")), (b.header("etag"), a.header("etag")));
+    let between = server.get("/v1/collections/world/study?origin=0.001,0.0123&size=50,40&resolution_m=0.013");
+    assert_eq!(between.status, 400);
+    let scale = patch("world", "&field=albedo").status;
+    assert_eq!(scale, 200);
+    let png = server.get("/v1/collections/world/patch?origin=0,4&size=50,40&format=png&field=albedo");
+    assert!(png.header("grid-note").unwrap().starts_with("values are "), "{}", png.head);
 }
 
 /// Tags, ranges and encodings; a smooth version of the same ground; quarter turns come back.
@@ -175,12 +239,17 @@ fn val_answers_are_named_parted_and_packed() {
     let server = Server::start(folder.path(), &["world.toml"], &[]);
     let whole = server.get(PATCH);
     let tag = whole.header("etag").unwrap().to_owned();
-    assert_eq!(server.get_with(PATCH, &[&format!("If-None-Match: {tag}")]).status, 304);
+    let held = |tag: &str| server.get_with(PATCH, &[&format!("If-None-Match: {tag}")]);
+    assert_eq!((held(&tag).status, held(&tag).header("etag")), (304, Some(tag.as_str())));
+    assert_eq!((held("*").status, held(&tag.replace("\"", "")).status), (200, 200));
     let part = server.get_with(PATCH, &["Range: bytes=100-199"]);
     assert_eq!((part.status, part.body.as_slice()), (206, &whole.body[100..200]));
-    assert_eq!(server.get_with(PATCH, &["Range: bytes=99999999-"]).status, 416);
+    let beyond = server.get_with(PATCH, &["Range: bytes=99999999-"]);
+    assert_eq!((beyond.status, beyond.header("content-type")), (416, Some("application/problem+json")));
+    assert_eq!(beyond.header("content-range").unwrap(), format!("bytes */{}", whole.body.len()));
     let json = server.get_with("/v1/collections", &["Accept-Encoding: gzip"]);
     assert_eq!(json.header("content-encoding"), Some("gzip"));
+    packed(&server);
     let raw = |more: &str| server.get(&format!("{PATCH}&format=raw{more}")).floats();
     let turned = raw("&rotate=90");
     let plain = raw("");
@@ -208,7 +277,67 @@ fn val_answers_are_named_parted_and_packed() {
     assert!(made.values.iter().zip(&plain).all(|(a, b)| *a as f32 == *b));
 }
 
-/// A token, a limit for each client, and the end in good order.
+/// Packed answers have tags of their own, by which clients find them unchanged; parts are parts of what is not packed.
+fn packed(server: &Server) {
+    let raw = format!("{PATCH}&format=raw");
+    let plain = server.get(&raw);
+    let tag = plain.header("etag").unwrap().trim_matches('"').to_owned();
+    for encoding in ["gzip", "zstd"] {
+        let packed = server.get_with(&raw, &[&format!("Accept-Encoding: {encoding}")]);
+        let own = format!("\"{tag}-{encoding}\"");
+        assert_eq!(packed.header("content-encoding"), Some(encoding));
+        assert_eq!((packed.header("etag"), packed.header("vary")), (Some(own.as_str()), Some("accept-encoding")));
+        assert!(packed.body.len() < plain.body.len());
+        let again = server.get_with(&raw, &[&format!("Accept-Encoding: {encoding}"), &format!("If-None-Match: {own}")]);
+        assert_eq!((again.status, again.header("etag")), (304, Some(own.as_str())));
+        let part = server.get_with(&raw, &["Range: bytes=0-9", &format!("If-Range: {own}")]);
+        assert_eq!((part.status, part.body.len()), (200, plain.body.len()));
+    }
+    let part = server.get_with(&raw, &["Range: bytes=0-9", &format!("If-Range: \"{tag}\""), "Accept-Encoding: gzip"]);
+    assert_eq!((part.status, part.header("content-encoding")), (206, None));
+    let page = server.get_with("/page.js", &["Accept-Encoding: gzip"]);
+    let own = format!("If-None-Match: {}", page.header("etag").unwrap());
+    assert_eq!(server.get_with("/page.js", &["Accept-Encoding: gzip", &own]).status, 304);
+    let head = server.send("HEAD", &raw, &[], "");
+    assert_eq!((head.status, head.body.len()), (200, 0));
+    assert_eq!(head.header("content-length").unwrap(), plain.body.len().to_string());
+}
+
+/// Pages of named origins, and no others, may read what is answered and what is refused.
+#[test]
+fn val_named_origins_may_read() {
+    let folder = area();
+    world(folder.path());
+    let arguments = ["world.toml", "--cors", "https://a.example", "--cors", "http://b.example:81"];
+    let server = Server::start(folder.path(), &arguments, &[("SASTRUGI_TOKEN", "a-secret")]);
+    let allowed = |path: &str, origin: &str| {
+        let answer = server.get_with(path, &[&format!("Origin: {origin}")]);
+        answer.header("access-control-allow-origin").map(str::to_owned)
+    };
+    for path in ["/v1?token=a-secret", "/v1", "/v1/nothing"] {
+        assert_eq!(allowed(path, "https://a.example").as_deref(), Some("https://a.example"), "{path}");
+        assert_eq!(allowed(path, "http://b.example:81").as_deref(), Some("http://b.example:81"));
+        assert_eq!(allowed(path, "https://c.example"), None);
+    }
+    let asks = ["Origin: https://a.example", "Access-Control-Request-Method: GET"];
+    assert_eq!(server.send("OPTIONS", PATCH, &asks, "").status, 200);
+    for (wrong, code) in [("example.org", 2), ("https://example.org/x", 2), ("https://", 2)] {
+        let call = sastrugi_in(folder.path(), &["serve", "world.toml", "--cors", wrong]);
+        assert_eq!(call.code, code, "{}", call.stderr);
+        assert!(call.stderr.contains("--cors"), "{}", call.stderr);
+    }
+    for option in ["--connections", "--per-client"] {
+        for value in ["0", "18446744073709551615"] {
+            assert_eq!(sastrugi_in(folder.path(), &["serve", "world.toml", option, value]).code, 2);
+        }
+    }
+    assert_eq!(sastrugi_in(folder.path(), &["serve", "world.toml", "--library", "world.toml"]).code, 2);
+    let any = Server::start(folder.path(), &["world.toml", "--cors", "*"], &[]);
+    let answer = any.get_with("/v1", &["Origin: https://c.example"]);
+    assert_eq!(answer.header("access-control-allow-origin"), Some("*"));
+}
+
+/// A token, a limit for each client, and an orderly end.
 #[test]
 fn val_the_door_is_kept() {
     let folder = area();
@@ -220,8 +349,8 @@ fn val_the_door_is_kept() {
     assert_eq!(server.get_with("/v1/collections", &["Authorization: Bearer a-secret"]).status, 200);
     assert_eq!(server.get("/v1/collections?token=a-secret").status, 200);
     assert_eq!((server.get("/").status, server.get("/healthz").status), (200, 200));
-    // A coarse patch of everything takes seconds.
-    let slow = "/v1/collections/world/patch?origin=0,0&size=512,512&resolution_m=5.12&token=a-secret";
+    // An image of a million samples takes seconds.
+    let slow = "/v1/collections/world/patch?origin=0,0&size=1000,1000&field=image&token=a-secret";
     let busy = std::thread::scope(|scope| {
         // The slow one may itself come while the other is answered.
         let slow = scope.spawn(|| while server.get(slow).status == 429 {});
@@ -234,8 +363,9 @@ fn val_the_door_is_kept() {
         }
     });
     assert_eq!((busy.status, busy.header("retry-after")), (429, Some("1")));
-    let metrics = String::from_utf8(server.get("/metrics").body).unwrap();
+    let metrics = String::from_utf8(server.get("/metrics?token=a-secret").body).unwrap();
     assert!(metrics.contains("sastrugi_requests_total{route=\"/v1/collections\",status=\"401\"} 2"), "{metrics}");
+    assert_eq!(server.get("/metrics").status, 401);
     assert_eq!(server.terminate(), Some(0));
 }
 
@@ -266,9 +396,17 @@ fn val_jobs_make_tiles_ahead() {
     let made = server.get("/v1/library").json()["made"].clone();
     assert_eq!(server.get(PATCH).status, 200);
     assert_eq!(server.get("/v1/library").json()["made"], made);
-    assert_eq!(order("[0, 0, 3000, 3000]").status, 202);
-    assert_eq!(server.send("DELETE", "/v1/jobs/2", &[], "").status, 200);
-    state("/v1/jobs/2", "cancelled");
+    // Coarse tiles take seconds each: who cancels them, and who asks for others, does not wait for them.
+    let body = "{\"collection\": \"world\", \"bounds_m\": [1e5, 1e5, 2e5, 2e5], \"resolution_m\": 2.56}";
+    assert_eq!(server.send("POST", "/v1/jobs", &["Content-Type: application/json"], body).status, 202);
+    assert_eq!(server.get("/v1/collections/world/point?x=777&y=777").status, 200);
+    let cancelled = server.send("DELETE", "/v1/jobs/2", &[], "");
+    assert_eq!((cancelled.status, &cancelled.json()["state"]), (200, &"cancelled".into()));
+    let idle = (0..600).any(|_| {
+        std::thread::sleep(std::time::Duration::from_millis(20));
+        server.get("/v1/library").json()["running"] == 0
+    });
+    assert!(idle);
     assert_eq!(server.send("DELETE", "/v1/jobs/2", &[], "").status, 409);
     assert_eq!(order("[0, 0, 1e9, 1e9]").status, 413);
     assert_eq!(order("[5, 0, 1, 1]").status, 400);
@@ -317,7 +455,7 @@ fn val_releases_are_served() {
     let mut tracks = 0;
     for collection in collections {
         let id = collection["id"].as_str().unwrap();
-        let (own, _) = (&collection["tile_grid"], ());
+        let own = &collection["tile_grid"];
         let name = id.split_once('.').unwrap().1;
         let file = ["terrain", "dem", "texture"].map(|stage| folder.path().join(format!("release/{stage}/{name}.tif")));
         let grid = dem::read(file.iter().find(|f| f.is_file()).unwrap()).unwrap().grid;
@@ -342,6 +480,37 @@ fn val_releases_are_served() {
             assert!(one["x_m"].as_array().unwrap().len() > 1);
             tracks += 1;
         }
+        // Beyond its edge there is nothing, at any distance of samples.
+        let [_, _, east, north] = [0, 1, 2, 3].map(|k| collection["bounds_m"][k].as_f64().unwrap());
+        for step in [g.cell[0], 4.0 * g.cell[0], 64.0 * g.cell[0]] {
+            let (x, y) = (east + 0.6 * g.cell[0], north - 0.5 * g.size()[1]);
+            let point = server.get(&format!("/v1/collections/{id}/point?x={x}&y={y}&resolution_m={step}")).json();
+            assert!(point["elevation_m"].is_null(), "{id} {step}: {point}");
+        }
     }
     assert!(tracks > 0);
+}
+
+/// A file that is no longer what its release sealed is not served.
+#[test]
+fn val_changed_files_are_not_served() {
+    let folder = area();
+    write(folder.path(), "study.toml", &sastrugi_tests::small_study());
+    let call = sastrugi_in(folder.path(), &["run", "study.toml", "-o", "release", "--quiet"]);
+    assert_eq!(call.code, 0, "{}", call.stderr);
+    let terrains = fs::read_dir(folder.path().join("release/terrain")).unwrap().flatten();
+    let file = terrains.map(|e| e.path()).find(|p| p.extension().is_some_and(|e| e == "tif")).unwrap();
+    let id = file.file_stem().unwrap().to_string_lossy().split('.').next().unwrap().to_owned();
+    let mut read = dem::read(&file).unwrap();
+    read.grid.values.iter_mut().for_each(|z| *z += 100.0);
+    dem::write(&file, &read.grid, &read.info.crs, &dem::WriteOptions::default()).unwrap();
+    let server = Server::start(folder.path(), &["release"], &[]);
+    let all = server.get("/v1/collections").json();
+    let own =
+        all["collections"].as_array().unwrap().iter().find(|c| c["id"].as_str().unwrap().ends_with(&format!(".{id}")));
+    let (own, [west, south]) =
+        own.map(|c| (c["id"].as_str().unwrap(), [0, 1].map(|k| c["bounds_m"][k].as_f64().unwrap()))).unwrap();
+    let answer = server.get(&format!("/v1/collections/{own}/point?x={}&y={}", west + 1.0, south + 1.0));
+    assert_eq!(answer.status, 500, "{}", answer.head);
+    assert!(answer.json()["detail"].as_str().unwrap().contains("changed"), "{}", answer.json());
 }

@@ -199,8 +199,8 @@ pub enum Verb {
     Completions(Completions),
     /// Serve worlds and releases over HTTP: patches of terrain at any place and resolution, map tiles, and a map page.
     #[command(
-        after_help = "WORLD.toml is what `terrain` takes, of kind planetary; of a STUDY.toml all its planetary terrains are served; of a RELEASE\n\
-        its terrains with their maps, missions and rovers. With SASTRUGI_TOKEN set, requests must show that token.\n\n\
+        after_help = "A WORLD.toml is what `terrain` takes, of kind planetary. A STUDY.toml serves all its planetary terrains; a RELEASE serves\n\
+        its terrains with their maps, missions and rovers. With SASTRUGI_TOKEN set, requests must send that token.\n\n\
         Examples:\n  sastrugi serve fixtures/worlds/planet.toml\n  \
         sastrugi serve study.toml release --library tiles --library-bytes 10G --listen 127.0.0.1:9000\n  \
         curl 'http://127.0.0.1:8080/v1/collections/planet/patch?center=0,0&size=512,512&resolution_m=0.02' -o patch.tif"
@@ -975,42 +975,42 @@ pub struct Serve {
     /// Worlds, studies and releases.
     #[arg(required = true, value_name = "WORLD.toml|STUDY.toml|RELEASE")]
     pub paths: Vec<PathBuf>,
-    /// Address to listen at; port 0 takes a free one.
+    /// Address to listen on; port 0 picks a free port.
     #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:8080")]
     pub listen: String,
-    /// Folder that keeps tiles, made where there is none; several servers may share it. In memory only when absent.
+    /// Folder for the tile library, created if missing; several servers may share it. Without it tiles are kept in memory only.
     #[arg(long, value_name = "DIR")]
     pub library: Option<PathBuf>,
-    /// Most bytes of tiles on disk.
+    /// Maximum size of the tile library on disk.
     #[arg(long, value_name = "BYTES", default_value = "10G")]
     pub library_bytes: String,
-    /// Most bytes of tiles in memory.
+    /// Maximum memory for cached tiles, and again for the rasters of releases.
     #[arg(long, value_name = "BYTES", default_value = "512M")]
     pub memory_bytes: String,
-    /// Most samples of one patch.
+    /// Maximum number of samples in one patch; of an image a quarter.
     #[arg(long, value_name = "N", default_value_t = 1 << 22, value_parser = clap::value_parser!(u64).range(1..=1 << 26))]
     pub samples_max: u64,
-    /// Most requests of one client under way.
-    #[arg(long, value_name = "N", default_value_t = 256)]
-    pub per_client: usize,
-    /// Most connections.
-    #[arg(long, value_name = "N", default_value_t = 2048)]
-    pub connections: usize,
-    /// Longest time of a request, s.
+    /// Maximum number of concurrent requests per client.
+    #[arg(long, value_name = "N", default_value_t = 256, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    pub per_client: u32,
+    /// Maximum number of open connections.
+    #[arg(long, value_name = "N", default_value_t = 2048, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    pub connections: u32,
+    /// Time limit for one request, in seconds.
     #[arg(long, value_name = "S", default_value_t = 60, value_parser = clap::value_parser!(u64).range(1..=3600))]
     pub request_seconds: u64,
-    /// Origin whose pages may use the server, as `https://example.org`; may be given several times.
+    /// Origin whose pages may use the server, as `https://example.org`, or `*`; may be given several times.
     #[arg(long, value_name = "ORIGIN")]
     pub cors: Vec<String>,
-    /// Log every request on stderr; RUST_LOG says more finely what is logged.
+    /// Log every request on stderr; RUST_LOG gives finer control.
     #[arg(long)]
     pub log: bool,
-    /// Form of the log.
+    /// Format of the log.
     #[arg(long, value_enum, default_value_t = LogFormat::Text)]
     pub log_format: LogFormat,
 }
 
-/// Form of a log.
+/// Format of a log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum LogFormat {
     /// Lines to read.

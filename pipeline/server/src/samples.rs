@@ -77,8 +77,11 @@ impl Samples {
     /// The samples at other rows and columns: `from(row, col)` tells which one comes there.
     fn rearranged(&self, [rows, cols]: [usize; 2], from: impl Fn(usize, usize) -> [usize; 2]) -> Self {
         self.each([rows, cols], |values| {
-            let at = |k: usize| from(k / cols, k % cols);
-            (0..rows * cols).map(|k| values[at(k)[0] * self.cols + at(k)[1]]).collect()
+            let at = |k: usize| {
+                let [row, col] = from(k / cols, k % cols);
+                values[row * self.cols + col]
+            };
+            (0..rows * cols).map(at).collect()
         })
     }
 
@@ -131,11 +134,6 @@ impl Samples {
                 (0..shape[0] * shape[1]).map(of_block).collect()
             }),
         })
-    }
-
-    /// A part.
-    pub fn part(&self, [row, col]: [usize; 2], shape: [usize; 2]) -> Self {
-        self.rearranged(shape, |r, c| [row + r, col + c])
     }
 
     /// Bilinear values at places counted in samples from the north-west one; rock by the nearest sample. Places lie inside.

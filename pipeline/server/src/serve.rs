@@ -15,7 +15,8 @@ use hyper_util::service::TowerToHyperService;
 use sastrugi_stages::Error;
 use std::net::SocketAddr;
 use std::path::PathBuf;
-use std::sync::Arc;
+use std::sync::atomic::AtomicU64;
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::{Notify, Semaphore};
@@ -26,8 +27,9 @@ use tower::ServiceExt;
 const HEAD: Duration = Duration::from_secs(15);
 /// How long a client may take nothing of its answer.
 const STALL: Duration = Duration::from_secs(30);
-/// How long requests under way may take to end when the server stops.
-const FAREWELL: Duration = Duration::from_secs(10);
+/// How long requests under way may take to end when the server stops, and what is left of them then.
+const FAREWELL: Duration = Duration::from_secs(9);
+const LAST: Duration = Duration::from_secs(1);
 /// Most bytes of a head, and most headers.
 const HEAD_BYTES: usize = 32 << 10;
 const HEADERS: usize = 64;
@@ -65,7 +67,9 @@ impl Stop {
 impl From<LibraryError> for Error {
     fn from(error: LibraryError) -> Self {
         match error {
-            LibraryError::Occupied(_) | LibraryError::Version(_) => Self::Usage(error.to_string()),
+            LibraryError::Occupied(_) | LibraryError::Version(_) | LibraryError::NoFolder(_) => {
+                Self::Usage(error.to_string())
+            }
             LibraryError::Io { path, source } => Self::at(&path, source),
         }
     }
@@ -80,41 +84,58 @@ pub fn serve(
     stop: &Stop,
     ready: impl FnOnce(SocketAddr, &collections::Collections),
 ) -> Result<(), Error> {
-    let collections = collections::open(&settings.paths)?;
-    let origin = |text: &String| {
-        HeaderValue::from_str(text)
-            .map_err(|_| Error::Usage(format!("`--cors {text}`: it must be an origin, as https://example.org")))
-    };
-    let origins = settings.origins.iter().map(origin).collect::<Result<Vec<_>, _>>()?;
+    let collections = collections::open(&settings.paths, settings.library.memory_bytes)?;
+    let origins = settings.origins.iter().map(|text| origin(text)).collect::<Result<Vec<_>, _>>()?;
+    let library = Library::open(&settings.library)?;
+    let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build().map_err(Error::io)?;
+    let (listener, address) = runtime.block_on(listen(settings.listen))?;
     let service = Arc::new(Service {
+        address,
         collections,
-        library: Library::open(&settings.library)?,
+        library,
         answers: Answers::new(ANSWERS),
         limits: settings.limits.clone(),
         token: settings.token.clone(),
+        hosts: origins.iter().filter_map(host_of).collect(),
         jobs: Jobs::default(),
         metrics: Metrics::default(),
-        under_way: std::sync::Mutex::default(),
+        under_way: Mutex::default(),
+        sending: AtomicU64::new(0),
+        processors: Arc::new(Semaphore::new(settings.library.workers.max(1))),
     });
-    let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build().map_err(Error::io)?;
-    let result = runtime.block_on(async {
-        let listen = settings.listen;
-        let listener = TcpListener::bind(listen)
-            .await
-            .map_err(|e| Error::Retry(format!("{listen}: {e}; choose another address with --listen")))?;
-        let address = listener.local_addr().map_err(Error::io)?;
-        ready(address, &service.collections);
-        accept(&listener, &service, &origins, stop).await;
-        Ok(())
-    });
+    ready(address, &service.collections);
+    runtime.block_on(accept(listener, &service, &origins, stop));
     service.jobs.stop();
     service.library.stop();
-    runtime.shutdown_timeout(FAREWELL);
-    result
+    runtime.shutdown_timeout(LAST);
+    Ok(())
+}
+
+/// An origin whose pages may use the server.
+fn origin(text: &str) -> Result<HeaderValue, Error> {
+    let host = ["http://", "https://"].iter().find_map(|scheme| text.strip_prefix(scheme)).unwrap_or_default();
+    let plain = |b: u8| b.is_ascii_alphanumeric() || b".:-_[]".contains(&b);
+    let is_origin = text == "*" || (!host.is_empty() && host.bytes().all(plain));
+    HeaderValue::from_str(text).ok().filter(|_| is_origin).ok_or_else(|| {
+        Error::Usage(format!("`--cors {text}`: it must be an origin without a path, as https://example.org, or `*`"))
+    })
+}
+
+/// The host of an origin, without its port.
+fn host_of(origin: &HeaderValue) -> Option<String> {
+    let (_, host) = origin.to_str().ok()?.split_once("://")?;
+    Some(host.rsplit_once(':').map_or(host, |(name, _)| name).to_owned())
+}
+
+async fn listen(listen: SocketAddr) -> Result<(TcpListener, SocketAddr), Error> {
+    let failed = |e: std::io::Error| Error::Retry(format!("{listen}: {e}; choose another address with --listen"));
+    let listener = TcpListener::bind(listen).await.map_err(failed)?;
+    let address = listener.local_addr().map_err(failed)?;
+    Ok((listener, address))
 }
 
 /// Takes connections until the end.
-async fn accept(listener: &TcpListener, service: &Arc<Service>, origins: &[HeaderValue], stop: &Stop) {
+async fn accept(listener: TcpListener, service: &Arc<Service>, origins: &[HeaderValue], stop: &Stop) {
     let app = router(service, origins);
     let seats = Arc::new(Semaphore::new(service.limits.connections));
     let graceful = GracefulShutdown::new();
@@ -157,7 +178,9 @@ async fn accept(listener: &TcpListener, service: &Arc<Service>, origins: &[Heade
             drop(seat);
         });
     }
-    tracing::info!("the server ends what is under way");
+    // Who comes now is refused at once.
+    drop(listener);
+    tracing::info!("the server finishes the requests that are open");
     let _ = tokio::time::timeout(FAREWELL, graceful.shutdown()).await;
 }
 

@@ -62,8 +62,8 @@ pub fn serve(args: &Serve, common: &Common) -> Verdict {
         },
         limits: Limits {
             samples: args.samples_max,
-            per_client: args.per_client,
-            connections: args.connections,
+            per_client: args.per_client as usize,
+            connections: args.connections as usize,
             request: Duration::from_secs(args.request_seconds),
             // Half of what the cores can do in that time: the expectation is rough, and clients share them.
             work_s: 0.5 * args.request_seconds as f64 * workers as f64,
@@ -72,12 +72,17 @@ pub fn serve(args: &Serve, common: &Common) -> Verdict {
         token,
         origins: args.cors.clone(),
     };
+    if settings.library.folder.is_some() && settings.library.disk_bytes == 0 {
+        return Err(Failure::usage(
+            "`--library-bytes 0` leaves no room for the tiles of --library; give it more, or leave --library out",
+        ));
+    }
     let stop = RUNNING.get_or_init(Stop::default);
     let mut printed = Ok(());
     sastrugi_server::serve(&settings, stop, |address, collections| {
         let ids: Vec<&String> = collections.keys().collect();
-        let served = format!("{} collections: {}", ids.len(), shortened(&ids));
-        let text = format!("http://{address}/\n{served}\nCtrl-C ends it.");
+        let noun = if ids.len() == 1 { "collection" } else { "collections" };
+        let text = format!("http://{address}/\n{} {noun}: {}\nPress Ctrl-C to stop.", ids.len(), shortened(&ids));
         printed = print(common.json, &json!({ "address": format!("http://{address}/"), "collections": ids }), &text);
     })?;
     printed?;

@@ -5,12 +5,14 @@ pub mod tracks;
 pub mod world;
 
 pub use raster::Raster;
+use tracks::Drives;
 pub use world::World;
 
 use crate::grid::TileGrid;
+use crate::http::Problem;
+use crate::layers::Layer;
 use sastrugi_stages::Error;
 use sastrugi_stages::verbs::served::{Served, served};
-use sastrugi_store::release::Release;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -24,10 +26,8 @@ pub struct Collection {
     pub source: String,
     /// Its ground.
     pub ground: Ground,
-    /// The release that it stands in.
-    pub release: Option<Arc<Release>>,
-    /// Hash of all that its samples depend on.
-    pub digest: String,
+    /// What was driven in the release that it stands in.
+    pub drives: Option<Arc<Drives>>,
 }
 
 /// Where samples come from.
@@ -42,6 +42,14 @@ pub enum Ground {
 pub type Collections = BTreeMap<String, Arc<Collection>>;
 
 impl Collection {
+    /// Hash of all that its samples depend on.
+    pub fn digest(&self) -> &str {
+        match &self.ground {
+            Ground::World(world) => &world.digest,
+            Ground::Raster(raster) => &raster.digest,
+        }
+    }
+
     /// Its tile grid.
     pub fn grid(&self) -> &TileGrid {
         match &self.ground {
@@ -77,7 +85,7 @@ impl Collection {
             "title": self.title(),
             "kind": match self.ground { Ground::World(_) => "world", Ground::Raster(_) => "raster" },
             "source": self.source,
-            "release": self.release.as_ref().map(|r| r.manifest().name.clone()),
+            "release": self.drives.as_ref().map(|d| d.release.manifest().name.clone()),
             "bounds_m": self.grid().bounds_m(),
             "cell_m": cell_m,
             "spacing_m": spacing_m,
@@ -113,8 +121,19 @@ impl Collection {
     /// The layers of its map tiles.
     pub fn layers(&self) -> Vec<&'static str> {
         let fields = self.fields();
-        let has = |layer: &&crate::layers::Layer| layer.field().is_none_or(|field| fields.contains(&field));
+        let has = |layer: &&Layer| layer.field().is_none_or(|field| fields.contains(&field));
         crate::layers::ALL.iter().filter(has).map(|l| l.name()).collect()
+    }
+
+    /// The layer of a name.
+    ///
+    /// # Errors
+    /// One that it does not have.
+    pub fn layer(&self, name: &str) -> Result<Layer, Problem> {
+        let known = self.layers();
+        Layer::of_name(name).filter(|layer| known.contains(&layer.name())).ok_or_else(|| {
+            Problem::not_found(format!("\"{}\" has no such layer; it has {}", self.id, known.join(", ")))
+        })
     }
 }
 
@@ -122,8 +141,8 @@ impl Collection {
 ///
 /// # Errors
 /// A file that has nothing to serve, or two things of one id.
-pub fn open(paths: &[PathBuf]) -> Result<Collections, Error> {
-    let mut all = Collections::new();
+pub fn open(paths: &[PathBuf], raster_bytes: u64) -> Result<Collections, Error> {
+    let (mut all, memory) = (Collections::new(), raster::Memory::new(raster_bytes));
     for path in paths {
         let source = path.display().to_string();
         let found = match served(path)? {
@@ -132,35 +151,30 @@ pub fn open(paths: &[PathBuf]) -> Result<Collections, Error> {
                 .map(|w| World::open(w).map(|w| (w.id().to_owned(), Ground::World(Arc::new(w)), None)))
                 .collect::<Result<Vec<_>, _>>()?,
             Served::Release(release, rasters) => {
-                let release = Arc::new(*release);
-                let name = release.manifest().name.clone();
+                let drives = Arc::new(Drives::new(*release));
+                let name = drives.release.manifest().name.clone();
                 let open = |files| {
-                    let raster = Raster::open(files).map_err(Error::Input)?;
+                    let raster = Raster::open(files, &memory).map_err(Error::Input)?;
                     let id = format!("{name}.{}", raster.files.id);
-                    Ok((id, Ground::Raster(Arc::new(raster)), Some(Arc::clone(&release))))
+                    Ok((id, Ground::Raster(Arc::new(raster)), Some(Arc::clone(&drives))))
                 };
                 rasters.into_iter().map(open).collect::<Result<Vec<_>, Error>>()?
             }
         };
-        for (id, ground, release) in found {
+        for (id, ground, drives) in found {
             if let Some(other) = all.get(&id) {
                 return Err(Error::Usage(format!(
-                    "{source}: \"{id}\" is served from {} already; give one of the two another name",
+                    "{source}: \"{id}\" is served from {} already; rename one of them, or name the file once",
                     other.source
                 )));
             }
-            let digest = digest(&ground);
-            all.insert(id.clone(), Arc::new(Collection { id, source: source.clone(), ground, release, digest }));
+            all.insert(id.clone(), Arc::new(Collection { id, source: source.clone(), ground, drives }));
         }
     }
     Ok(all)
 }
 
-/// Hash of all that samples depend on: parameters, streams and sources of the generator, or the files.
-fn digest(ground: &Ground) -> String {
-    let what = match ground {
-        Ground::World(world) => world.identity(),
-        Ground::Raster(raster) => format!("{} {}", crate::revision(), raster.files.content),
-    };
+/// A short name for a text that says all that samples depend on.
+fn digest(what: &str) -> String {
     blake3::hash(what.as_bytes()).to_hex()[..32].to_owned()
 }

@@ -1,12 +1,18 @@
-//! The heights of a release, with the maps of the same cells: read when they are first asked for, thinned for coarse levels.
+//! The heights of a release, with the maps of the same cells. Files are read and checked against their sums when they are first asked for, and
+//! kept in memory as long as there is room.
+//!
+//! Points and patches lie between the cells of the file at any distance of samples; map tiles of coarse levels are drawn from means of cells.
 
 use crate::grid::{TILE, TileGrid, TileIndex};
 use crate::http::Problem;
 use crate::samples::Samples;
+use quick_cache::Weighter;
+use quick_cache::sync::Cache;
 use sastrugi_numeric::{Geometry, Grid};
-use sastrugi_stages::verbs::served::ServedRaster;
+use sastrugi_stages::verbs::served::{SealedFile, ServedRaster};
 use sastrugi_store::dem::{self, Crs, ReadOptions};
-use std::sync::{Arc, OnceLock};
+use sastrugi_store::digest;
+use std::sync::Arc;
 
 /// Maps that are fields of a collection, and what they are called there.
 const MAPS: [&str; 3] = ["albedo", "class", "rock-potential"];
@@ -21,8 +27,32 @@ pub struct Raster {
     pub grid: TileGrid,
     /// Coordinate reference system.
     pub crs: Crs,
-    levels: OnceLock<Result<Arc<Vec<Level>>, String>>,
+    /// Hash of its files, and of what is done with them.
+    pub digest: String,
+    memory: Arc<Memory>,
 }
+
+/// Rasters that were read.
+pub struct Memory(Cache<String, Arc<Pyramid>, Bytes>);
+
+#[derive(Clone)]
+struct Bytes;
+
+impl Weighter<String, Arc<Pyramid>> for Bytes {
+    fn weight(&self, _: &String, pyramid: &Arc<Pyramid>) -> u64 {
+        pyramid.iter().map(|level| level.samples.bytes()).sum()
+    }
+}
+
+impl Memory {
+    /// Room for that many bytes.
+    pub fn new(bytes: u64) -> Arc<Self> {
+        Arc::new(Self(Cache::with_weighter(64, bytes, Bytes)))
+    }
+}
+
+/// The levels of a raster, from the file's own to one of few samples.
+type Pyramid = Vec<Level>;
 
 /// The samples of one level: those of the file, or means of 2 x 2 of the level below.
 struct Level {
@@ -35,21 +65,18 @@ impl Raster {
     ///
     /// # Errors
     /// A sentence on what is wrong with the file.
-    pub fn open(files: ServedRaster) -> Result<Self, String> {
-        let reader = dem::open(&files.heights, &ReadOptions::default()).map_err(|e| e.to_string())?;
+    pub fn open(files: ServedRaster, memory: &Arc<Memory>) -> Result<Self, String> {
+        let reader = dem::open(&files.heights.path, &ReadOptions::default()).map_err(|e| e.to_string())?;
         let (geometry, crs) = (reader.geometry(), reader.info().crs.clone());
         let finest_m = geometry.cell[0].min(geometry.cell[1]);
         let size_m = geometry.size();
         let across = size_m[0].max(size_m[1]) / (finest_m * TILE as f64);
         let levels = (0..31).find(|l| across <= (1u64 << l) as f64 * (1.0 + 1e-9)).unwrap_or(31) + 1;
         let origin_m = [geometry.origin[0], geometry.origin[1] + size_m[1]];
-        Ok(Self {
-            files,
-            geometry,
-            grid: TileGrid { origin_m, size_m, finest_m, levels },
-            crs,
-            levels: OnceLock::new(),
-        })
+        let grid = TileGrid { origin_m, size_m, finest_m, levels };
+        let sums = std::iter::once(&files.heights).chain(files.maps.values()).map(|file| file.sha256.as_str());
+        let digest = super::digest(&format!("{} {}", crate::revision(), sums.collect::<Vec<_>>().join(",")));
+        Ok(Self { files, geometry, grid, crs, digest, memory: Arc::clone(memory) })
     }
 
     /// True where it has that map.
@@ -57,21 +84,22 @@ impl Raster {
         self.files.maps.contains_key(map)
     }
 
-    /// Its levels, from the file's own to one of few samples. Reads the files when first called: not for the threads of the runtime.
-    fn levels(&self) -> Result<Arc<Vec<Level>>, Problem> {
-        self.levels.get_or_init(|| self.read().map(Arc::new)).clone().map_err(Problem::internal)
+    /// Its levels. Reads the files where memory does not have them: not for the threads of the runtime.
+    fn levels(&self) -> Result<Arc<Pyramid>, Problem> {
+        let read = || self.read().map(Arc::new);
+        self.memory.0.get_or_insert_with(&self.digest, read).map_err(Problem::internal)
     }
 
-    fn read(&self) -> Result<Vec<Level>, String> {
-        let heights = dem::read(&self.files.heights).map_err(|e| e.to_string())?.grid;
+    fn read(&self) -> Result<Pyramid, String> {
+        let heights = sealed(&self.files.heights)?;
         let map = |name: &str| -> Result<Option<Vec<f32>>, String> {
             let Some(file) = self.files.maps.get(name) else { return Ok(None) };
-            let grid = dem::read(file).map_err(|e| e.to_string())?.grid;
+            let grid = sealed(file)?;
             let same = (grid.rows(), grid.cols()) == (heights.rows(), heights.cols());
             if same {
                 Ok(Some(single(&grid)))
             } else {
-                Err(format!("{}: its cells are not those of the heights", file.display()))
+                Err(format!("{}: its cells are not those of the heights", file.path.display()))
             }
         };
         let [albedo, rock, rock_potential] = MAPS.map(map);
@@ -91,26 +119,36 @@ impl Raster {
         Ok(levels)
     }
 
-    /// Samples at the places `(x0 + col step, y0 - row step)`, from cells about as wide as `step`.
+    /// Samples at the places `(x0 + col step, y0 - row step)`, bilinear between the cells of the file.
     ///
     /// # Errors
-    /// Files that cannot be read.
+    /// Files that cannot be read, or are not those that were sealed.
     pub fn samples(&self, [x0, y0]: [f64; 2], step_m: f64, shape: [usize; 2]) -> Result<Samples, Problem> {
-        let levels = self.levels()?;
-        let wanted = libm::log2(step_m / self.grid.finest_m * (1.0 + 1e-9)).floor().max(0.0) as usize;
-        let level = &levels[wanted.min(levels.len() - 1)];
-        Ok(level.at([x0, y0], step_m, shape))
+        Ok(self.levels()?[0].at(&self.geometry, [x0, y0], step_m, shape))
     }
 
-    /// The samples of a tile and one cell more on every side.
+    /// The samples of a tile and one cell more on every side, from means of cells about as wide.
     ///
     /// # Errors
-    /// Files that cannot be read.
+    /// Files that cannot be read, or are not those that were sealed.
     pub fn tile(&self, tile: TileIndex) -> Result<Samples, Problem> {
+        let levels = self.levels()?;
         let step_m = self.grid.resolution_m(tile.level);
         let [west, north] = self.grid.corner_m(tile);
-        self.samples([west - 0.5 * step_m, north + 0.5 * step_m], step_m, [TILE + 2; 2])
+        let level = (self.grid.levels - 1 - tile.level) as usize;
+        let level = &levels[level.min(levels.len() - 1)];
+        Ok(level.at(&self.geometry, [west - 0.5 * step_m, north + 0.5 * step_m], step_m, [TILE + 2; 2]))
     }
+}
+
+/// The values of a file that is as its release sealed it.
+fn sealed(file: &SealedFile) -> Result<Grid, String> {
+    let path = file.path.display();
+    let (_, sha256) = digest::of_file(&file.path).map_err(|e| format!("{path}: {e}"))?;
+    if sha256 != file.sha256 {
+        return Err(format!("{path}: the file has changed since its release was sealed; `sastrugi verify` says more"));
+    }
+    Ok(dem::read(&file.path).map_err(|e| e.to_string())?.grid)
 }
 
 fn single(grid: &Grid) -> Vec<f32> {
@@ -156,18 +194,20 @@ impl Level {
         Some(Self { geometry: Geometry { rows, cols, cell, origin }, samples })
     }
 
-    /// Bilinear samples; within half a cell of the edge those of the edge, beyond it none.
-    fn at(&self, [x0, y0]: [f64; 2], step_m: f64, [rows, cols]: [usize; 2]) -> Samples {
+    /// Bilinear samples; within half a cell of the edge those of the edge, beyond the cells of the file, `whole`, none.
+    fn at(&self, whole: &Geometry, [x0, y0]: [f64; 2], step_m: f64, [rows, cols]: [usize; 2]) -> Samples {
+        let (x, y) = (|c: usize| x0 + c as f64 * step_m, |r: usize| y0 - r as f64 * step_m);
         let g = &self.geometry;
-        let north = g.origin[1] + g.size()[1];
-        let down = |r: usize| (north - (y0 - r as f64 * step_m)) / g.cell[1] - 0.5;
-        let right = |c: usize| (x0 + c as f64 * step_m - g.origin[0]) / g.cell[0] - 0.5;
+        let down = |r: usize| (g.origin[1] + g.size()[1] - y(r)) / g.cell[1] - 0.5;
+        let right = |c: usize| (x(c) - g.origin[0]) / g.cell[0] - 0.5;
         // A place within rounding of a sample is that sample.
         let settle = |at: f64| if (at - at.round()).abs() < 1e-6 { at.round() } else { at };
-        let inside = |at: f64, count: usize| at >= -0.5 - 1e-6 && at <= count as f64 - 0.5 + 1e-6;
         let clamp = |at: f64, count: usize| settle(at.clamp(0.0, (count - 1) as f64));
         let made = self.samples.between([rows, cols], |r, c| [clamp(down(r), g.rows), clamp(right(c), g.cols)]);
-        let beyond = |k: usize| !(inside(down(k / cols), g.rows) && inside(right(k % cols), g.cols));
-        made.without(beyond)
+        let inside = |at: f64, axis: usize| {
+            let from = (at - whole.origin[axis]) / whole.cell[axis];
+            (-1e-6..=whole.size()[axis] / whole.cell[axis] + 1e-6).contains(&from)
+        };
+        made.without(|k| !(inside(x(k % cols), 0) && inside(y(k / cols), 1)))
     }
 }

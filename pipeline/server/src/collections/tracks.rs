@@ -7,9 +7,13 @@ use sastrugi_schemas::Record;
 use sastrugi_schemas::tables::{MissionRow, RoverRow, RoverSampleRow, SampleRow};
 use sastrugi_store::release::{Release, ReleaseError};
 use serde_json::{Value, json};
+use std::collections::BTreeMap;
+use std::sync::OnceLock;
 
 /// Most points of a track that are sent.
 const POINTS_MAX: usize = 5000;
+/// Most missions and rovers that are listed.
+pub const LISTED_MAX: usize = 10_000;
 
 /// Where a track leads.
 #[derive(Default)]
@@ -42,44 +46,102 @@ impl Track {
     }
 }
 
+/// A release whose missions and rovers are drawn on its terrains.
+pub struct Drives {
+    /// The release.
+    pub release: Release,
+    /// How many drives there are on each terrain.
+    counts: OnceLock<BTreeMap<String, usize>>,
+}
+
+impl Drives {
+    /// Those of a release.
+    pub fn new(release: Release) -> Self {
+        Self { release, counts: OnceLock::new() }
+    }
+
+    /// Calls `f` with every drive.
+    fn each(&self, mut f: impl FnMut(Drive)) -> Result<(), Problem> {
+        rows(&self.release, |row: MissionRow| {
+            f(Drive {
+                terrain: row.terrain_id,
+                kind: "mission",
+                driver: row.vehicle,
+                id: row.mission_id,
+                outcome: row.outcome,
+                duration_s: row.time_s,
+                length_m: row.path_length_m,
+            });
+        })?;
+        rows(&self.release, |row: RoverRow| {
+            f(Drive {
+                terrain: row.terrain_id,
+                kind: "rover",
+                driver: row.navigator,
+                id: row.rover_id,
+                outcome: row.outcome,
+                duration_s: row.time_s,
+                length_m: row.distance_m,
+            });
+        })
+    }
+
+    /// How many there are on a terrain; 0 where the tables cannot be read.
+    fn count(&self, terrain: &str) -> usize {
+        let counts = self.counts.get_or_init(|| {
+            let mut counts = BTreeMap::new();
+            let read = self.each(|drive| *counts.entry(drive.terrain).or_insert(0) += 1);
+            read.map_or_else(|_| BTreeMap::new(), |()| counts)
+        });
+        counts.get(terrain).copied().unwrap_or(0)
+    }
+}
+
+/// One mission or rover.
+struct Drive {
+    terrain: String,
+    kind: &'static str,
+    driver: String,
+    id: String,
+    outcome: String,
+    duration_s: f64,
+    length_m: f64,
+}
+
+impl Drive {
+    fn describe(&self) -> Value {
+        let Self { kind, driver, id, outcome, duration_s, length_m, .. } = self;
+        json!({
+            "id": id, "kind": kind, "label": format!("{driver} {id}"), "outcome": outcome, "duration_s": duration_s, "length_m": length_m,
+        })
+    }
+}
+
 impl Collection {
-    fn driven_on(&self) -> Option<(&Release, &str)> {
-        match (&self.ground, &self.release) {
-            (Ground::Raster(raster), Some(release)) => Some((release, &raster.files.id)),
+    fn driven_on(&self) -> Option<(&Drives, &str)> {
+        match (&self.ground, &self.drives) {
+            (Ground::Raster(raster), Some(drives)) => Some((drives, &raster.files.id)),
             _ => None,
         }
     }
 
-    /// How many missions and rovers there are; 0 where the tables cannot be read.
+    /// How many missions and rovers there are. Reads tables at first: not for the threads of the runtime.
     pub fn tracks(&self) -> usize {
-        self.track_list().map_or(0, |list| list.len())
+        self.driven_on().map_or(0, |(drives, terrain)| drives.count(terrain))
     }
 
-    /// The missions and rovers. Reads tables: not for the threads of the runtime.
+    /// The first missions and rovers, at most [`LISTED_MAX`]. Reads tables: not for the threads of the runtime.
     ///
     /// # Errors
     /// A table that cannot be read.
     pub fn track_list(&self) -> Result<Vec<Value>, Problem> {
-        let Some((release, terrain)) = self.driven_on() else { return Ok(Vec::new()) };
+        let Some((drives, terrain)) = self.driven_on() else { return Ok(Vec::new()) };
         let mut tracks = Vec::new();
-        let mission = |row: MissionRow| {
-            if row.terrain_id == terrain {
-                tracks.push(json!({
-                    "id": row.mission_id, "kind": "mission", "label": format!("{} {}", row.vehicle, row.mission_id),
-                    "outcome": row.outcome, "duration_s": row.time_s, "length_m": row.path_length_m,
-                }));
+        drives.each(|drive| {
+            if drive.terrain == terrain && tracks.len() < LISTED_MAX {
+                tracks.push(drive.describe());
             }
-        };
-        rows(release, mission)?;
-        let rover = |row: RoverRow| {
-            if row.terrain_id == terrain {
-                tracks.push(json!({
-                    "id": row.rover_id, "kind": "rover", "label": format!("{} {}", row.navigator, row.rover_id),
-                    "outcome": row.outcome, "duration_s": row.time_s, "length_m": row.distance_m,
-                }));
-            }
-        };
-        rows(release, rover)?;
+        })?;
         Ok(tracks)
     }
 
@@ -89,7 +151,7 @@ impl Collection {
     /// A table that cannot be read, or no track of that id.
     pub fn track(&self, id: &str) -> Result<Value, Problem> {
         let mut track = Track::default();
-        if let Some((release, terrain)) = self.driven_on() {
+        if let Some((Drives { release, .. }, terrain)) = self.driven_on() {
             let is = |own: &str, on: &str| own == id && on == terrain;
             rows(release, |s: SampleRow| {
                 if is(&s.mission_id, &s.terrain_id) {

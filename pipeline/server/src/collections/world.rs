@@ -28,46 +28,42 @@ const LATTICE_MAX: f64 = (1u64 << 52) as f64;
 const ZOOM_MAX: u32 = 40;
 /// Most sets of processes whose worlds are kept.
 const WORLDS: usize = 32;
+/// Samples of a window that is made by itself.
+const FEW: usize = 16;
+/// Tiles of one request that are asked of the library at once.
+const AT_ONCE: usize = 16;
 /// Samples along the side of a look at the whole map, for its range of heights.
 const LOOK: usize = 64;
-/// A quotient this near to a whole number is that number.
+/// A distance of samples is that of a lattice when it differs by no more than this part of it.
+const SAME: f64 = 1e-9;
+/// A place this near to a lattice point, in spacings, is that point.
 const WHOLE: f64 = 1e-6;
 /// Most processor time that a tile may be expected to take, s; the craters and rocks of such a tile hold up to 3 GB.
 const TILE_SECONDS: f64 = 10.0;
 
-/// Which processes act.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, Default)]
-pub enum Phenomena {
-    /// All of the list.
-    #[default]
-    All,
-    /// Those at these places of it, from 0, rising.
-    Some(Vec<usize>),
-}
-
-impl Phenomena {
-    fn acts(&self, place: usize) -> bool {
-        match self {
-            Self::All => true,
-            Self::Some(places) => places.contains(&place),
-        }
-    }
-
-    fn name(&self) -> String {
-        match self {
-            Self::All => "all".to_owned(),
-            Self::Some(places) => places.iter().map(ToString::to_string).collect::<Vec<_>>().join(","),
-        }
-    }
-}
-
-/// Which version of a world is asked for.
+/// Which part of a world is asked for.
 #[derive(Clone, Debug, PartialEq, Default)]
-pub struct Version {
-    /// Processes that act.
-    pub phenomena: Phenomena,
+pub struct Selection {
+    /// The processes that act, as places in the list from 0, rising; all when absent.
+    pub phenomena: Option<Vec<usize>>,
     /// Craters and rocks that are not wider are left out, m.
     pub feature_min_m: f64,
+}
+
+/// How the samples of a window are made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Piece {
+    /// In tiles that the library keeps, for what lies around it too.
+    Tiles,
+    /// By itself: right for a few samples.
+    Alone,
+}
+
+impl Piece {
+    /// The cheaper of the two for a window that stands alone.
+    pub fn of([rows, cols]: [usize; 2]) -> Self {
+        if rows * cols <= FEW { Self::Alone } else { Self::Tiles }
+    }
 }
 
 /// A world.
@@ -75,10 +71,10 @@ pub struct World {
     served: ServedWorld,
     /// Its tiles.
     pub grid: TileGrid,
-    /// What tells it from others: parameters, streams, sources of the generator.
-    identity: String,
+    /// Hash of all that samples depend on: parameters, streams, sources of the generator.
+    pub digest: String,
     range_m: [f64; 2],
-    worlds: Mutex<HashMap<Phenomena, Arc<planetary::World>>>,
+    worlds: Mutex<HashMap<Option<Vec<usize>>, Arc<planetary::World>>>,
 }
 
 impl World {
@@ -97,8 +93,8 @@ impl World {
                 map.remove(key);
             }
         }
-        let identity = format!("{} {} {parameters}", crate::revision(), served.streams.label());
-        let mut world = Self { served, grid, identity, range_m: [0.0; 2], worlds: Mutex::default() };
+        let digest = super::digest(&format!("{} {} {parameters}", crate::revision(), served.streams.label()));
+        let mut world = Self { served, grid, digest, range_m: [0.0; 2], worlds: Mutex::default() };
         world.range_m = world.look()?;
         Ok(world)
     }
@@ -111,14 +107,14 @@ impl World {
         let at = |m: f64| (m / step).round() as i64;
         let window = Window { zoom, west: at(west), south: at(south), cols: LOOK, rows: LOOK, centred: false };
         let request = Request { window, feature_min_m: FEATURE_PIXELS * step, cancel: None };
-        let patch = self.world(&Phenomena::All)?.patch_for(&request);
+        let patch = self.world(&None)?.patch_for(&request);
         let mut heights = patch.map_or_else(Vec::new, |patch| patch.heights);
         heights.sort_by(f64::total_cmp);
         let part = |share: f64| heights.get((share * heights.len() as f64) as usize).copied().unwrap_or_default();
         Ok([part(0.05), part(0.95)])
     }
 
-    fn world(&self, phenomena: &Phenomena) -> Result<Arc<planetary::World>, Error> {
+    fn world(&self, phenomena: &Option<Vec<usize>>) -> Result<Arc<planetary::World>, Error> {
         let mut worlds = self.worlds.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(world) = worlds.get(phenomena) {
             return Ok(Arc::clone(world));
@@ -126,7 +122,10 @@ impl World {
         if worlds.len() >= WORLDS {
             worlds.clear();
         }
-        let made = self.served.world.world_of(&self.served.streams, |place| phenomena.acts(place))?;
+        let made = self
+            .served
+            .world
+            .world_of(&self.served.streams, |place| phenomena.as_ref().is_none_or(|list| list.contains(&place)))?;
         let made = Arc::new(made);
         worlds.insert(phenomena.clone(), Arc::clone(&made));
         Ok(made)
@@ -135,11 +134,6 @@ impl World {
     /// Id in addresses.
     pub fn id(&self) -> &str {
         &self.served.id
-    }
-
-    /// What tells it from others.
-    pub fn identity(&self) -> String {
-        self.identity.clone()
     }
 
     /// Licence of the study that it stands in.
@@ -189,8 +183,8 @@ impl World {
     ///
     /// # Errors
     /// A number that the list does not have.
-    pub fn choose(&self, numbers: Option<Vec<usize>>) -> Result<Phenomena, Problem> {
-        let Some(mut numbers) = numbers else { return Ok(Phenomena::All) };
+    pub fn choose(&self, numbers: Option<Vec<usize>>) -> Result<Option<Vec<usize>>, Problem> {
+        let Some(mut numbers) = numbers else { return Ok(None) };
         let count = self.served.world.raw().processes.len();
         if let Some(n) = numbers.iter().find(|n| !(1..=count).contains(*n)) {
             return Err(Problem::bad_request(format!(
@@ -201,10 +195,13 @@ impl World {
         numbers.sort_unstable();
         numbers.dedup();
         let places: Vec<usize> = numbers.into_iter().map(|n| n - 1).collect();
-        Ok(if places.len() == count { Phenomena::All } else { Phenomena::Some(places) })
+        Ok((places.len() < count).then_some(places))
     }
 
     /// A section of a study that makes the same patch.
+    ///
+    /// # Errors
+    /// A window that `planetary` does not have: samples between those of the lattices.
     pub fn snippet(&self, origin_m: [f64; 2], size_px: [usize; 2], cell_m: f64) -> Result<String, Problem> {
         let failed = |e: Error| Problem::internal(e.to_string());
         let mut parameters = self.served.parameters.clone();
@@ -213,6 +210,11 @@ impl World {
         map.insert("size_px".to_owned(), json!(size_px));
         map.insert("cell_m".to_owned(), json!(cell_m));
         map.insert("origin_m".to_owned(), json!(origin_m));
+        sastrugi_terrain::prepare(planetary::KIND, &parameters).map_err(|e| {
+            Problem::bad_request(format!(
+                "a study cannot make this patch, whose samples lie between those of a lattice: {e}"
+            ))
+        })?;
         let (head, seed) = seed_lines(&self.served.streams.label(), self.id());
         sastrugi_stages::verbs::served::section(&head, seed, planetary::KIND, &parameters).map_err(failed)
     }
@@ -224,7 +226,26 @@ impl World {
 
     /// The doublings after which samples are no farther apart than that.
     fn zoom_below(&self, step_m: f64) -> u32 {
-        (0..=ZOOM_MAX).take_while(|k| self.step_m(*k) <= step_m * (1.0 + WHOLE)).last().unwrap_or(0)
+        (0..=ZOOM_MAX).take_while(|k| self.step_m(*k) <= step_m * (1.0 + SAME)).last().unwrap_or(0)
+    }
+
+    /// How many doublings make that distance of samples, if some do.
+    pub fn zoom_of(&self, step_m: f64) -> Option<u32> {
+        (0..=ZOOM_MAX).find(|zoom| (self.step_m(*zoom) / step_m - 1.0).abs() <= SAME)
+    }
+
+    /// Refuses columns or rows of a lattice beyond the end of the world.
+    ///
+    /// # Errors
+    /// Those.
+    pub fn check_reach(&self, zoom: u32, index: f64) -> Result<(), Problem> {
+        if (index.abs() + TILE as f64) * (1u64 << zoom) as f64 <= LATTICE_MAX {
+            return Ok(());
+        }
+        let end_m = LATTICE_MAX * self.spacing_m();
+        Err(Problem::unprocessable(format!(
+            "the world ends {end_m:.3e} m from its origin; choose a place within that distance"
+        )))
     }
 
     /// Column or row of a lattice window for a place, `None` where it does not stand on one.
@@ -267,7 +288,7 @@ impl World {
         &self,
         maker: &Maker,
         tile: TileIndex,
-        phenomena: &Phenomena,
+        phenomena: Option<&[usize]>,
     ) -> Result<Arc<Samples>, Problem> {
         let zoom = LEVELS - tile.level;
         let half = (TILE as i64 / 2) << tile.level;
@@ -275,37 +296,35 @@ impl World {
         let side = TILE + 2;
         let window =
             Window { zoom, west: west - 1, south: north - TILE as i64 - 1, cols: side, rows: side, centred: true };
-        let version = Version {
-            phenomena: phenomena.clone(),
+        let selection = Selection {
+            phenomena: phenomena.map(<[usize]>::to_vec),
             feature_min_m: FEATURE_PIXELS * self.grid.resolution_m(tile.level),
         };
-        self.window(maker, window, &version).await
+        self.window(maker, window, &selection).await
     }
 
     /// The samples of one window, as the library keeps them.
-    async fn window(&self, maker: &Maker, window: Window, version: &Version) -> Result<Arc<Samples>, Problem> {
+    async fn window(&self, maker: &Maker, window: Window, selection: &Selection) -> Result<Arc<Samples>, Problem> {
         let Window { zoom, west, south, cols, rows, centred } = window;
         let key = TileKey::new(format!(
-            "{} | {} {:?} | {zoom} {west} {south} {cols} {rows} {centred}",
-            self.identity,
-            version.phenomena.name(),
-            version.feature_min_m
+            "{} {:?} {:?} {zoom} {west} {south} {cols} {rows} {centred}",
+            self.digest, selection.phenomena, selection.feature_min_m
         ));
-        let world = self.made_of(&version.phenomena)?;
-        self.check_seconds(&world, &window, version.feature_min_m, [1.0, TILE_SECONDS])?;
-        let feature_min_m = version.feature_min_m;
+        let world = self.made_of(&selection.phenomena)?;
+        self.check_seconds(&world, &window, selection.feature_min_m, [1.0, TILE_SECONDS])?;
+        let feature_min_m = selection.feature_min_m;
         let make = move |cancel: &std::sync::atomic::AtomicBool| {
             let request = Request { window, feature_min_m, cancel: Some(cancel) };
             Some(from_south(&world, &world.patch_for(&request)?, feature_min_m))
         };
         maker.library.tile(key, maker.priority, make).await.map_err(|e| match e {
-            Unavailable::Busy => Problem::unavailable("as many tiles wait to be made as may wait; try again soon"),
+            Unavailable::Busy => Problem::unavailable("the queue of tiles is full; try again in 2 s"),
             Unavailable::Failed(_) => Problem::internal(e.to_string()),
         })
     }
 
     /// The world of some of its processes.
-    fn made_of(&self, phenomena: &Phenomena) -> Result<Arc<planetary::World>, Problem> {
+    fn made_of(&self, phenomena: &Option<Vec<usize>>) -> Result<Arc<planetary::World>, Problem> {
         self.world(phenomena).map_err(|e| Problem::internal(e.to_string()))
     }
 
@@ -313,11 +332,11 @@ impl World {
     ///
     /// # Errors
     /// A sentence with a `feature_min_m` that would do.
-    pub fn check_work(&self, zoom: u32, tiles: u64, version: &Version, seconds_max: f64) -> Result<(), Problem> {
-        let world = self.made_of(&version.phenomena)?;
+    pub fn check_work(&self, zoom: u32, tiles: u64, selection: &Selection, seconds_max: f64) -> Result<(), Problem> {
+        let world = self.made_of(&selection.phenomena)?;
         let window = Window { zoom, west: 0, south: 0, cols: TILE, rows: TILE, centred: false };
-        self.check_seconds(&world, &window, version.feature_min_m, [1.0, TILE_SECONDS])?;
-        self.check_seconds(&world, &window, version.feature_min_m, [tiles as f64, seconds_max])
+        self.check_seconds(&world, &window, selection.feature_min_m, [1.0, TILE_SECONDS])?;
+        self.check_seconds(&world, &window, selection.feature_min_m, [tiles as f64, seconds_max])
     }
 
     /// Refuses a number of tiles like a window that are expected to take longer than a limit on one core.
@@ -361,11 +380,11 @@ impl World {
         maker: &Maker,
         zoom: u32,
         [col, row]: [i64; 2],
-        version: &Version,
+        selection: &Selection,
     ) -> Result<Arc<Samples>, Problem> {
         let (west, south) = (TILE as i64 * col, TILE as i64 * row);
         let window = Window { zoom, west, south, cols: TILE, rows: TILE, centred: false };
-        self.window(maker, window, version).await
+        self.window(maker, window, selection).await
     }
 
     /// Samples `step_m` apart, the south-west one at `origin_m`: lattice points where they stand on them, bilinear between the points of the next
@@ -379,16 +398,17 @@ impl World {
         origin_m: [f64; 2],
         step_m: f64,
         shape: [usize; 2],
-        version: &Version,
+        selection: &Selection,
+        piece: Piece,
     ) -> Result<Samples, Problem> {
         let zoom = self.zoom_below(step_m);
         let own_m = self.step_m(zoom);
-        let same = (step_m / own_m - 1.0).abs() <= WHOLE;
+        let same = (step_m / own_m - 1.0).abs() <= SAME;
         let [rows, cols] = shape;
         if let (true, Some(west), Some(south)) =
             (same, Self::on_lattice(origin_m[0], own_m), Self::on_lattice(origin_m[1], own_m))
         {
-            return self.lattice(maker, zoom, [west, south], shape, version).await;
+            return self.lattice(maker, zoom, [west, south], shape, selection, piece).await;
         }
         let first = origin_m.map(|at| (at / own_m).floor() as i64);
         let last = |at: f64, count: usize, first: i64| {
@@ -396,7 +416,7 @@ impl World {
             (end - first + 2) as usize
         };
         let (own_cols, own_rows) = (last(origin_m[0], cols, first[0]), last(origin_m[1], rows, first[1]));
-        let fine = self.lattice(maker, zoom, first, [own_rows, own_cols], version).await?;
+        let fine = self.lattice(maker, zoom, first, [own_rows, own_cols], selection, piece).await?;
         let across = |c: usize| (origin_m[0] + c as f64 * step_m) / own_m - first[0] as f64;
         let up = |r: usize| (origin_m[1] + (rows - 1 - r) as f64 * step_m) / own_m - first[1] as f64;
         Ok(fine.between(shape, |r, c| [(own_rows - 1) as f64 - up(r), across(c)]))
@@ -409,29 +429,31 @@ impl World {
         zoom: u32,
         first: [i64; 2],
         shape: [usize; 2],
-        version: &Version,
+        selection: &Selection,
+        piece: Piece,
     ) -> Result<Samples, Problem> {
-        let far =
-            |first: i64, count: usize| (first.unsigned_abs() as f64 + (count + TILE) as f64) * (1u64 << zoom) as f64;
-        if far(first[0], shape[1]).max(far(first[1], shape[0])) > LATTICE_MAX {
-            let end = LATTICE_MAX * self.spacing_m();
-            return Err(Problem::unprocessable(format!(
-                "the world ends {end:.3e} m from its origin; ask for a nearer place"
-            )));
+        for (first, count) in first.into_iter().zip([shape[1], shape[0]]) {
+            self.check_reach(zoom, first as f64)?;
+            self.check_reach(zoom, first as f64 + count as f64)?;
+        }
+        let [rows, cols] = shape;
+        if piece == Piece::Alone {
+            let window = Window { zoom, west: first[0], south: first[1], cols, rows, centred: false };
+            return self.window(maker, window, selection).await.map(|samples| Samples::clone(&samples));
         }
         let places = Self::tiles_of(first, shape);
-        self.check_work(zoom, places.len() as u64, version, maker.seconds_max)?;
-        let mut tiles = JoinSet::new();
-        for place in places {
-            let (world, maker, version) = (Arc::clone(self), maker.clone(), version.clone());
-            tiles.spawn(async move { (place, world.lattice_tile(&maker, zoom, place, &version).await) });
-        }
-        let mut made: Option<Samples> = None;
-        while let Some(joined) = tiles.join_next().await {
+        self.check_work(zoom, places.len() as u64, selection, maker.seconds_max)?;
+        let mut places = places.into_iter();
+        let (mut tiles, mut made) = (JoinSet::new(), None::<Samples>);
+        loop {
+            for place in places.by_ref().take(AT_ONCE - tiles.len()) {
+                let (world, maker, selection) = (Arc::clone(self), maker.clone(), selection.clone());
+                tiles.spawn(async move { (place, world.lattice_tile(&maker, zoom, place, &selection).await) });
+            }
+            let Some(joined) = tiles.join_next().await else { break };
             let (place, tile) = joined.map_err(|e| Problem::internal(e.to_string()))?;
             let tile = tile?;
-            let all = made.get_or_insert_with(|| tile.void_like(shape));
-            all.lay(&tile, first, place);
+            made.get_or_insert_with(|| tile.void_like(shape)).lay(&tile, first, place);
         }
         made.ok_or_else(|| Problem::bad_request("`size`: there is no sample; ask for one at least"))
     }

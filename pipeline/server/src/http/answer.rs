@@ -1,4 +1,5 @@
-//! Answers that are kept: named by the hash of all that they depend on, sent whole or in part, or not at all where the client has them.
+//! Answers that are kept: named by the hash of all that they depend on, made once however many ask, sent whole or in part, or not at all where
+//! the client has them.
 
 use super::Problem;
 use axum::body::{Body, Bytes};
@@ -10,6 +11,14 @@ use std::ops::Range;
 
 /// How long a client may use an answer unasked, s. A server that is started anew with other files serves others under the same address.
 const FRESH_S: u32 = 60;
+/// Longer answers are sent as they are: packing them would keep the runtime's threads from other clients, bytes.
+const PACKED_MAX: usize = 4 << 20;
+/// Endings of the tags of packed answers.
+const ENCODINGS: [&str; 2] = ["gzip", "zstd"];
+
+/// Marks a response that is not to be packed.
+#[derive(Clone, Copy, Debug)]
+pub struct AsItIs;
 
 /// What is sent.
 #[derive(Clone, Debug)]
@@ -62,49 +71,66 @@ impl Answers {
         what: &str,
         make: impl Future<Output = Result<Option<Answer>, Problem>>,
     ) -> Result<Response, Problem> {
-        let tag = blake3::hash(what.as_bytes()).to_hex()[..32].to_owned();
-        if has(headers, &tag) {
-            return Ok(with_tag(StatusCode::NOT_MODIFIED.into_response(), &tag));
+        let tag = tag(what.as_bytes());
+        if let Some(own) = held(headers, &tag) {
+            return Ok(not_modified(own));
         }
-        let answer = match self.0.get(&tag) {
-            Some(answer) => answer,
-            None => {
+        let answer = match self.0.get_value_or_guard_async(&tag).await {
+            Ok(answer) => answer,
+            // Who leaves drops the guard, and the next that waits makes it.
+            Err(guard) => {
                 let Some(made) = make.await? else { return Ok(StatusCode::NO_CONTENT.into_response()) };
-                self.0.insert(tag.clone(), made.clone());
+                // One that is too large to be kept comes back.
+                let _ = guard.insert(made.clone());
                 made
             }
         };
-        Ok(with_tag(whole_or_part(headers, &tag, answer), &tag))
+        Ok(fresh(whole_or_part(headers, &tag, answer), &format!("\"{tag}\"")))
     }
 }
 
-/// Whether the client names the answer among those that it has, in whatever encoding.
-fn has(headers: &HeaderMap, tag: &str) -> bool {
+/// The name of what depends on these bytes alone.
+pub fn tag(what: &[u8]) -> String {
+    blake3::hash(what).to_hex()[..32].to_owned()
+}
+
+/// The tag by which the client has the answer, in whatever encoding.
+pub fn held(headers: &HeaderMap, tag: &str) -> Option<String> {
     let listed = headers.get_all(header::IF_NONE_MATCH).iter().filter_map(|value| value.to_str().ok());
-    listed.flat_map(|list| list.split(',')).any(|one| one.trim() == "*" || is_tag(one, tag))
+    let mut own = listed.flat_map(|list| list.split(',')).map(|one| one.trim().trim_start_matches("W/"));
+    own.find(|own| is_tag(own, tag)).map(str::to_owned)
 }
 
-fn is_tag(text: &str, tag: &str) -> bool {
-    let own = text.trim().trim_start_matches("W/").trim_matches('"');
-    own.split('-').next() == Some(tag)
+fn is_tag(quoted: &str, tag: &str) -> bool {
+    let own = quoted.strip_prefix('"').and_then(|own| own.strip_suffix('"'));
+    let ending = own.and_then(|own| own.strip_prefix(tag));
+    ending.is_some_and(|ending| {
+        ending.is_empty() || ending.strip_prefix('-').is_some_and(|encoding| ENCODINGS.contains(&encoding))
+    })
 }
 
-fn with_tag(mut response: Response, tag: &str) -> Response {
+/// 304: the client has it by this tag.
+pub fn not_modified(own: String) -> Response {
+    fresh(StatusCode::NOT_MODIFIED.into_response(), &own)
+}
+
+fn fresh(mut response: Response, tag: &str) -> Response {
     let headers = response.headers_mut();
-    for (name, value) in [
-        (header::ETAG, HeaderValue::from_str(&format!("\"{tag}\""))),
-        (header::CACHE_CONTROL, HeaderValue::from_str(&format!("max-age={FRESH_S}, must-revalidate"))),
-    ] {
-        // Hexadecimal digits and words are valid headers.
-        let _ = value.map(|value| headers.insert(name, value));
+    if let Ok(tag) = HeaderValue::from_str(tag) {
+        headers.insert(header::ETAG, tag);
     }
+    let freshness = format!("max-age={FRESH_S}, must-revalidate");
+    headers.extend(HeaderValue::from_str(&freshness).ok().map(|value| (header::CACHE_CONTROL, value)));
+    headers.insert(header::VARY, HeaderValue::from_static("accept-encoding"));
     response
 }
 
 /// All of the bytes, or the range that the client asks for.
 fn whole_or_part(headers: &HeaderMap, tag: &str, answer: Answer) -> Response {
     let length = answer.body.len();
-    let same = headers.get(header::IF_RANGE).is_none_or(|value| value.to_str().is_ok_and(|v| is_tag(v, tag)));
+    let quoted = format!("\"{tag}\"");
+    // Ranges are those of the bytes as they are: the tag of a packed answer names others.
+    let same = headers.get(header::IF_RANGE).is_none_or(|value| value.as_bytes() == quoted.as_bytes());
     let asked = headers.get(header::RANGE).and_then(|value| value.to_str().ok()).filter(|_| same);
     let mut response = match asked.and_then(|text| range(text, length)) {
         None => Body::from(answer.body).into_response(),
@@ -112,15 +138,15 @@ fn whole_or_part(headers: &HeaderMap, tag: &str, answer: Answer) -> Response {
             let place = format!("bytes {}-{}/{length}", part.start, part.end - 1);
             (StatusCode::PARTIAL_CONTENT, [(header::CONTENT_RANGE, place)], answer.body.slice(part)).into_response()
         }
-        Some(None) => {
-            let place = format!("bytes */{length}");
-            return (StatusCode::RANGE_NOT_SATISFIABLE, [(header::CONTENT_RANGE, place)]).into_response();
-        }
+        Some(None) => return Problem::range(length).into_response(),
     };
     let own = response.headers_mut();
     own.insert(header::CONTENT_TYPE, HeaderValue::from_static(answer.media));
     own.insert(header::ACCEPT_RANGES, HeaderValue::from_static("bytes"));
     own.extend(answer.more);
+    if length > PACKED_MAX {
+        response.extensions_mut().insert(AsItIs);
+    }
     response
 }
 
@@ -159,12 +185,51 @@ mod tests {
     }
 
     #[test]
-    fn val_tags_match_in_any_encoding() {
+    fn val_tags_match_in_known_encodings() {
         let headers =
             |value: &'static str| HeaderMap::from_iter([(header::IF_NONE_MATCH, HeaderValue::from_static(value))]);
-        for value in ["\"abc\"", "W/\"abc\"", "\"x\", \"abc-gzip\"", "*"] {
-            assert!(has(&headers(value), "abc"), "{value}");
+        for (value, own) in [
+            ("\"abc\"", "\"abc\""),
+            ("W/\"abc\"", "\"abc\""),
+            ("\"x\", \"abc-gzip\"", "\"abc-gzip\""),
+            ("\"abc-zstd\"", "\"abc-zstd\""),
+        ] {
+            assert_eq!(held(&headers(value), "abc").as_deref(), Some(own), "{value}");
         }
-        assert!(!has(&headers("\"abcd\""), "abc") && !has(&HeaderMap::new(), "abc"));
+        for value in ["\"abcd\"", "abc", "\"abc-nonsense\"", "\"abc-\"", "*"] {
+            assert_eq!(held(&headers(value), "abc"), None, "{value}");
+        }
+        assert_eq!(held(&HeaderMap::new(), "abc"), None);
+    }
+
+    /// However many ask at once, an answer is made once; where who makes it leaves, the next makes it.
+    #[test]
+    fn val_answers_are_made_once() {
+        use std::sync::atomic::{AtomicU32, Ordering};
+        let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build().unwrap();
+        runtime.block_on(async {
+            let (answers, made) = (std::sync::Arc::new(Answers::new(1 << 20)), std::sync::Arc::new(AtomicU32::new(0)));
+            let ask = || {
+                let (answers, made) = (answers.clone(), made.clone());
+                tokio::spawn(async move {
+                    let make = async {
+                        made.fetch_add(1, Ordering::SeqCst);
+                        tokio::time::sleep(std::time::Duration::from_millis(50)).await;
+                        Ok(Some(Answer::new("text/plain", "ground")))
+                    };
+                    answers.answer(&HeaderMap::new(), "what", make).await.unwrap().status()
+                })
+            };
+            let first = ask();
+            while made.load(Ordering::SeqCst) == 0 {
+                tokio::task::yield_now().await;
+            }
+            let others: Vec<_> = (0..50).map(|_| ask()).collect();
+            first.abort();
+            for other in others {
+                assert_eq!(other.await.unwrap(), StatusCode::OK);
+            }
+            assert_eq!(made.load(Ordering::SeqCst), 2);
+        });
     }
 }

@@ -1,15 +1,21 @@
 //! What every request passes: the token, the limits, and the books.
 
+use super::Problem;
+use super::extract::host;
 use super::query::TOKEN;
 use super::service::Service;
-use super::{Pairs, Problem};
-use axum::extract::{FromRequestParts, MatchedPath, Query, Request, State};
+use axum::body::Body;
+use axum::extract::{MatchedPath, Query, Request, State};
 use axum::http::{HeaderName, HeaderValue, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
+use hyper::body::{Body as HttpBody, Bytes, Frame, SizeHint};
 use std::collections::HashMap;
 use std::net::{IpAddr, SocketAddr};
+use std::pin::Pin;
+use std::sync::atomic::Ordering;
 use std::sync::{Arc, MutexGuard, PoisonError};
+use std::task::{Context, Poll};
 use std::time::Instant;
 
 /// Where a request comes from.
@@ -27,17 +33,10 @@ pub async fn guard(State(service): State<Arc<Service>>, request: Request, next: 
     let (method, path) = (request.method().clone(), request.uri().path().to_owned());
     let mut response = match admit(&service, &request) {
         Err(problem) => problem.into_response(),
-        Ok(seat) => {
-            let answer = tokio::time::timeout(service.limits.request, next.run(request)).await;
-            drop(seat);
-            answer.unwrap_or_else(|_| {
-                let seconds = service.limits.request.as_secs();
-                let detail = format!(
-                    "the answer took longer than {seconds} s and was given up; ask for fewer samples, or for `feature_min_m`"
-                );
-                Problem::unavailable(detail).into_response()
-            })
-        }
+        Ok(seat) => match tokio::time::timeout(service.limits.request, next.run(request)).await {
+            Ok(response) => send(&service, response, seat),
+            Err(_) => late(&service).into_response(),
+        },
     };
     let headers = response.headers_mut();
     headers.insert(header::X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff"));
@@ -48,6 +47,13 @@ pub async fn guard(State(service): State<Arc<Service>>, request: Request, next: 
     service.metrics.count(&route, status, seconds);
     tracing::debug!(%method, path, status, milliseconds = 1e3 * seconds, "request");
     response
+}
+
+fn late(service: &Service) -> Problem {
+    let seconds = service.limits.request.as_secs();
+    Problem::unavailable(format!(
+        "the request took longer than {seconds} s and was abandoned; ask for fewer samples, or set `feature_min_m`"
+    ))
 }
 
 /// A place among the requests of a client; given back when dropped.
@@ -72,15 +78,70 @@ fn seats(service: &Service) -> MutexGuard<'_, HashMap<IpAddr, usize>> {
     service.under_way.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
+/// Bytes on their way to a client; given back when dropped.
+struct Load {
+    service: Arc<Service>,
+    bytes: u64,
+}
+
+impl Load {
+    /// `None` where too many are on their way; one answer alone may have any length.
+    fn take(service: &Arc<Service>, bytes: u64) -> Option<Self> {
+        let more =
+            |sending: u64| (sending == 0 || sending + bytes <= service.limits.sending).then_some(sending + bytes);
+        service.sending.fetch_update(Ordering::Relaxed, Ordering::Relaxed, more).ok()?;
+        Some(Self { service: Arc::clone(service), bytes })
+    }
+}
+
+impl Drop for Load {
+    fn drop(&mut self) {
+        self.service.sending.fetch_sub(self.bytes, Ordering::Relaxed);
+    }
+}
+
+/// A body that keeps its place among requests, and its bytes among those on their way, until it is sent.
+struct Held {
+    body: Body,
+    _seat: Option<Seat>,
+    _load: Load,
+}
+
+impl HttpBody for Held {
+    type Data = Bytes;
+    type Error = axum::Error;
+
+    fn poll_frame(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<Option<Result<Frame<Bytes>, axum::Error>>> {
+        Pin::new(&mut self.body).poll_frame(cx)
+    }
+
+    fn is_end_stream(&self) -> bool {
+        self.body.is_end_stream()
+    }
+
+    fn size_hint(&self) -> SizeHint {
+        self.body.size_hint()
+    }
+}
+
+fn send(service: &Arc<Service>, response: Response, seat: Option<Seat>) -> Response {
+    let bytes = response.body().size_hint().lower();
+    let Some(load) = Load::take(service, bytes) else {
+        return Problem::unavailable("too many bytes are on their way to clients; try again in 2 s").into_response();
+    };
+    response.map(|body| Body::new(Held { body, _seat: seat, _load: load }))
+}
+
 fn admit(service: &Arc<Service>, request: &Request) -> Result<Option<Seat>, Problem> {
     let length = request.uri().to_string().len();
     let most = service.limits.address;
     if length > most {
         return Err(Problem::uri_too_long(format!("the address has {length} bytes; at most {most} are read")));
     }
+    check_host(service, request)?;
+    let path = request.uri().path();
     if let Some(token) = &service.token
-        && request.uri().path().starts_with("/v1")
-        && request.method() != axum::http::Method::OPTIONS
+        && (path.starts_with("/v1") || path == "/metrics")
         && !shows(request, token)
     {
         return Err(Problem::unauthorized("this server asks for a token: send `Authorization: Bearer ...`"));
@@ -92,17 +153,45 @@ fn admit(service: &Arc<Service>, request: &Request) -> Result<Option<Seat>, Prob
     if *count >= service.limits.per_client {
         let most = service.limits.per_client;
         return Err(Problem::too_many_requests(format!(
-            "{most} requests of this client are under way, the most that may be"
+            "this client already has {most} requests in progress, the maximum; wait for one to finish"
         )));
     }
     *count += 1;
     Ok(Some(Seat { service: Arc::clone(service), client }))
 }
 
+/// A server for this computer alone, without a token, answers those who know that they talk to it: a page of another site may have had its own
+/// name lead here.
+fn check_host(service: &Service, request: &Request) -> Result<(), Problem> {
+    if request.headers().get_all(header::HOST).iter().count() > 1 {
+        return Err(Problem::bad_request("`Host`: given twice; give it once"));
+    }
+    let Some(host) = host(request.headers()) else { return Ok(()) };
+    if !service.address.ip().is_loopback() || service.token.is_some() {
+        return Ok(());
+    }
+    let name = match host.rsplit_once(':') {
+        Some((name, port)) if port.bytes().all(|b| b.is_ascii_digit()) => name,
+        _ => host,
+    };
+    let address = name.trim_matches(['[', ']']).parse::<IpAddr>();
+    if name.eq_ignore_ascii_case("localhost")
+        || address.is_ok_and(|address| address.is_loopback())
+        || service.hosts.iter().any(|own| own.eq_ignore_ascii_case(name))
+    {
+        return Ok(());
+    }
+    Err(Problem::misdirected(format!(
+        "this server is for its own computer and is not called \"{name}\"; start it with --cors http://{name}, or with a token"
+    )))
+}
+
 /// Whether a request shows the token, in its header or, for pictures, in its address.
 fn shows(request: &Request, token: &str) -> bool {
     let header = request.headers().get(header::AUTHORIZATION).and_then(|value| value.to_str().ok());
-    let of_header = header.and_then(|value| value.strip_prefix("Bearer ")).is_some_and(|own| same(own, token));
+    let of_header = header
+        .and_then(|value| value.split_once(' '))
+        .is_some_and(|(scheme, own)| scheme.eq_ignore_ascii_case("bearer") && same(own.trim(), token));
     of_header || {
         let pairs = Query::<Vec<(String, String)>>::try_from_uri(request.uri());
         pairs.is_ok_and(|Query(pairs)| pairs.iter().any(|(name, own)| name == TOKEN && same(own, token)))
@@ -112,17 +201,6 @@ fn shows(request: &Request, token: &str) -> bool {
 /// Equality in a time that does not tell where two texts differ.
 fn same(a: &str, b: &str) -> bool {
     blake3::hash(a.as_bytes()) == blake3::hash(b.as_bytes())
-}
-
-impl<S: Sync> FromRequestParts<S> for Pairs {
-    type Rejection = Problem;
-
-    async fn from_request_parts(parts: &mut axum::http::request::Parts, _: &S) -> Result<Self, Problem> {
-        let pairs = Query::<Vec<(String, String)>>::try_from_uri(&parts.uri);
-        pairs
-            .map(|Query(pairs)| Self(pairs))
-            .map_err(|e| Problem::bad_request(format!("the query cannot be read: {e}")))
-    }
 }
 
 /// One tag for each encoding of an answer: compressed bytes are others.

@@ -1,21 +1,24 @@
 //! Work ahead: the tiles of an area, made while nobody waits.
 
-use super::service::{Service, checked};
-use super::{Pairs, Problem};
+use super::extract::Body;
+use super::service::Service;
+use super::{Plain, Problem, Segments};
 use crate::collections::Ground;
-use crate::collections::world::{Maker, Phenomena, Version, World};
+use crate::collections::world::{Maker, Selection, World};
+use crate::grid::TILE;
 use crate::library::Priority;
 use axum::Json;
-use axum::body::Bytes;
-use axum::extract::{Path, State};
+use axum::extract::State;
 use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use serde::Deserialize;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
+use tokio::sync::Notify;
+use tokio::task::JoinSet;
 
 /// Most jobs that are remembered.
 const JOBS_MAX: usize = 1000;
@@ -27,7 +30,7 @@ const WAIT: Duration = Duration::from_millis(200);
 /// What is asked for.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Order {
+pub struct Order {
     collection: String,
     /// West, south, east and north, m.
     bounds_m: [f64; 4],
@@ -53,7 +56,7 @@ struct Job {
     order: Order,
     tiles: u64,
     made: AtomicU64,
-    cancel: AtomicBool,
+    cancel: Notify,
     state: Mutex<Progress>,
 }
 
@@ -71,7 +74,6 @@ fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 impl Job {
     fn describe(&self) -> Value {
         let (state, detail) = match &*locked(&self.state) {
-            Progress::Running if self.made.load(Ordering::Relaxed) == 0 => ("queued", None),
             Progress::Running => ("running", None),
             Progress::Done => ("done", None),
             Progress::Cancelled => ("cancelled", None),
@@ -87,6 +89,17 @@ impl Job {
     fn ended(&self) -> bool {
         *locked(&self.state) != Progress::Running
     }
+
+    /// Ends it, if it has not ended; false where it has.
+    fn end(&self, how: Progress) -> bool {
+        let mut state = locked(&self.state);
+        let runs = *state == Progress::Running;
+        if runs {
+            *state = how;
+            self.cancel.notify_one();
+        }
+        runs
+    }
 }
 
 impl Jobs {
@@ -99,12 +112,11 @@ impl Jobs {
         let mut all = locked(&self.all);
         if all.len() >= JOBS_MAX {
             let old = all.iter().find(|(_, job)| job.ended()).map(|(id, _)| *id);
-            old.and_then(|id| all.remove(&id)).ok_or_else(|| {
-                Problem::unavailable("as many jobs are under way as may be; cancel one, or try again later")
-            })?;
+            old.and_then(|id| all.remove(&id))
+                .ok_or_else(|| Problem::unavailable("too many jobs are running; cancel one, or try again later"))?;
         }
         let id = 1 + self.last.fetch_add(1, Ordering::Relaxed);
-        let (made, cancel, state) = (AtomicU64::new(0), AtomicBool::new(false), Mutex::new(Progress::Running));
+        let (made, cancel, state) = (AtomicU64::new(0), Notify::new(), Mutex::new(Progress::Running));
         let job = Arc::new(Job { id, order, tiles, made, cancel, state });
         all.insert(id, Arc::clone(&job));
         Ok(job)
@@ -112,7 +124,9 @@ impl Jobs {
 
     /// Tells all jobs to end.
     pub fn stop(&self) {
-        locked(&self.all).values().for_each(|job| job.cancel.store(true, Ordering::Relaxed));
+        for job in locked(&self.all).values() {
+            job.end(Progress::Cancelled);
+        }
     }
 }
 
@@ -123,14 +137,14 @@ struct Area {
     /// First column and row, and how many there are.
     first: [i64; 2],
     count: [u64; 2],
-    version: Version,
+    selection: Selection,
 }
 
 impl Area {
     fn of(service: &Service, order: &Order) -> Result<Self, Problem> {
         let collection = service.collection(&order.collection)?;
         let Ground::World(world) = &collection.ground else {
-            return Err(Problem::bad_request("a raster is read, not made: there is nothing to make ahead"));
+            return Err(Problem::bad_request("a raster is read, not generated: there is nothing to prepare"));
         };
         let [west, south, east, north] = order.bounds_m;
         let finite = order.bounds_m.iter().all(|v| v.is_finite() && v.abs() <= 1e12);
@@ -140,17 +154,16 @@ impl Area {
             ));
         }
         let step_m = order.resolution_m.unwrap_or(world.cell_m());
-        let zoom = (0..41).find(|k| (world.step_m(*k) / step_m - 1.0).abs() < 1e-6);
-        let zoom = zoom.ok_or_else(|| {
+        let zoom = world.zoom_of(step_m).ok_or_else(|| {
             Problem::bad_request(format!(
-                "`resolution_m`: {step_m}; tiles have 1, 2, 4, 8 ... times {} m",
+                "`resolution_m` is {step_m}; it must be {} m times 1, 2, 4, 8 ...",
                 world.spacing_m()
             ))
         })?;
         if !(0.0..=1e9).contains(&order.feature_min_m) {
             return Err(Problem::bad_request("`feature_min_m` must lie between 0 and 1e9"));
         }
-        let side = world.step_m(zoom) * crate::grid::TILE as f64;
+        let side = world.step_m(zoom) * TILE as f64;
         let tile = |at: f64| (at / side).floor() as i64;
         let first = [tile(west), tile(south)];
         let count = [tile(east) - first[0] + 1, tile(north) - first[1] + 1].map(|n| n.max(1) as u64);
@@ -163,10 +176,12 @@ impl Area {
                 most,
             ));
         }
-        let phenomena: Phenomena = world.choose(order.phenomena.clone())?;
-        let version = Version { phenomena, feature_min_m: order.feature_min_m };
-        world.check_work(zoom, tiles, &version, f64::INFINITY)?;
-        Ok(Self { world: Arc::clone(world), zoom, first, count, version })
+        let phenomena = world.choose(order.phenomena.clone())?;
+        let selection = Selection { phenomena, feature_min_m: order.feature_min_m };
+        world.check_work(zoom, tiles, &selection, f64::INFINITY)?;
+        let ends = |axis: usize| [first[axis], first[axis].saturating_add(count[axis] as i64)];
+        [0, 1].into_iter().flat_map(ends).try_for_each(|tile| world.check_reach(zoom, tile as f64 * TILE as f64))?;
+        Ok(Self { world: Arc::clone(world), zoom, first, count, selection })
     }
 
     fn places(&self) -> impl Iterator<Item = [i64; 2]> + use<> {
@@ -176,11 +191,11 @@ impl Area {
 }
 
 /// `POST /v1/jobs`
-pub async fn order(State(service): State<Arc<Service>>, pairs: Pairs, body: Bytes) -> Result<Response, Problem> {
-    checked(pairs, &[])?;
-    let order: Order = serde_json::from_slice(&body).map_err(|e| {
-        Problem::bad_request(format!("the body is not an order: {e}; it must be JSON as {{\"collection\": \"planet\", \"bounds_m\": [0, 0, 50, 50], \"resolution_m\": 0.02}}"))
-    })?;
+pub async fn order(
+    State(service): State<Arc<Service>>,
+    _: Plain,
+    Body(order): Body<Order>,
+) -> Result<Response, Problem> {
     let area = Area::of(&service, &order)?;
     let job = service.jobs.add(order, area.count[0] * area.count[1])?;
     let described = job.describe();
@@ -189,78 +204,68 @@ pub async fn order(State(service): State<Arc<Service>>, pairs: Pairs, body: Byte
     Ok((StatusCode::ACCEPTED, [(header::LOCATION, place)], Json(described)).into_response())
 }
 
-/// Makes the tiles of a job, a few at a time.
+/// Makes the tiles of a job until it is cancelled.
 async fn work(service: Arc<Service>, job: Arc<Job>, area: Area) {
+    tokio::select! {
+        end = make(&service, &job, area) => { job.end(end); }
+        // Dropping what is under way tells its makers to stop.
+        () = job.cancel.notified() => {}
+    }
+}
+
+/// Makes the tiles of a job, a few at a time.
+async fn make(service: &Service, job: &Job, area: Area) -> Progress {
     let maker = Maker { priority: Priority::Background, seconds_max: f64::INFINITY, ..service.maker() };
     let area = Arc::new(area);
-    let mut under_way = tokio::task::JoinSet::new();
-    let mut places = area.places();
-    let mut end = Progress::Done;
+    let (mut under_way, mut places) = (JoinSet::new(), area.places());
     loop {
-        while under_way.len() < AT_ONCE {
-            let Some(place) = places.next() else { break };
-            let (area, maker, job) = (Arc::clone(&area), maker.clone(), Arc::clone(&job));
-            under_way.spawn(async move {
-                loop {
-                    let made = area.world.lattice_tile(&maker, area.zoom, place, &area.version).await;
-                    match made {
-                        Err(problem)
-                            if problem.status() == StatusCode::SERVICE_UNAVAILABLE
-                                && !job.cancel.load(Ordering::Relaxed) =>
-                        {
-                            tokio::time::sleep(WAIT).await;
-                        }
-                        other => return other.map(|_| ()),
-                    }
-                }
-            });
+        for place in places.by_ref().take(AT_ONCE - under_way.len()) {
+            under_way.spawn(patiently(Arc::clone(&area), maker.clone(), place));
         }
-        let Some(ended) = under_way.join_next().await else { break };
-        match ended {
-            _ if job.cancel.load(Ordering::Relaxed) => end = Progress::Cancelled,
-            Ok(Ok(())) => {
-                job.made.fetch_add(1, Ordering::Relaxed);
-            }
-            Ok(Err(problem)) => end = Progress::Failed(problem.detail().to_owned()),
-            Err(error) => end = Progress::Failed(error.to_string()),
-        }
-        if end != Progress::Done {
-            break;
+        match under_way.join_next().await {
+            None => return Progress::Done,
+            Some(Ok(Ok(()))) => drop(job.made.fetch_add(1, Ordering::Relaxed)),
+            Some(Ok(Err(problem))) => return Progress::Failed(problem.detail().to_owned()),
+            Some(Err(error)) => return Progress::Failed(error.to_string()),
         }
     }
-    // Dropping the rest tells their makers to stop.
-    drop(under_way);
-    *locked(&job.state) = end;
+}
+
+/// Makes a tile, as soon as the library has room for it.
+async fn patiently(area: Arc<Area>, maker: Maker, place: [i64; 2]) -> Result<(), Problem> {
+    loop {
+        match area.world.lattice_tile(&maker, area.zoom, place, &area.selection).await {
+            Err(problem) if problem.status() == StatusCode::SERVICE_UNAVAILABLE => tokio::time::sleep(WAIT).await,
+            other => return other.map(drop),
+        }
+    }
 }
 
 /// `GET /v1/jobs`
-pub async fn list(State(service): State<Arc<Service>>, pairs: Pairs) -> Result<Json<Value>, Problem> {
-    checked(pairs, &[])?;
+pub async fn list(State(service): State<Arc<Service>>, _: Plain) -> Json<Value> {
     let jobs: Vec<Value> = locked(&service.jobs.all).values().map(|job| job.describe()).collect();
-    Ok(Json(json!({ "jobs": jobs })))
+    Json(json!({ "jobs": jobs }))
 }
 
 /// `GET /v1/jobs/{id}`
 pub async fn one(
     State(service): State<Arc<Service>>,
-    Path(id): Path<String>,
-    pairs: Pairs,
+    Segments(id): Segments<String>,
+    _: Plain,
 ) -> Result<Json<Value>, Problem> {
-    checked(pairs, &[])?;
     Ok(Json(service.jobs.get(&id)?.describe()))
 }
 
 /// `DELETE /v1/jobs/{id}`
 pub async fn cancel(
     State(service): State<Arc<Service>>,
-    Path(id): Path<String>,
-    pairs: Pairs,
+    Segments(id): Segments<String>,
+    _: Plain,
 ) -> Result<Json<Value>, Problem> {
-    checked(pairs, &[])?;
     let job = service.jobs.get(&id)?;
-    if job.ended() {
-        return Err(Problem::conflict("the job has ended; only one under way can be cancelled"));
+    if job.end(Progress::Cancelled) {
+        Ok(Json(job.describe()))
+    } else {
+        Err(Problem::conflict("the job has ended; only one that is running can be cancelled"))
     }
-    job.cancel.store(true, Ordering::Relaxed);
-    Ok(Json(job.describe()))
 }

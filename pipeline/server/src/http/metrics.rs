@@ -12,6 +12,7 @@ use prometheus_client::metrics::gauge::Gauge;
 use prometheus_client::metrics::histogram::Histogram;
 use prometheus_client::registry::Registry;
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 
 /// Bounds of the times of answers, s.
 const SECONDS: [f64; 11] = [0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.3, 1.0, 5.0, 30.0];
@@ -58,28 +59,24 @@ impl Metrics {
         registry.register("requests", "Answers by route and status", self.requests.clone());
         registry.register("request_seconds", "Time of answers", self.seconds.clone());
         registry.register("connections", "Open connections", self.connections.clone());
-        let s = service.library.statistics();
-        let figures: [(&str, &str, u64); 11] = [
-            ("library_memory_hits", "Tiles answered from memory", s.memory_hits),
-            ("library_disk_hits", "Tiles read from disk", s.disk_hits),
-            ("library_made", "Tiles made", s.made),
-            ("library_cancelled", "Makings that nobody waited for any longer", s.cancelled),
-            ("library_failed", "Makings that failed", s.failed),
-            ("library_damaged", "Damaged records", s.damaged),
-            ("library_evicted", "Records that made room", s.evicted),
-            ("library_unwritten", "Records that could not be written", s.unwritten),
-            ("library_disk_bytes", "Bytes of records", s.disk_bytes),
-            ("library_memory_bytes", "Bytes of tiles in memory", s.memory_bytes),
-            ("library_queued", "Tiles that wait to be made", s.queued),
-        ];
-        for (name, help, value) in figures {
-            let gauge: Gauge = Gauge::default();
-            gauge.set(i64::try_from(value).unwrap_or(i64::MAX));
-            registry.register(name, help, gauge);
+        for figure in service.library.statistics().figures() {
+            let (name, value) = (format!("library_{}", figure.name), figure.value);
+            if figure.counts {
+                let counter: Counter = Counter::default();
+                counter.inc_by(value);
+                registry.register(name, figure.help, counter);
+            } else {
+                let gauge: Gauge = Gauge::default();
+                gauge.set(i64::try_from(value).unwrap_or(i64::MAX));
+                registry.register(name, figure.help, gauge);
+            }
         }
         let answers: Gauge = Gauge::default();
         answers.set(i64::try_from(service.answers.bytes()).unwrap_or(i64::MAX));
         registry.register("answers_bytes", "Bytes of answers in memory", answers);
+        let sending: Gauge = Gauge::default();
+        sending.set(i64::try_from(service.sending.load(Ordering::Relaxed)).unwrap_or(i64::MAX));
+        registry.register("sending_bytes", "Bytes of answers on their way to clients", sending);
         let mut text = String::new();
         encode(&mut text, &registry)?;
         Ok(text)

@@ -1,6 +1,7 @@
 //! The service: addresses, parameters, answers and their limits.
 
 pub mod answer;
+pub mod extract;
 pub mod guard;
 pub mod jobs;
 pub mod metrics;
@@ -14,12 +15,14 @@ pub mod service;
 pub mod tiles;
 pub mod values;
 
+pub use extract::{Base, On, Pairs, Plain, Segments};
 pub use problem::Problem;
 pub use query::Query;
 pub use service::{Limits, Service};
 
-use axum::extract::DefaultBodyLimit;
-use axum::http::{HeaderValue, Method, header};
+use answer::AsItIs;
+use axum::extract::{DefaultBodyLimit, State};
+use axum::http::{HeaderMap, HeaderValue, Method, StatusCode, Version, header};
 use axum::middleware::{from_fn, from_fn_with_state};
 use axum::response::{IntoResponse, Response};
 use axum::routing::{MethodRouter, get};
@@ -27,11 +30,8 @@ use axum::{Json, Router};
 use std::sync::Arc;
 use tower_http::catch_panic::CatchPanicLayer;
 use tower_http::compression::CompressionLayer;
+use tower_http::compression::predicate::{DefaultPredicate, Predicate};
 use tower_http::cors::{AllowOrigin, CorsLayer};
-
-/// The parameters of an address, as they stand there.
-#[derive(Clone, Debug)]
-pub struct Pairs(pub Vec<(String, String)>);
 
 type Route = (&'static str, fn() -> MethodRouter<Arc<Service>>);
 
@@ -61,48 +61,58 @@ pub const ROUTES: [Route; 22] = [
     ("/metrics", || get(metrics::metrics)),
 ];
 
-/// The service as a router; `origins` may use it from their pages.
+/// The service as a router; pages of `origins` may use it.
 pub fn router(service: &Arc<Service>, origins: &[HeaderValue]) -> Router {
     let mut router = Router::new();
     for (path, handlers) in ROUTES {
         router = router.route(path, handlers());
     }
-    router = router
+    router
         .route("/healthz", get(async || "ok\n"))
         .route("/", get(page::index))
         .route("/{*file}", get(page::file))
-        .method_not_allowed_fallback(async || Problem::method("this address takes another method"))
-        .layer(DefaultBodyLimit::max(service.limits.body));
-    if !origins.is_empty() {
-        let cors = CorsLayer::new()
-            .allow_origin(AllowOrigin::list(origins.iter().cloned()))
-            .allow_methods([Method::GET, Method::HEAD, Method::POST, Method::DELETE])
-            .allow_headers([header::AUTHORIZATION, header::CONTENT_TYPE, header::IF_NONE_MATCH, header::RANGE])
-            .expose_headers(tower_http::cors::Any);
-        router = router.layer(cors);
-    }
-    router
-        .layer(CompressionLayer::new())
+        .method_not_allowed_fallback(async |method: Method| {
+            Problem::method(format!("{method} is not for this address; the header `Allow` names what is"))
+        })
+        .layer(DefaultBodyLimit::max(service::BODY_BYTES))
+        .layer(CompressionLayer::new().compress_when(DefaultPredicate::new().and(is_packed)))
         .layer(from_fn(guard::tag_encodings))
         .layer(CatchPanicLayer::custom(panicked))
         .layer(from_fn_with_state(Arc::clone(service), guard::guard))
+        // Around all others, so that pages can read what is refused.
+        .layer(cors(origins))
         .with_state(Arc::clone(service))
 }
 
+/// Whether a response is packed where the client takes it packed.
+fn is_packed(_: StatusCode, _: Version, _: &HeaderMap, extensions: &axum::http::Extensions) -> bool {
+    extensions.get::<AsItIs>().is_none()
+}
+
+fn cors(origins: &[HeaderValue]) -> CorsLayer {
+    let allowed = match origins {
+        [any] if any == "*" => AllowOrigin::any(),
+        some => AllowOrigin::list(some.iter().cloned()),
+    };
+    CorsLayer::new()
+        .allow_origin(allowed)
+        .allow_methods([Method::GET, Method::HEAD, Method::POST, Method::DELETE])
+        .allow_headers([
+            header::AUTHORIZATION,
+            header::CONTENT_TYPE,
+            header::IF_NONE_MATCH,
+            header::IF_RANGE,
+            header::RANGE,
+        ])
+        .expose_headers(tower_http::cors::Any)
+}
+
 fn panicked(_: Box<dyn std::any::Any + Send>) -> Response {
-    Problem::internal("a fault of the server; its log says more").into_response()
+    Problem::internal("internal error; see the log of the server").into_response()
 }
 
 /// `GET /v1/library`
-async fn library(
-    axum::extract::State(service): axum::extract::State<Arc<Service>>,
-    pairs: Pairs,
-) -> Result<Json<serde_json::Value>, Problem> {
-    service::checked(pairs, &[])?;
-    let s = service.library.statistics();
-    Ok(Json(serde_json::json!({
-        "memory_hits": s.memory_hits, "disk_hits": s.disk_hits, "made": s.made, "cancelled": s.cancelled, "failed": s.failed,
-        "damaged": s.damaged, "evicted": s.evicted, "unwritten": s.unwritten, "disk_bytes": s.disk_bytes,
-        "memory_bytes": s.memory_bytes, "queued": s.queued,
-    })))
+async fn library(State(service): State<Arc<Service>>, _: Plain) -> Json<serde_json::Value> {
+    let figures = service.library.statistics().figures().map(|f| (f.name.to_owned(), f.value.into()));
+    Json(serde_json::Value::Object(figures.into_iter().collect()))
 }

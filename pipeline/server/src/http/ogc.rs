@@ -1,20 +1,18 @@
 //! Landing page, collections and tile sets as OGC API - Tiles has them.
 
-use super::service::{Service, blocking, checked};
-use super::{Pairs, Problem};
+use super::service::Service;
+use super::{Base, On, Plain, Problem, Segments};
 use crate::collections::Collection;
 use crate::grid::TILE;
-use crate::layers::Layer;
 use axum::Json;
-use axum::extract::{Path, State};
-use axum::http::{HeaderMap, header};
+use axum::extract::State;
 use serde_json::{Value, json};
 use std::sync::Arc;
 
 /// Side of a pixel that scale denominators refer to, m.
 const STANDARD_PIXEL_M: f64 = 0.00028;
 const JSON: &str = "application/json";
-/// What is conformed to.
+/// Conformance classes.
 const CONFORMANCE: [&str; 6] = [
     "http://www.opengis.net/spec/ogcapi-common-1/1.0/conf/core",
     "http://www.opengis.net/spec/ogcapi-common-1/1.0/conf/json",
@@ -28,70 +26,55 @@ const MAP_TILESETS: &str = "http://www.opengis.net/def/rel/ogc/1.0/tilesets-map"
 const SCHEME: &str = "http://www.opengis.net/def/rel/ogc/1.0/tiling-scheme";
 const SCHEMES: &str = "http://www.opengis.net/def/rel/ogc/1.0/tiling-schemes";
 
-/// Where clients find the server, as they call it.
-pub fn base(headers: &HeaderMap) -> String {
-    let host = headers.get(header::HOST).and_then(|value| value.to_str().ok()).unwrap_or("localhost");
-    let plain = host.bytes().all(|b| b.is_ascii_alphanumeric() || b".:-[]".contains(&b));
-    format!("http://{}", if plain { host } else { "localhost" })
-}
-
 fn link(href: String, rel: &str, media: &str, title: &str) -> Value {
     json!({ "href": href, "rel": rel, "type": media, "title": title })
 }
 
 /// `GET /v1`
-pub async fn landing(
-    State(service): State<Arc<Service>>,
-    pairs: Pairs,
-    headers: HeaderMap,
-) -> Result<Json<Value>, Problem> {
-    checked(pairs, &[])?;
-    let v1 = format!("{}/v1", base(&headers));
-    Ok(Json(json!({
+pub async fn landing(State(service): State<Arc<Service>>, _: Plain, Base(base): Base) -> Json<Value> {
+    let v1 = format!("{base}/v1");
+    Json(json!({
         "title": "sastrugi terrain server",
-        "description": format!("{} collections: patches of terrain at any place and resolution, and map tiles", service.collections.len()),
+        "description": "Patches of terrain at any place and resolution, and map tiles",
+        "collections": service.collections.len(),
         "links": [
             link(v1.clone(), "self", JSON, "this page"),
             link(format!("{v1}/openapi.json"), "service-desc", "application/vnd.oai.openapi+json;version=3.1", "the API"),
-            link(format!("{v1}/conformance"), "conformance", JSON, "what is conformed to"),
+            link(format!("{v1}/conformance"), "conformance", JSON, "conformance classes"),
             link(format!("{v1}/collections"), "data", JSON, "worlds and rasters"),
             link(format!("{v1}/tileMatrixSets"), SCHEMES, JSON, "tile matrix sets"),
         ],
-    })))
+    }))
 }
 
 /// `GET /v1/conformance`
-pub async fn conformance(pairs: Pairs) -> Result<Json<Value>, Problem> {
-    checked(pairs, &[])?;
-    Ok(Json(json!({ "conformsTo": CONFORMANCE })))
+pub async fn conformance(_: Plain) -> Json<Value> {
+    Json(json!({ "conformsTo": CONFORMANCE }))
 }
 
 /// `GET /v1/collections`
 pub async fn collections(
     State(service): State<Arc<Service>>,
-    pairs: Pairs,
-    headers: HeaderMap,
+    _: Plain,
+    Base(base): Base,
 ) -> Result<Json<Value>, Problem> {
-    checked(pairs, &[])?;
-    let base = base(&headers);
-    blocking(move || {
-        let all: Vec<Value> = service.collections.values().map(|c| described(c, &base)).collect();
+    let own = Arc::clone(&service);
+    let describe = move || {
+        let all: Vec<Value> = own.collections.values().map(|c| described(c, &base)).collect();
         let links = [link(format!("{base}/v1/collections"), "self", JSON, "this list")];
         Ok(Json(json!({ "collections": all, "links": links })))
-    })
-    .await
+    };
+    service.blocking(describe).await
 }
 
 /// `GET /v1/collections/{id}`
 pub async fn collection(
     State(service): State<Arc<Service>>,
-    Path(id): Path<String>,
-    pairs: Pairs,
-    headers: HeaderMap,
+    On(collection): On,
+    _: Plain,
+    Base(base): Base,
 ) -> Result<Json<Value>, Problem> {
-    checked(pairs, &[])?;
-    let (collection, base) = (Arc::clone(service.collection(&id)?), base(&headers));
-    blocking(move || Ok(Json(described(&collection, &base)))).await
+    service.blocking(move || Ok(Json(described(&collection, &base)))).await
 }
 
 fn described(collection: &Collection, base: &str) -> Value {
@@ -116,28 +99,17 @@ fn crs(id: &str) -> String {
 }
 
 /// `GET /v1/tileMatrixSets`
-pub async fn matrix_sets(
-    State(service): State<Arc<Service>>,
-    pairs: Pairs,
-    headers: HeaderMap,
-) -> Result<Json<Value>, Problem> {
-    checked(pairs, &[])?;
-    let base = base(&headers);
+pub async fn matrix_sets(State(service): State<Arc<Service>>, _: Plain, Base(base): Base) -> Json<Value> {
     let set = |id: &String| {
         let address = format!("{base}/v1/tileMatrixSets/{id}");
         json!({ "id": id, "title": id, "crs": crs(id), "links": [link(address, SCHEME, JSON, id)] })
     };
-    Ok(Json(json!({ "tileMatrixSets": service.collections.keys().map(set).collect::<Vec<_>>() })))
+    Json(json!({ "tileMatrixSets": service.collections.keys().map(set).collect::<Vec<_>>() }))
 }
 
 /// `GET /v1/tileMatrixSets/{id}`
-pub async fn matrix_set(
-    State(service): State<Arc<Service>>,
-    Path(id): Path<String>,
-    pairs: Pairs,
-) -> Result<Json<Value>, Problem> {
-    checked(pairs, &[])?;
-    let grid = service.collection(&id)?.grid();
+pub async fn matrix_set(On(collection): On, _: Plain) -> Json<Value> {
+    let (id, grid) = (&collection.id, collection.grid());
     let matrix = |level: u32| {
         let [cols, rows] = grid.matrix(level);
         let cell = grid.resolution_m(level);
@@ -146,46 +118,44 @@ pub async fn matrix_set(
             "pointOfOrigin": grid.origin_m, "tileWidth": TILE, "tileHeight": TILE, "matrixWidth": cols, "matrixHeight": rows,
         })
     };
-    Ok(Json(json!({
-        "id": id, "title": id, "crs": crs(&id), "orderedAxes": ["E", "N"],
+    Json(json!({
+        "id": id, "title": id, "crs": crs(id), "orderedAxes": ["E", "N"],
         "tileMatrices": (0..grid.levels).map(matrix).collect::<Vec<_>>(),
-    })))
+    }))
 }
 
-fn checked_layer<'a>(collection: &Collection, layer: &'a str) -> Result<&'a str, Problem> {
-    let known = Layer::of_name(layer).is_some_and(|l| collection.layers().contains(&l.name()));
-    let layers = || collection.layers().join(", ");
-    known
-        .then_some(layer)
-        .ok_or_else(|| Problem::not_found(format!("\"{}\" has no such layer; it has {}", collection.id, layers())))
+/// Refuses a tile matrix set that is not the collection's own.
+///
+/// # Errors
+/// Another one.
+pub fn check_matrix_set(collection: &Collection, set: &str) -> Result<(), Problem> {
+    let id = &collection.id;
+    if set == id {
+        return Ok(());
+    }
+    Err(Problem::not_found(format!("the tiles of \"{id}\" lie in the tile matrix set \"{id}\"")))
 }
 
 /// `GET /v1/collections/{id}/styles/{layer}/map/tiles`
 pub async fn tile_sets(
-    State(service): State<Arc<Service>>,
-    Path((id, layer)): Path<(String, String)>,
-    pairs: Pairs,
-    headers: HeaderMap,
+    On(collection): On,
+    Segments((_, layer)): Segments<(String, String)>,
+    _: Plain,
+    Base(base): Base,
 ) -> Result<Json<Value>, Problem> {
-    checked(pairs, &[])?;
-    let collection = service.collection(&id)?;
-    let set = tile_set_of(collection, checked_layer(collection, &layer)?, &base(&headers));
+    let set = tile_set_of(&collection, collection.layer(&layer)?.name(), &base);
     Ok(Json(json!({ "tilesets": [set] })))
 }
 
 /// `GET /v1/collections/{id}/styles/{layer}/map/tiles/{tms}`
 pub async fn tile_set(
-    State(service): State<Arc<Service>>,
-    Path((id, layer, grid)): Path<(String, String, String)>,
-    pairs: Pairs,
-    headers: HeaderMap,
+    On(collection): On,
+    Segments((_, layer, set)): Segments<(String, String, String)>,
+    _: Plain,
+    Base(base): Base,
 ) -> Result<Json<Value>, Problem> {
-    checked(pairs, &[])?;
-    let collection = service.collection(&id)?;
-    if grid != id {
-        return Err(Problem::not_found(format!("the tiles of \"{id}\" lie in the tile matrix set \"{id}\"")));
-    }
-    Ok(Json(tile_set_of(collection, checked_layer(collection, &layer)?, &base(&headers))))
+    check_matrix_set(&collection, &set)?;
+    Ok(Json(tile_set_of(&collection, collection.layer(&layer)?.name(), &base)))
 }
 
 fn tile_set_of(collection: &Collection, layer: &str, base: &str) -> Value {

@@ -1,17 +1,15 @@
 //! The description of the API: OpenAPI 3.1.
 
 use super::patch::{FIELDS, FORMATS};
-use super::service::checked;
-use super::{Pairs, Problem, Service};
+use super::{Plain, Service};
 use axum::Json;
 use axum::extract::State;
 use serde_json::{Map, Value, json};
 use std::sync::Arc;
 
 /// `GET /v1/openapi.json`
-pub async fn description(State(service): State<Arc<Service>>, pairs: Pairs) -> Result<Json<Value>, Problem> {
-    checked(pairs, &[])?;
-    Ok(Json(document(&service)))
+pub async fn description(State(service): State<Arc<Service>>, _: Plain) -> Json<Value> {
+    Json(document(&service))
 }
 
 /// A parameter of a query.
@@ -32,7 +30,7 @@ fn pair() -> Value {
     json!({ "type": "string", "pattern": "^-?[0-9]{1,9}(\\.[0-9]{1,6})?,-?[0-9]{1,9}(\\.[0-9]{1,6})?$" })
 }
 
-fn version() -> Vec<Value> {
+fn selection() -> Vec<Value> {
     let numbers = json!({ "type": "string", "pattern": "^([1-9][0-9]?(,[1-9][0-9]?)*)?$" });
     vec![
         query("phenomena", numbers, "Numbers of the processes that act; all when absent"),
@@ -66,21 +64,20 @@ fn patch() -> Vec<Value> {
     all.extend([
         query("field", words(&FIELDS), "What the samples are"),
         query("format", words(&FORMATS), "GeoTIFF (COG), NumPy, float32 little-endian, or 16-bit PNG"),
-        query("interpolation", words(&["bilinear"]), "Between samples"),
         query("rotate", words(&["0", "90", "180", "270"]), "Counterclockwise, degrees"),
         query("flip", words(&["none", "horizontal", "vertical"]), "Mirror"),
         query("downsample", json!({ "type": "integer", "minimum": 0, "maximum": 12 }), "One sample for 2^m x 2^m"),
         query("method", words(&["point", "mean"]), "How blocks are thinned"),
     ]);
     all.extend(sun());
-    all.extend(version());
+    all.extend(selection());
     all
 }
 
 fn tile() -> Vec<Value> {
     let mut all = sun();
     all.push(query("exaggeration", number(0.1, 100.0), "Factor on slopes"));
-    all.push(version().remove(0));
+    all.push(selection().remove(0));
     all
 }
 
@@ -116,16 +113,16 @@ fn operations() -> Vec<Operation> {
         query("samples", json!({ "type": "integer", "minimum": 2, "maximum": 4096 }), "Number of samples"),
         query("resolution_m", number(1e-6, 1e9), "Distance of the samples of the ground, m"),
     ];
-    let with_version = |mut parameters: Vec<Value>| {
-        parameters.extend(version());
+    let with_selection = |mut parameters: Vec<Value>| {
+        parameters.extend(selection());
         parameters
     };
     let media = &["image/tiff; application=geotiff; profile=cloud-optimized", "application/octet-stream", "image/png"];
     vec![
         operation("/v1", "Landing page", vec![], JSON),
-        operation("/v1/conformance", "What is conformed to", vec![], JSON),
+        operation("/v1/conformance", "Conformance classes", vec![], JSON),
         operation("/v1/openapi.json", "This description", vec![], JSON),
-        operation("/v1/library", "What the library of tiles has done", vec![], JSON),
+        operation("/v1/library", "What the tile library has done", vec![], JSON),
         operation("/v1/collections", "Worlds and rasters", vec![], JSON),
         operation("/v1/collections/{id}", "One of them", vec![], JSON),
         operation("/v1/collections/{id}/patch", "Samples of a window", patch(), media),
@@ -135,8 +132,8 @@ fn operations() -> Vec<Operation> {
             window(),
             &["text/plain; charset=utf-8"],
         ),
-        operation("/v1/collections/{id}/point", "Values at a point", with_version(point), JSON),
-        operation("/v1/collections/{id}/profile", "Heights along a line", with_version(profile), JSON),
+        operation("/v1/collections/{id}/point", "Values at a point", with_selection(point), JSON),
+        operation("/v1/collections/{id}/profile", "Heights along a line", with_selection(profile), JSON),
         operation("/v1/collections/{id}/tracks", "Missions and rovers driven on a terrain", vec![], JSON),
         operation("/v1/collections/{id}/tracks/{track}", "One track", vec![], JSON),
         operation("/v1/collections/{id}/styles/{layer}/map/tiles", "Tile sets of a layer", vec![], JSON),
@@ -156,8 +153,8 @@ fn operations() -> Vec<Operation> {
         ),
         operation("/v1/tileMatrixSets", "Tile matrix sets", vec![], JSON),
         operation("/v1/tileMatrixSets/{id}", "One of them", vec![], JSON),
-        operation("/v1/jobs", "Work ahead", vec![], JSON),
-        Operation { method: "post", ..operation("/v1/jobs", "Order tiles ahead", vec![], JSON) },
+        operation("/v1/jobs", "Jobs", vec![], JSON),
+        Operation { method: "post", ..operation("/v1/jobs", "Order the tiles of an area in advance", vec![], JSON) },
         operation("/v1/jobs/{id}", "One job", vec![], JSON),
         Operation { method: "delete", ..operation("/v1/jobs/{id}", "Cancel a job", vec![], JSON) },
         operation(
@@ -190,16 +187,22 @@ fn document(service: &Service) -> Value {
         let mut parameters = in_path(o.path, &ids);
         parameters.extend(o.parameters);
         let content: Map<String, Value> = o.media.iter().map(|m| ((*m).to_owned(), json!({}))).collect();
-        let mut responses = json!({ "200": { "description": "Done", "content": content } });
-        for (status, what) in problems(o.path, o.method) {
+        let (done, what) = if o.method == "post" { ("202", "Taken") } else { ("200", "Done") };
+        let mut responses = json!({ done: { "description": what, "content": content } });
+        for (status, what) in problems(o.method) {
             responses[status] = problem(what);
         }
-        if o.path.ends_with("{col}") || o.path.ends_with("{y}") {
+        let is_tile = o.path.ends_with("{col}") || o.path.ends_with("{y}");
+        if is_tile {
             responses["204"] = json!({ "description": "There is no data in this tile" });
+        }
+        if is_tile || o.path.ends_with("/patch") {
+            responses["206"] = json!({ "description": "The range that was asked for" });
+            responses["304"] = json!({ "description": "The client has it" });
+            responses["416"] = problem("The range lies beyond the end");
         }
         let mut entry = json!({ "summary": o.summary, "parameters": parameters, "responses": responses });
         if o.method == "post" {
-            entry["responses"]["202"] = json!({ "description": "Taken", "content": { "application/json": {} } });
             entry["requestBody"] =
                 json!({ "required": true, "content": { "application/json": { "schema": order() } } });
         }
@@ -228,20 +231,24 @@ fn document(service: &Service) -> Value {
     document
 }
 
-fn problems(path: &str, method: &str) -> Vec<(&'static str, &'static str)> {
+fn problems(method: &str) -> Vec<(&'static str, &'static str)> {
     let mut all = vec![
         ("400", "A parameter is missing, unknown or out of range"),
         ("401", "The token is missing or wrong"),
         ("404", "There is no such thing, or no data"),
         ("413", "More than a limit"),
+        ("405", "Another method"),
         ("414", "The address is too long"),
+        ("421", "The request is meant for another host"),
         ("422", "There is nothing right to answer"),
-        ("429", "Too many requests of one client"),
-        ("500", "A fault of the server"),
-        ("503", "The server cannot now"),
+        ("429", "Too many requests of one client are in progress"),
+        ("500", "Internal error"),
+        ("503", "The server is busy"),
     ];
-    if method == "delete" || path == "/v1/jobs" {
-        all.push(("409", "It can no longer be done"));
+    match method {
+        "delete" => all.push(("409", "The job has ended")),
+        "post" => all.push(("415", "The body is not JSON")),
+        _ => {}
     }
     all
 }
@@ -278,5 +285,21 @@ mod tests {
         let described: BTreeSet<&str> = operations().iter().map(|o| o.path).collect();
         let routed: BTreeSet<&str> = super::super::ROUTES.iter().map(|(path, _)| *path).collect();
         assert_eq!(described, routed);
+    }
+
+    /// It names the parameters that are taken, and no other.
+    #[test]
+    fn val_every_parameter_is_described() {
+        let names = |path: &str| -> BTreeSet<String> {
+            let all = operations();
+            let found = all.iter().find(|o| o.path == path).unwrap();
+            found.parameters.iter().map(|p| p["name"].as_str().unwrap().to_owned()).collect()
+        };
+        let own = |known: &[&str]| known.iter().map(|name| (*name).to_owned()).collect::<BTreeSet<String>>();
+        assert_eq!(names("/v1/collections/{id}/patch"), own(&super::super::patch::KNOWN));
+        assert_eq!(names("/v1/collections/{id}/xyz/{layer}/{z}/{x}/{y}"), own(&super::super::tiles::KNOWN));
+        let known = |own_names: &[&'static str]| own(&[own_names, &super::super::service::SELECTION].concat());
+        assert_eq!(names("/v1/collections/{id}/point"), known(&super::super::values::POINT));
+        assert_eq!(names("/v1/collections/{id}/profile"), known(&super::super::values::PROFILE));
     }
 }

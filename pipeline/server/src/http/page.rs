@@ -1,9 +1,9 @@
 //! The map page: files that are part of the program.
 
-use super::Problem;
+use super::answer::{held, not_modified, tag};
+use super::{Problem, Segments};
 use axum::body::Bytes;
-use axum::extract::Path;
-use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
+use axum::http::{HeaderMap, HeaderValue, header};
 use axum::response::{IntoResponse, Response};
 
 /// Name, media type and bytes of every file.
@@ -21,21 +21,21 @@ pub async fn index(headers: HeaderMap) -> Response {
 }
 
 /// `GET /{file}`
-pub async fn file(Path(name): Path<String>, headers: HeaderMap) -> Result<Response, Problem> {
+pub async fn file(Segments(name): Segments<String>, headers: HeaderMap) -> Result<Response, Problem> {
     send(&name, &headers)
 }
 
 fn send(name: &str, headers: &HeaderMap) -> Result<Response, Problem> {
     let found = FILES.iter().find(|(own, ..)| *own == name);
     let (_, media, bytes) = found.ok_or_else(|| Problem::not_found("no such page; the API is below /v1"))?;
-    let tag = format!("\"{}\"", &blake3::hash(bytes).to_hex()[..32]);
-    if headers.get(header::IF_NONE_MATCH).is_some_and(|own| own.as_bytes() == tag.as_bytes()) {
-        return Ok(StatusCode::NOT_MODIFIED.into_response());
+    let tag = tag(bytes);
+    if let Some(own) = held(headers, &tag) {
+        return Ok(not_modified(own));
     }
     let mut response = Bytes::from_static(bytes).into_response();
     let own = response.headers_mut();
     own.insert(header::CONTENT_TYPE, HeaderValue::from_static(media));
     own.insert(header::CACHE_CONTROL, HeaderValue::from_static("no-cache"));
-    own.extend(HeaderValue::from_str(&tag).ok().map(|tag| (header::ETAG, tag)));
+    own.extend(HeaderValue::from_str(&format!("\"{tag}\"")).ok().map(|tag| (header::ETAG, tag)));
     Ok(response)
 }

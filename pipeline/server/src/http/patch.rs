@@ -1,12 +1,12 @@
 //! `patch`: samples of any place at any resolution, in the format that is asked for.
 
 use super::answer::Answer;
-use super::service::{Service, VERSION, blocking, checked, version};
-use super::{Pairs, Problem, Query};
-use crate::collections::world::Version;
+use super::service::{Service, selection};
+use super::{On, Pairs, Problem, Query};
+use crate::collections::world::{Piece, Selection};
 use crate::collections::{Collection, Ground};
 use crate::samples::{Flip, Samples, Thinning};
-use axum::extract::{Path, State};
+use axum::extract::State;
 use axum::http::{HeaderMap, HeaderName, HeaderValue, header};
 use axum::response::Response;
 use sastrugi_imaging::{RenderParameters, Scene, Sun, render};
@@ -14,7 +14,8 @@ use sastrugi_numeric::{Geometry, Grid, Streams};
 use sastrugi_store::dem::{self, Crs, Values, WriteOptions};
 use std::sync::Arc;
 
-const KNOWN: [&str; 16] = [
+/// The parameters that patches take.
+pub const KNOWN: [&str; 15] = [
     "origin",
     "center",
     "size",
@@ -22,7 +23,6 @@ const KNOWN: [&str; 16] = [
     "resolution_m",
     "field",
     "format",
-    "interpolation",
     "rotate",
     "flip",
     "downsample",
@@ -36,6 +36,8 @@ const KNOWN: [&str; 16] = [
 pub const FIELDS: [&str; 5] = ["elevation", "albedo", "class", "rock_potential", "image"];
 /// Names of the formats.
 pub const FORMATS: [&str; 4] = ["tif", "npy", "raw", "png"];
+/// An image may have this part of the samples of a patch: rendering takes far longer than samples that are there.
+const IMAGE_PART: u64 = 4;
 /// Blocks of at most 2^12 x 2^12 samples.
 const DOWNSAMPLE_MAX: u32 = 12;
 
@@ -64,15 +66,16 @@ impl Window {
             _ => return Err(Problem::bad_request("give `size` in samples or `size_m` in metres, one of the two")),
         };
         if shape.iter().any(|n| !(*n >= 1.0 && n.fract() == 0.0)) {
-            return Err(Problem::bad_request(format!(
-                "`size`: {} x {} samples; it must be whole numbers of at least 1",
-                shape[0], shape[1]
-            )));
+            return Err(Problem::bad_request(if query.text("size").is_some() {
+                "`size` must be two whole numbers of at least 1, columns and rows".to_owned()
+            } else {
+                format!("`size_m` is smaller than half a sample; samples are {step_m} m apart")
+            }));
         }
         if shape[0] * shape[1] > most as f64 {
             return Err(Problem::too_large(
                 format!(
-                    "{} x {} samples are too many: this server makes at most {most} at once; ask for fewer, or for parts",
+                    "{} x {} samples are too many: the limit is {most}; ask for fewer, or for parts",
                     shape[0], shape[1]
                 ),
                 "samples_max",
@@ -114,6 +117,7 @@ fn settled(collection: &Collection, at: [f64; 2], step_m: f64) -> [f64; 2] {
 }
 
 /// What becomes of the samples.
+#[derive(Clone, Copy, Debug)]
 struct Treatment {
     field: &'static str,
     format: &'static str,
@@ -134,7 +138,6 @@ impl Treatment {
                 collection.id
             )));
         }
-        query.word("interpolation", &["bilinear"], "bilinear")?;
         let quarters = match query.word("rotate", &["0", "90", "180", "270"], "0")? {
             "90" => 1,
             "180" => 2,
@@ -155,9 +158,9 @@ impl Treatment {
         Ok(Self { field, format, quarters, flip, downsample, method, sun: sun(query)? })
     }
 
-    /// True where the result does not lie as the ground does.
-    fn is_displaced(&self) -> bool {
-        self.quarters > 0 || self.flip.is_some()
+    /// False where the result does not lie as the ground does.
+    fn has_place(&self) -> bool {
+        self.quarters == 0 && self.flip.is_none()
     }
 
     fn apply(&self, samples: Samples, window: &Window, crs: &Crs) -> Result<Answer, Problem> {
@@ -176,11 +179,11 @@ impl Treatment {
             None => field,
         };
         (geometry.rows, geometry.cols) = (field.rows, field.cols);
-        let crs = if self.is_displaced() {
+        let crs = if self.has_place() {
+            crs.clone()
+        } else {
             geometry.origin = [0.0; 2];
             Crs::default()
-        } else {
-            crs.clone()
         };
         self.encode(&Grid::new(geometry, field.heights), &crs)
     }
@@ -227,11 +230,12 @@ impl Treatment {
                 Answer::new(media(format), bytes)
             }
         };
+        let place = self.has_place().then(|| format!("{:?},{:?}", g.x(0), g.y(g.rows - 1)));
         let named = [
             ("grid-rows", g.rows.to_string()),
             ("grid-columns", g.cols.to_string()),
-            ("grid-cell-m", format!("{:?}", g.cell[0])),
-            ("grid-origin-m", format!("{:?},{:?}", g.origin[0], g.origin[1])),
+            ("grid-resolution-m", format!("{:?}", g.cell[0])),
+            ("grid-origin-m", place.unwrap_or_default()),
             ("grid-note", notes.join("; ")),
         ];
         for (name, value) in named.into_iter().filter(|(_, value)| !value.is_empty()) {
@@ -280,23 +284,23 @@ pub fn sun(query: &Query) -> Result<Sun, Problem> {
 /// `GET /v1/collections/{id}/patch`
 pub async fn patch(
     State(service): State<Arc<Service>>,
-    Path(id): Path<String>,
+    On(collection): On,
     pairs: Pairs,
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
-    let collection = Arc::clone(service.collection(&id)?);
-    let query = checked(pairs, &[&KNOWN])?;
-    let window = Window::of(&query, &collection, service.limits.samples)?;
+    let query = pairs.checked(&[&KNOWN])?;
     let treatment = Treatment::of(&query, &collection)?;
-    let version = version(&collection, &query)?;
-    let what = format!("patch {} {}", collection.digest, query.canonical());
+    let most = service.limits.samples / if treatment.field == "image" { IMAGE_PART } else { 1 };
+    let window = Window::of(&query, &collection, most.max(1))?;
+    let selection = selection(&collection, &query)?;
+    let what = format!("patch {} {window:?} {treatment:?} {selection:?}", collection.digest());
     let make = async {
-        let samples = ground(&service, &collection, &window, &version).await?;
+        let samples = ground(&service, &collection, &window, &selection).await?;
         let crs = match &collection.ground {
             Ground::World(_) => Crs::default(),
             Ground::Raster(raster) => raster.crs.clone(),
         };
-        blocking(move || treatment.apply(samples, &window, &crs)).await.map(Some)
+        service.blocking(move || treatment.apply(samples, &window, &crs)).await.map(Some)
     };
     service.answers.answer(&headers, &what, make).await
 }
@@ -305,9 +309,10 @@ async fn ground(
     service: &Service,
     collection: &Collection,
     window: &Window,
-    version: &Version,
+    selection: &Selection,
 ) -> Result<Samples, Problem> {
-    let samples = service.samples(collection, window.origin_m, window.step_m, window.shape, version).await?;
+    let Window { origin_m, step_m, shape } = *window;
+    let samples = service.samples(collection, origin_m, step_m, shape, selection, Piece::of(shape)).await?;
     if samples.is_void() {
         let [west, south, east, north] = collection.grid().bounds_m();
         return Err(Problem::not_found(format!(
@@ -319,22 +324,13 @@ async fn ground(
 }
 
 /// `GET /v1/collections/{id}/study`: a section of a study that makes the same patch.
-pub async fn snippet(
-    State(service): State<Arc<Service>>,
-    Path(id): Path<String>,
-    pairs: Pairs,
-) -> Result<String, Problem> {
-    let collection = service.collection(&id)?;
-    let query = checked(pairs, &[&["origin", "center", "size", "size_m", "resolution_m"]])?;
+pub async fn snippet(State(service): State<Arc<Service>>, On(collection): On, pairs: Pairs) -> Result<String, Problem> {
+    let query = pairs.checked(&[&["origin", "center", "size", "size_m", "resolution_m"]])?;
     let Ground::World(world) = &collection.ground else {
+        let id = &collection.id;
         return Err(Problem::bad_request(format!("\"{id}\" is a raster; its release holds the study that made it")));
     };
-    let window = Window::of(&query, collection, service.limits.samples)?;
+    let window = Window::of(&query, &collection, service.limits.samples)?;
     let [rows, cols] = window.shape;
     world.snippet(window.origin_m, [cols, rows], window.step_m)
 }
-
-/// Parameters of the version of a ground, and a sun.
-pub const LIT: [&str; 3] = ["sun_azimuth_deg", "sun_elevation_deg", "exaggeration"];
-/// The parameters that tiles take.
-pub const TILE_PARAMETERS: [&[&str]; 2] = [&LIT, &VERSION];

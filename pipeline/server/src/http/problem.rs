@@ -13,11 +13,13 @@ pub struct Problem {
     more: Map<String, Value>,
     /// Seconds after which the client may try again.
     retry_after_s: Option<u32>,
+    /// Bytes of the answer that a range lies beyond.
+    length: Option<usize>,
 }
 
 impl Problem {
     fn new(status: StatusCode, detail: impl Into<String>) -> Self {
-        Self { status, detail: detail.into(), more: Map::new(), retry_after_s: None }
+        Self { status, detail: detail.into(), more: Map::new(), retry_after_s: None, length: None }
     }
 
     /// 400: a parameter is missing, unknown or out of range.
@@ -38,6 +40,22 @@ impl Problem {
     /// 405: the path is right, the method is not.
     pub fn method(detail: impl Into<String>) -> Self {
         Self::new(StatusCode::METHOD_NOT_ALLOWED, detail)
+    }
+
+    /// 415: the body is of another type.
+    pub fn media(detail: impl Into<String>) -> Self {
+        Self::new(StatusCode::UNSUPPORTED_MEDIA_TYPE, detail)
+    }
+
+    /// 416: the range lies beyond the end of `length` bytes.
+    pub fn range(length: usize) -> Self {
+        let detail = format!("the range lies beyond the end; there are {length} bytes");
+        Self { length: Some(length), ..Self::new(StatusCode::RANGE_NOT_SATISFIABLE, detail) }
+    }
+
+    /// 421: the request is meant for another server.
+    pub fn misdirected(detail: impl Into<String>) -> Self {
+        Self::new(StatusCode::MISDIRECTED_REQUEST, detail)
     }
 
     /// 409: it can no longer be done.
@@ -102,6 +120,10 @@ impl IntoResponse for Problem {
         headers.insert(header::CACHE_CONTROL, HeaderValue::from_static("no-store"));
         if let Some(seconds) = self.retry_after_s {
             headers.insert(header::RETRY_AFTER, HeaderValue::from(seconds));
+        }
+        if let Some(length) = self.length {
+            let place = HeaderValue::from_str(&format!("bytes */{length}"));
+            headers.extend(place.ok().map(|place| (header::CONTENT_RANGE, place)));
         }
         if self.status == StatusCode::UNAUTHORIZED {
             headers.insert(header::WWW_AUTHENTICATE, HeaderValue::from_static("Bearer"));

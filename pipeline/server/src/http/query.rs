@@ -34,11 +34,6 @@ impl Query {
         Ok(Self(all))
     }
 
-    /// The parameters in one order, for the key of an answer.
-    pub fn canonical(&self) -> String {
-        self.0.iter().map(|(name, value)| format!("{name}={value}")).collect::<Vec<_>>().join("&")
-    }
-
     /// Text of a parameter.
     pub fn text(&self, name: &str) -> Option<&str> {
         self.0.get(name).map(String::as_str)
@@ -62,6 +57,14 @@ impl Query {
         let Some(text) = self.text(name) else { return Ok(None) };
         let value = f64::from_str(text).ok().filter(|v| (low..=high).contains(v));
         value.map(Some).ok_or_else(|| refused(name, text, &format!("a number from {low} to {high}")))
+    }
+
+    /// A number that must be there.
+    ///
+    /// # Errors
+    /// It is missing, or not within bounds.
+    pub fn number_of(&self, name: &str, bounds: [f64; 2]) -> Result<f64, Problem> {
+        self.number(name, bounds)?.ok_or_else(|| missing(name))
     }
 
     /// A whole number within bounds.
@@ -88,7 +91,7 @@ impl Query {
     /// # Errors
     /// Fewer than two places, or text that is not places.
     pub fn line(&self, name: &str, most: usize) -> Result<Vec<[f64; 2]>, Problem> {
-        let text = self.required(name)?;
+        let text = self.text(name).ok_or_else(|| missing(name))?;
         let places: Option<Vec<[f64; 2]>> = text.split(';').map(place).collect();
         places
             .filter(|p| (2..=most).contains(&p.len()))
@@ -105,14 +108,6 @@ impl Query {
         let numbers: Result<Vec<usize>, _> = parts.map(usize::from_str).collect();
         numbers.map(Some).map_err(|_| refused(name, text, "whole numbers, as `1,3`"))
     }
-
-    /// A parameter that must be there.
-    ///
-    /// # Errors
-    /// It is missing.
-    pub fn required(&self, name: &str) -> Result<&str, Problem> {
-        self.text(name).ok_or_else(|| Problem::bad_request(format!("`{name}`: missing; this path needs it")))
-    }
 }
 
 /// Name of the parameter that carries the token of pictures, which cannot carry a header.
@@ -122,6 +117,10 @@ fn place(text: &str) -> Option<[f64; 2]> {
     let (a, b) = text.split_once(',')?;
     let number = |text: &str| f64::from_str(text.trim()).ok().filter(|v| v.abs() <= FARTHEST_M);
     Some([number(a)?, number(b)?])
+}
+
+fn missing(name: &str) -> Problem {
+    Problem::bad_request(format!("`{name}`: missing; this path needs it"))
 }
 
 fn refused(name: &str, text: &str, right: &str) -> Problem {
@@ -141,10 +140,11 @@ mod tests {
     fn val_parameters_are_read_and_wrong_ones_are_named() {
         let q = query(&[("x", "2.5"), ("size", "3,4"), ("line", "0,0;1,2;3,4"), ("token", "secret")]).unwrap();
         assert_eq!(q.number("x", [0.0, 3.0]).unwrap(), Some(2.5));
+        assert_eq!(q.number_of("x", [0.0, 3.0]).unwrap(), 2.5);
+        assert!(q.number_of("n", [0.0, 3.0]).unwrap_err().detail().contains("missing"));
         assert_eq!(q.pair("size").unwrap(), Some([3.0, 4.0]));
         assert_eq!(q.line("line", 3).unwrap().len(), 3);
         assert!(q.line("line", 2).is_err());
-        assert_eq!(q.canonical(), "line=0,0;1,2;3,4&size=3,4&x=2.5");
         for (name, text) in [("x", "nan"), ("x", "4"), ("x", "inf"), ("x", "1e400"), ("x", "")] {
             let problem = query(&[(name, text)]).unwrap().number(name, [0.0, 3.0]).unwrap_err();
             assert!(problem.detail().contains("`x`"), "{}", problem.detail());

@@ -3,20 +3,25 @@
 use super::answer::Answers;
 use super::jobs::Jobs;
 use super::metrics::Metrics;
-use super::{Pairs, Problem, Query};
-use crate::collections::world::{Maker, Version};
+use super::{Problem, Query};
+use crate::collections::world::{Maker, Piece, Selection};
 use crate::collections::{Collection, Collections, Ground};
 use crate::library::{Library, Priority};
 use crate::samples::Samples;
 use std::collections::HashMap;
-use std::net::IpAddr;
+use std::net::{IpAddr, SocketAddr};
+use std::sync::atomic::AtomicU64;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
+use tokio::sync::Semaphore;
+
+/// Most bytes of the body of a request.
+pub const BODY_BYTES: usize = 1 << 16;
 
 /// What a request may ask for, and how much may be under way.
 #[derive(Clone, Debug)]
 pub struct Limits {
-    /// Most samples of a patch.
+    /// Most samples of a patch; of an image a quarter.
     pub samples: u64,
     /// Most processor time that a request may be expected to take, s.
     pub work_s: f64,
@@ -30,27 +35,29 @@ pub struct Limits {
     pub request: Duration,
     /// Longest address, bytes.
     pub address: usize,
-    /// Most bytes of the body of a request.
-    pub body: usize,
+    /// Most bytes of answers on their way to clients.
+    pub sending: u64,
 }
 
 impl Default for Limits {
     fn default() -> Self {
         Self {
             samples: 1 << 22,
-            work_s: 40.0,
+            work_s: 60.0,
             job_tiles: 1 << 20,
             per_client: 256,
             connections: 2048,
             request: Duration::from_secs(60),
             address: 8192,
-            body: 1 << 16,
+            sending: 1 << 29,
         }
     }
 }
 
 /// The service.
 pub struct Service {
+    /// Where it listens.
+    pub address: SocketAddr,
     /// What is served.
     pub collections: Collections,
     /// Tiles that were made.
@@ -61,12 +68,18 @@ pub struct Service {
     pub limits: Limits,
     /// What clients must show.
     pub token: Option<String>,
+    /// Names of this computer beside those of its loopback, as clients call it.
+    pub hosts: Vec<String>,
     /// Work ahead.
     pub jobs: Jobs,
     /// Counters.
     pub metrics: Metrics,
     /// Requests under way by client.
     pub under_way: Mutex<HashMap<IpAddr, usize>>,
+    /// Bytes of answers on their way to clients.
+    pub sending: AtomicU64,
+    /// Processors for work that is not that of the library.
+    pub processors: Arc<Semaphore>,
 }
 
 impl Service {
@@ -96,55 +109,54 @@ impl Service {
         origin_m: [f64; 2],
         step_m: f64,
         shape: [usize; 2],
-        version: &Version,
+        selection: &Selection,
+        piece: Piece,
     ) -> Result<Samples, Problem> {
         match &collection.ground {
-            Ground::World(world) => world.samples(&self.maker(), origin_m, step_m, shape, version).await,
+            Ground::World(world) => world.samples(&self.maker(), origin_m, step_m, shape, selection, piece).await,
             Ground::Raster(raster) => {
                 let raster = Arc::clone(raster);
                 let north = origin_m[1] + (shape[0] - 1) as f64 * step_m;
-                blocking(move || raster.samples([origin_m[0], north], step_m, shape)).await
+                self.blocking(move || raster.samples([origin_m[0], north], step_m, shape)).await
             }
         }
     }
+
+    /// Work that takes a processor for a while, or reads files: not on the threads of the runtime, and no more of it at once than there are
+    /// processors. Who leaves while it waits takes it away; once begun it ends.
+    ///
+    /// # Errors
+    /// Those of the work.
+    pub async fn blocking<T: Send + 'static>(
+        &self,
+        work: impl FnOnce() -> Result<T, Problem> + Send + 'static,
+    ) -> Result<T, Problem> {
+        let ended = |e: &dyn std::fmt::Display| Problem::internal(format!("the work ended early: {e}"));
+        let seat = Arc::clone(&self.processors).acquire_owned().await.map_err(|e| ended(&e))?;
+        let done = tokio::task::spawn_blocking(move || {
+            let done = work();
+            drop(seat);
+            done
+        });
+        done.await.map_err(|e| ended(&e))?
+    }
 }
 
-/// Which version of its ground a request asks for.
+/// What a request selects of a ground.
 ///
 /// # Errors
 /// A process that a world does not have; any for a raster, whose ground is as it is.
-pub fn version(collection: &Collection, query: &Query) -> Result<Version, Problem> {
+pub fn selection(collection: &Collection, query: &Query) -> Result<Selection, Problem> {
     let numbers = query.numbers("phenomena")?;
     let feature_min_m = query.number("feature_min_m", [0.0, 1e9])?.unwrap_or(0.0);
     match &collection.ground {
-        Ground::World(world) => Ok(Version { phenomena: world.choose(numbers)?, feature_min_m }),
+        Ground::World(world) => Ok(Selection { phenomena: world.choose(numbers)?, feature_min_m }),
         Ground::Raster(_) if numbers.is_some() || feature_min_m > 0.0 => Err(Problem::bad_request(
             "`phenomena` and `feature_min_m` are for worlds; a raster has the ground that its file holds",
         )),
-        Ground::Raster(_) => Ok(Version::default()),
+        Ground::Raster(_) => Ok(Selection::default()),
     }
 }
 
-/// The parameters of [`version`].
-pub const VERSION: [&str; 2] = ["phenomena", "feature_min_m"];
-
-/// The checked parameters of a request.
-///
-/// # Errors
-/// A parameter that the path does not take.
-pub fn checked(pairs: Pairs, known: &[&[&str]]) -> Result<Query, Problem> {
-    Query::new(pairs.0, &known.concat())
-}
-
-/// Work that takes a processor for a while, or reads files: not on the threads of the runtime.
-///
-/// # Errors
-/// Those of the work.
-pub async fn blocking<T: Send + 'static>(
-    work: impl FnOnce() -> Result<T, Problem> + Send + 'static,
-) -> Result<T, Problem> {
-    match tokio::task::spawn_blocking(work).await {
-        Ok(done) => done,
-        Err(error) => Err(Problem::internal(format!("the work ended early: {error}"))),
-    }
-}
+/// The parameters of [`selection`].
+pub const SELECTION: [&str; 2] = ["phenomena", "feature_min_m"];

@@ -1,33 +1,34 @@
 //! Map tiles: by level, row and column of the collection's own grid, and by z, x, y for clients of the web-Mercator kind.
 
 use super::answer::Answer;
-use super::patch::{TILE_PARAMETERS, sun};
-use super::service::{Service, blocking, checked, version};
-use super::{Pairs, Problem, Query};
+use super::ogc::check_matrix_set;
+use super::patch::sun;
+use super::service::{Service, selection};
+use super::{Base, On, Pairs, Plain, Problem, Query, Segments};
 use crate::collections::{Collection, Ground};
 use crate::grid::{TileIndex, WINDOW_TILE, WINDOW_ZOOM, of_web_mercator};
 use crate::layers::{Layer, STEP_M, Style};
 use axum::Json;
-use axum::extract::{Path, State};
+use axum::extract::State;
 use axum::http::HeaderMap;
 use axum::response::Response;
 use serde_json::{Value, json};
 use std::sync::Arc;
 
-/// Levels of [`Layer::Elevation`].
-const LEVELS: f64 = 16_777_216.0;
+/// Steps of [`Layer::Elevation`].
+const STEPS: f64 = 16_777_216.0;
+/// The parameters that tiles take.
+pub const KNOWN: [&str; 4] = ["sun_azimuth_deg", "sun_elevation_deg", "exaggeration", "phenomena"];
 
 /// `GET /v1/collections/{id}/styles/{layer}/map/tiles/{tms}/{level}/{row}/{col}`
 pub async fn tile(
     State(service): State<Arc<Service>>,
-    Path((id, layer, grid, level, row, col)): Path<(String, String, String, String, String, String)>,
+    On(collection): On,
+    Segments((_, layer, set, level, row, col)): Segments<(String, String, String, String, String, String)>,
     pairs: Pairs,
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
-    let collection = Arc::clone(service.collection(&id)?);
-    if grid != id {
-        return Err(Problem::not_found(format!("the tiles of \"{id}\" lie in the tile matrix set \"{id}\"")));
-    }
+    check_matrix_set(&collection, &set)?;
     let [level, row, col] = whole([&level, &row, &col])?;
     send(&service, &collection, &layer, TileIndex { level, row, col }, pairs, &headers).await
 }
@@ -35,11 +36,11 @@ pub async fn tile(
 /// `GET /v1/collections/{id}/xyz/{layer}/{z}/{x}/{y}.png`
 pub async fn xyz(
     State(service): State<Arc<Service>>,
-    Path((id, layer, z, x, y)): Path<(String, String, String, String, String)>,
+    On(collection): On,
+    Segments((_, layer, z, x, y)): Segments<(String, String, String, String, String)>,
     pairs: Pairs,
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
-    let collection = Arc::clone(service.collection(&id)?);
     let y = y.strip_suffix(".png").unwrap_or(&y);
     let [z, x, y] = whole([&z, &x, y])?;
     let tile = of_web_mercator(z, x, y).ok_or_else(|| {
@@ -52,16 +53,12 @@ pub async fn xyz(
 fn whole<const N: usize>(texts: [&str; N]) -> Result<[u32; N], Problem> {
     let mut numbers = [0; N];
     for (number, text) in numbers.iter_mut().zip(texts) {
-        *number = text.parse().map_err(|_| Problem::not_found("level, row and column of a tile are whole numbers"))?;
+        let digits = Some(text).filter(|text| text.bytes().all(|b| b.is_ascii_digit()));
+        *number = digits
+            .and_then(|text| text.parse().ok())
+            .ok_or_else(|| Problem::not_found("level, row and column of a tile are whole numbers"))?;
     }
     Ok(numbers)
-}
-
-fn layer_of(collection: &Collection, name: &str) -> Result<Layer, Problem> {
-    let known = collection.layers();
-    Layer::of_name(name).filter(|layer| known.contains(&layer.name())).ok_or_else(|| {
-        Problem::not_found(format!("\"{}\" has no such layer; it has {}", collection.id, known.join(", ")))
-    })
 }
 
 async fn send(
@@ -72,35 +69,30 @@ async fn send(
     pairs: Pairs,
     headers: &HeaderMap,
 ) -> Result<Response, Problem> {
-    let layer = layer_of(collection, layer)?;
-    let query = checked(pairs, &TILE_PARAMETERS)?;
+    let layer = collection.layer(layer)?;
+    let query = pairs.checked(&[&KNOWN])?;
     let grid = collection.grid();
     if !grid.has(tile) {
         let levels = grid.levels - 1;
         return Err(Problem::not_found(format!(
-            "there is no such tile; levels are 0 to {levels}, and tiles end with the ground"
+            "there is no such tile; levels are 0 to {levels}, and there are no tiles outside the collection"
         )));
     }
-    let version = version(collection, &query)?;
-    if version.feature_min_m > 0.0 {
-        return Err(Problem::bad_request(
-            "`feature_min_m` goes with the level of a tile: two pixels; `patch` takes any",
-        ));
-    }
+    let phenomena = selection(collection, &query)?.phenomena;
     let style = style(collection, &query, tile.level)?;
-    let what = format!("tile {} {} {tile:?} {}", collection.digest, layer.name(), query.canonical());
+    let what = format!("tile {} {} {tile:?} {phenomena:?} {style:?}", collection.digest(), layer.name());
     let make = async {
         let samples = match &collection.ground {
-            Ground::World(world) => world.map_tile(&service.maker(), tile, &version.phenomena).await?,
+            Ground::World(world) => world.map_tile(&service.maker(), tile, phenomena.as_deref()).await?,
             Ground::Raster(raster) => {
                 let raster = Arc::clone(raster);
-                blocking(move || raster.tile(tile).map(Arc::new)).await?
+                service.blocking(move || raster.tile(tile).map(Arc::new)).await?
             }
         };
         if samples.is_void() {
             return Ok(None);
         }
-        let drawn = blocking(move || Ok(layer.draw(&samples, &style))).await?;
+        let drawn = service.blocking(move || Ok(layer.draw(&samples, &style))).await?;
         let png = drawn.ok_or_else(|| {
             Problem::not_found(format!(
                 "heights of this tile lie beyond what `{}` can hold; `patch` has them",
@@ -130,29 +122,26 @@ fn range_m(collection: &Collection) -> [f64; 2] {
     }
 }
 
-/// Height of level 0 of [`Layer::Elevation`]: whole metres, the home of the collection in the middle.
+/// Height of step 0 of [`Layer::Elevation`]: whole metres, the home of the collection in the middle.
 fn offset_m([low, high]: [f64; 2]) -> f64 {
-    (0.5 * (low + high) - 0.5 * LEVELS * STEP_M).round()
+    (0.5 * (low + high) - 0.5 * STEPS * STEP_M).round()
 }
 
 /// `GET /v1/collections/{id}/xyz/{layer}/tilejson.json`
 pub async fn tilejson(
-    State(service): State<Arc<Service>>,
-    Path((id, layer)): Path<(String, String)>,
-    pairs: Pairs,
-    headers: HeaderMap,
+    On(collection): On,
+    Segments((id, layer)): Segments<(String, String)>,
+    _: Plain,
+    Base(host): Base,
 ) -> Result<Json<Value>, Problem> {
-    let collection = service.collection(&id)?;
-    let layer = layer_of(collection, &layer)?;
-    checked(pairs, &[])?;
-    let host = super::ogc::base(&headers);
+    let layer = collection.layer(&layer)?;
     let mut json = json!({
         "tilejson": "3.0.0",
         "name": format!("{id}: {}", layer.summary()),
         "tiles": [format!("{host}/v1/collections/{id}/xyz/{}/{{z}}/{{x}}/{{y}}.png", layer.name())],
         "minzoom": WINDOW_ZOOM,
         "maxzoom": WINDOW_ZOOM + collection.grid().levels - 1,
-        "bounds": window_degrees(collection),
+        "bounds": window_degrees(&collection),
         "scheme": "xyz",
         "description": "A plane in the place of one tile of the web-Mercator map: distances and areas that a client works out from longitude \
                         and latitude are not those of the ground; `metres_per_pixel` are.",
@@ -163,7 +152,7 @@ pub async fn tilejson(
         Layer::TerrainRgb => Some(json!({ "encoding": "mapbox" })),
         Layer::Elevation => Some(json!({
             "encoding": "custom", "redFactor": 65536.0 * STEP_M, "greenFactor": 256.0 * STEP_M, "blueFactor": STEP_M,
-            "baseShift": -offset_m(range_m(collection)), "offset_m": offset_m(range_m(collection)), "step_m": STEP_M,
+            "baseShift": -offset_m(range_m(&collection)), "offset_m": offset_m(range_m(&collection)), "step_m": STEP_M,
         })),
         _ => None,
     };

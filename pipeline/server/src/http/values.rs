@@ -1,16 +1,22 @@
 //! Values at points and along lines, and the tracks of a release.
 
-use super::service::{Service, VERSION, blocking, checked, version};
-use super::{Pairs, Problem};
-use crate::collections::Collection;
-use crate::collections::world::{FEATURE_PIXELS, Version};
-use crate::samples::Samples;
+use super::service::{SELECTION, Service, selection};
+use super::{On, Pairs, Plain, Problem, Segments};
+use crate::collections::world::{FEATURE_PIXELS, Piece, Selection};
+use crate::collections::{Collection, Ground};
+use crate::grid::TILE;
 use axum::Json;
-use axum::extract::{Path, State};
+use axum::extract::State;
 use serde_json::{Value, json};
 use std::sync::Arc;
 use tokio::task::JoinSet;
 
+/// The parameters of a point, and of a profile, beside the selection.
+pub const POINT: [&str; 3] = ["x", "y", "resolution_m"];
+/// See [`POINT`].
+pub const PROFILE: [&str; 3] = ["line", "samples", "resolution_m"];
+/// From so many samples in a tile on, a profile is taken from tiles.
+const SHARED: usize = 16;
 /// Most samples of a profile.
 const SAMPLES_MAX: u32 = 4096;
 /// Samples of a profile unasked.
@@ -23,19 +29,16 @@ const PARTS: usize = 16;
 /// `GET /v1/collections/{id}/point`
 pub async fn point(
     State(service): State<Arc<Service>>,
-    Path(id): Path<String>,
+    On(collection): On,
     pairs: Pairs,
 ) -> Result<Json<Value>, Problem> {
-    let collection = service.collection(&id)?;
-    let query = checked(pairs, &[&["x", "y", "resolution_m"], &VERSION])?;
-    query.required("x")?;
-    query.required("y")?;
+    let query = pairs.checked(&[&POINT, &SELECTION])?;
     let far = [-1e12, 1e12];
-    let (x, y) = (query.number("x", far)?.unwrap_or_default(), query.number("y", far)?.unwrap_or_default());
+    let [x, y] = [query.number_of("x", far)?, query.number_of("y", far)?];
     let [_, finest_m] = collection.spacings_m();
     let step_m = query.number("resolution_m", [1e-6, 1e9])?.unwrap_or(finest_m);
-    let version = version(collection, &query)?;
-    let s = service.samples(collection, [x, y], step_m, [1, 1], &version).await?;
+    let selection = selection(&collection, &query)?;
+    let s = service.samples(&collection, [x, y], step_m, [1, 1], &selection, Piece::Alone).await?;
     let first = |field: &Option<Vec<f32>>| field.as_ref().map(|v| v[0]).filter(|v| v.is_finite());
     Ok(Json(json!({
         "x_m": x,
@@ -56,26 +59,28 @@ fn finite(value: f32) -> Option<f32> {
 /// `GET /v1/collections/{id}/profile`
 pub async fn profile(
     State(service): State<Arc<Service>>,
-    Path(id): Path<String>,
+    On(collection): On,
     pairs: Pairs,
 ) -> Result<Json<Value>, Problem> {
-    let collection = Arc::clone(service.collection(&id)?);
-    let query = checked(pairs, &[&["line", "samples", "resolution_m"], &VERSION])?;
+    let query = pairs.checked(&[&PROFILE, &SELECTION])?;
     let line = query.line("line", CORNERS_MAX)?;
     let count = query.whole("samples", [2, SAMPLES_MAX])?.unwrap_or(SAMPLES) as usize;
     let (distances_m, places) = along(&line, count)
         .ok_or_else(|| Problem::bad_request("`line`: its places are all the same; it must lead somewhere"))?;
     let apart_m = distances_m[count - 1] / (count - 1) as f64;
     let [_, finest_m] = collection.spacings_m();
-    let step_m = query.number("resolution_m", [1e-6, 1e9])?.unwrap_or_else(|| apart_m.max(finest_m));
-    let mut version = version(&collection, &query)?;
-    let is_world = matches!(collection.ground, crate::collections::Ground::World(_));
+    // A spacing of the lattice, so that lines that differ a little share tiles.
+    let unasked_m = || finest_m * libm::exp2(libm::floor(libm::log2(apart_m / finest_m)).max(0.0));
+    let step_m = query.number("resolution_m", [1e-6, 1e9])?.unwrap_or_else(unasked_m);
+    let mut selection = selection(&collection, &query)?;
+    let is_world = matches!(collection.ground, Ground::World(_));
     if is_world && query.text("feature_min_m").is_none() && step_m > finest_m {
-        // As the map has it at that resolution.
-        version.feature_min_m = FEATURE_PIXELS * step_m;
+        // As in map tiles of that resolution.
+        selection.feature_min_m = FEATURE_PIXELS * step_m;
     }
-    let feature_min_m = version.feature_min_m;
-    let heights = heights(&service, &collection, &places, step_m, &version).await?;
+    let piece = if apart_m * SHARED as f64 <= TILE as f64 * step_m { Piece::Tiles } else { Piece::Alone };
+    let feature_min_m = selection.feature_min_m;
+    let heights = heights(&service, &collection, &places, step_m, (selection, piece)).await?;
     Ok(Json(json!({
         "distance_m": distances_m,
         "x_m": places.iter().map(|p| p[0]).collect::<Vec<_>>(),
@@ -91,19 +96,18 @@ async fn heights(
     collection: &Arc<Collection>,
     places: &[[f64; 2]],
     step_m: f64,
-    version: &Version,
+    (selection, piece): (Selection, Piece),
 ) -> Result<Vec<f32>, Problem> {
     let mut parts = JoinSet::new();
     let size = places.len().div_ceil(PARTS);
     for (n, part) in places.chunks(size).enumerate() {
-        let (service, collection, version) = (Arc::clone(service), Arc::clone(collection), version.clone());
+        let (service, collection, selection) = (Arc::clone(service), Arc::clone(collection), selection.clone());
         let part = part.to_vec();
         parts.spawn(async move {
             let mut heights = Vec::with_capacity(part.len());
             for place in part {
-                let made: Result<Samples, Problem> =
-                    service.samples(&collection, place, step_m, [1, 1], &version).await;
-                heights.push(made?.heights[0]);
+                let made = service.samples(&collection, place, step_m, [1, 1], &selection, piece).await?;
+                heights.push(made.heights[0]);
             }
             Ok::<_, Problem>((n, heights))
         });
@@ -139,25 +143,19 @@ fn along(line: &[[f64; 2]], count: usize) -> Option<(Vec<f64>, Vec<[f64; 2]>)> {
 }
 
 /// `GET /v1/collections/{id}/tracks`
-pub async fn tracks(
-    State(service): State<Arc<Service>>,
-    Path(id): Path<String>,
-    pairs: Pairs,
-) -> Result<Json<Value>, Problem> {
-    checked(pairs, &[])?;
-    let collection = Arc::clone(service.collection(&id)?);
-    blocking(move || Ok(Json(json!({ "tracks": collection.track_list()? })))).await
+pub async fn tracks(State(service): State<Arc<Service>>, On(collection): On, _: Plain) -> Result<Json<Value>, Problem> {
+    let list = move || Ok(Json(json!({ "tracks": collection.track_list()?, "total": collection.tracks() })));
+    service.blocking(list).await
 }
 
 /// `GET /v1/collections/{id}/tracks/{track}`
 pub async fn track(
     State(service): State<Arc<Service>>,
-    Path((id, track)): Path<(String, String)>,
-    pairs: Pairs,
+    On(collection): On,
+    Segments((_, track)): Segments<(String, String)>,
+    _: Plain,
 ) -> Result<Json<Value>, Problem> {
-    checked(pairs, &[])?;
-    let collection = Arc::clone(service.collection(&id)?);
-    blocking(move || collection.track(&track).map(Json)).await
+    service.blocking(move || collection.track(&track).map(Json)).await
 }
 
 #[cfg(test)]

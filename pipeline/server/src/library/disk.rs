@@ -51,6 +51,9 @@ impl Disk {
             let path = path.to_owned();
             move |source| LibraryError::Io { path, source }
         };
+        if folder.is_file() {
+            return Err(LibraryError::NoFolder(folder.to_owned()));
+        }
         fs::create_dir_all(folder).map_err(at(folder))?;
         let marker = folder.join(MARKER);
         if !marker.is_file() {
@@ -106,7 +109,7 @@ impl Disk {
         let tile = record::decode(&key.text, &bytes);
         if tile.is_none() {
             self.damaged.fetch_add(1, Ordering::Relaxed);
-            tracing::warn!(record = %path.display(), "a damaged record is made again");
+            tracing::warn!(record = %path.display(), "damaged record; it will be regenerated");
             if fs::remove_file(&path).is_ok() {
                 self.forget(bytes.len() as u64);
             }

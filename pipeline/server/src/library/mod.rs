@@ -24,6 +24,8 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use tokio::sync::watch;
 
+/// Fewer samples than these are not worth a record.
+const RECORD_MIN: usize = 64;
 /// Threads that read records.
 const READERS: usize = 4;
 /// Most records that wait for a reader.
@@ -79,8 +81,11 @@ pub enum LibraryError {
     /// The folder is of another version of the program.
     #[error("{}: a library of another version of sastrugi; choose another folder with --library, or remove this one", .0.display())]
     Version(PathBuf),
+    /// There is a file of that name.
+    #[error("{}: this is a file; --library takes a folder", .0.display())]
+    NoFolder(PathBuf),
     /// The file system failed.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: the tile library cannot be used: {source}", path.display())]
     Io {
         /// The folder or file.
         path: PathBuf,
@@ -116,6 +121,41 @@ pub struct Statistics {
     pub queued: u64,
     /// Workers that are at it.
     pub running: u64,
+}
+
+/// One number of the [`Statistics`].
+#[derive(Clone, Copy, Debug)]
+pub struct Figure {
+    /// Its name.
+    pub name: &'static str,
+    /// What it is.
+    pub help: &'static str,
+    /// Whether it only ever rises.
+    pub counts: bool,
+    /// Its value.
+    pub value: u64,
+}
+
+impl Statistics {
+    /// All of them by name.
+    pub fn figures(&self) -> [Figure; 12] {
+        let figure = |(name, help, counts, value)| Figure { name, help, counts, value };
+        [
+            ("memory_hits", "Tiles answered from memory", true, self.memory_hits),
+            ("disk_hits", "Tiles read from disk", true, self.disk_hits),
+            ("made", "Tiles generated", true, self.made),
+            ("cancelled", "Tiles given up because nobody waited any longer", true, self.cancelled),
+            ("failed", "Tiles that could not be generated", true, self.failed),
+            ("damaged", "Damaged records", true, self.damaged),
+            ("evicted", "Records removed to make room", true, self.evicted),
+            ("unwritten", "Records that could not be written", true, self.unwritten),
+            ("disk_bytes", "Bytes of records", false, self.disk_bytes),
+            ("memory_bytes", "Bytes of tiles in memory", false, self.memory_bytes),
+            ("queued", "Tiles that wait", false, self.queued),
+            ("running", "Tiles being generated or read", false, self.running),
+        ]
+        .map(figure)
+    }
 }
 
 #[derive(Default)]
@@ -283,7 +323,7 @@ impl Library {
         let _ = land.send(Some(made));
         if let (Some(tile), false) = (tile, from_disk) {
             count(&self.counts.made);
-            if let Some(disk) = &self.disk {
+            if let Some(disk) = self.disk.as_ref().filter(|_| tile.heights.len() >= RECORD_MIN) {
                 disk.write(key, &tile);
             }
         }

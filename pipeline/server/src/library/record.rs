@@ -32,20 +32,10 @@ pub fn encode(key: &str, tile: &Samples) -> Vec<u8> {
 pub fn decode(key: &str, bytes: &[u8]) -> Option<Samples> {
     let (content, checksum) = bytes.split_at_checked(bytes.len().checked_sub(CHECKSUM)?)?;
     let mut rest = content.strip_prefix(MAGIC)?;
-    let mut word = || -> Option<usize> {
-        let (word, after) = rest.split_first_chunk::<4>()?;
-        rest = after;
-        usize::try_from(u32::from_le_bytes(*word)).ok()
-    };
-    let length = word()?;
+    let length = word(&mut rest)?;
     let (own, after) = rest.split_at_checked(length)?;
     rest = after;
-    let mut word = || -> Option<usize> {
-        let (word, after) = rest.split_first_chunk::<4>()?;
-        rest = after;
-        usize::try_from(u32::from_le_bytes(*word)).ok()
-    };
-    let [rows, cols, present] = [word()?, word()?, word()?];
+    let [rows, cols, present] = [word(&mut rest)?, word(&mut rest)?, word(&mut rest)?];
     if own != key.as_bytes() || rows > SIDE_MAX || cols > SIDE_MAX || present >= 16 {
         return None;
     }
@@ -61,4 +51,11 @@ pub fn decode(key: &str, bytes: &[u8]) -> Option<Samples> {
     };
     let [heights, albedo, rock, rock_potential] = [field(0), field(1), field(2), field(3)];
     Some(Samples { rows, cols, heights: heights?, albedo, rock, rock_potential })
+}
+
+/// The next number of a record.
+fn word(rest: &mut &[u8]) -> Option<usize> {
+    let (word, after) = rest.split_first_chunk::<4>()?;
+    *rest = after;
+    usize::try_from(u32::from_le_bytes(*word)).ok()
 }

@@ -37,7 +37,8 @@ pub fn write_png16<'a>(
     target: impl Into<Target<'a>>,
 ) -> Result<String, JobError> {
     let Some(levels) = generator.levels(heights) else {
-        return dem::write_png_heights(target.into(), heights).map(|scale| scale.sentence()).map_err(JobError::io);
+        let written = dem::write_png_heights(target.into(), heights).map_err(JobError::io)?;
+        return Ok(written.sentence(&dem::Values::Heights));
     };
     dem::write_png16(target.into(), &levels.grid).map_err(JobError::io)?;
     Ok(format!(

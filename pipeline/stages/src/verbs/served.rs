@@ -32,6 +32,15 @@ pub struct ServedWorld {
     pub license: Option<String>,
 }
 
+/// A file of a release.
+#[derive(Clone, Debug)]
+pub struct SealedFile {
+    /// Where it is.
+    pub path: PathBuf,
+    /// SHA-256 that its manifest states.
+    pub sha256: String,
+}
+
 /// Heights of a release, with the maps of the same cells.
 #[derive(Clone, Debug)]
 pub struct ServedRaster {
@@ -42,11 +51,9 @@ pub struct ServedRaster {
     /// Lowest and highest height, m.
     pub height_range_m: [f64; 2],
     /// File of the heights.
-    pub heights: PathBuf,
+    pub heights: SealedFile,
     /// Files of its maps by name, as `class`.
-    pub maps: BTreeMap<String, PathBuf>,
-    /// SHA-256 of these files, in order.
-    pub content: String,
+    pub maps: BTreeMap<String, SealedFile>,
     /// Licence, SPDX: that of its measured data where there is some, else that of the release.
     pub license: String,
     /// Whom to name.
@@ -100,8 +107,16 @@ fn world_of_file(path: &Path) -> Result<ServedWorld, Error> {
         return Err(Error::Usage(format!("{spec}: `kind` is `{kind}`; only patches of `{known}` are made on demand")));
     }
     let world = world(&parameters)?.with_inputs(&prepared.inputs()?).map_err(|e| Error::Input(e.to_string()))?;
-    let id = path.file_stem().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+    let id = id_of(&path.file_stem().unwrap_or_default().to_string_lossy());
     Ok(ServedWorld { id, world, parameters, streams: prepared.streams(), license: None })
+}
+
+/// An id for addresses and studies from the name of a file: lower case, `-` for what else than letters, digits, `-` and `_` stands there.
+fn id_of(name: &str) -> String {
+    let kept = |c: char| if c.is_ascii_alphanumeric() || c == '_' { c.to_ascii_lowercase() } else { '-' };
+    let id: String = name.chars().map(kept).collect();
+    let id = id.trim_matches('-');
+    if id.is_empty() { "world".to_owned() } else { id.to_owned() }
 }
 
 fn world(parameters: &Value) -> Result<Planetary, Error> {
@@ -162,16 +177,15 @@ fn rasters(release: &Release) -> Result<Vec<ServedRaster>, Error> {
         let (stage, id) = (row.stage.clone(), row.terrain_id.clone());
         let start = format!("{stage}/{id}.");
         let mut heights = None;
-        let (mut maps, mut content, mut sources) = (BTreeMap::new(), Vec::new(), Vec::new());
+        let (mut maps, mut sources) = (BTreeMap::new(), Vec::new());
         for artifact in manifest.artifacts.iter().filter(|a| a.origin.stage == stage && a.origin.item == id) {
             let Some(name) = artifact.path.strip_prefix(&start) else { continue };
-            let file = release.path(&artifact.path);
+            let file = SealedFile { path: release.path(&artifact.path), sha256: artifact.sha256.clone() };
             match name.strip_suffix(".tif") {
                 None if name == "tif" => heights = Some(file),
                 Some(map) => drop(maps.insert(map.to_owned(), file)),
                 None => continue,
             }
-            content.push(artifact.sha256.clone());
             sources.extend(artifact.origin.sources.iter().cloned());
         }
         // A DEM in degrees is studied, and served, in metres.
@@ -180,16 +194,20 @@ fn rasters(release: &Release) -> Result<Vec<ServedRaster>, Error> {
         let license = measured.iter().find_map(|s| s.license.clone()).unwrap_or_else(|| manifest.license.clone());
         let credit = measured.iter().find_map(|s| s.attribution.clone());
         let height_range_m = [row.height_min_m, row.height_max_m];
-        rasters.push(ServedRaster {
-            id,
-            stage,
-            height_range_m,
-            heights,
-            maps,
-            content: content.join(","),
-            license,
-            credit,
-        });
+        rasters.push(ServedRaster { id, stage, height_range_m, heights, maps, license, credit });
     }
     Ok(rasters)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn val_ids_are_fit_for_addresses() {
+        let table = [("planet", "planet"), ("Ünï World?#%2f", "n--world---2f"), ("..", "world"), ("a.b_c", "a-b_c")];
+        for (name, id) in table {
+            assert_eq!(id_of(name), id);
+        }
+    }
 }

@@ -97,7 +97,7 @@ static CODECS: [Codec; 9] = [
         starts: png::looks_like,
         parse: Some(|_, bytes, options| png::parse(&bytes, options)),
         claimed: Some(|_, file, options| png::claimed(file, options)),
-        render: Some(|_, grid, _, _| png::render(grid)),
+        render: Some(|_, grid, _, options| png::render(grid, &options.values)),
         ..Codec::new(Format::Png, "png", &["png"])
     },
     Codec {

@@ -37,9 +37,11 @@ impl HeightScale {
         if level == 0.0 { f64::NAN } else { self.offset_m + self.step_m * level }
     }
 
-    /// The scale as a sentence.
-    pub fn sentence(self) -> String {
-        format!("heights are {:?} m + {:?} m x level; level 0 is no data", self.offset_m, self.step_m)
+    /// The scale of some values as a sentence.
+    pub fn sentence(self, values: &Values) -> String {
+        let what = if *values == Values::Heights { "heights" } else { "values" };
+        let unit = values.unit().filter(|unit| *unit != "1").map_or_else(String::new, |unit| format!(" {unit}"));
+        format!("{what} are {:?}{unit} + {:?}{unit} x level; level 0 is no data", self.offset_m, self.step_m)
     }
 
     fn parse(text: &str) -> Option<Self> {
@@ -90,9 +92,9 @@ pub fn write_png_heights<'a>(target: impl Into<Target<'a>>, grid: &Grid) -> Resu
     Ok(scale)
 }
 
-/// The bytes of heights as levels, and the sentence on their scale.
-pub(super) fn render(grid: &Grid) -> Result<(Vec<u8>, Vec<String>), Refusal> {
-    scaled(grid).map(|(bytes, scale)| (bytes, vec![scale.sentence()]))
+/// The bytes of values as levels, and the sentence on their scale.
+pub(super) fn render(grid: &Grid, values: &Values) -> Result<(Vec<u8>, Vec<String>), Refusal> {
+    scaled(grid).map(|(bytes, scale)| (bytes, vec![scale.sentence(values)]))
 }
 
 fn scaled(grid: &Grid) -> Result<(Vec<u8>, HeightScale), Refusal> {

@@ -1,0 +1,130 @@
+//! What handlers take from a request; what cannot be taken is a problem in a sentence.
+
+use super::query::Query;
+use super::{Problem, Service};
+use crate::collections::Collection;
+use axum::extract::{FromRequest, FromRequestParts, Path, Request};
+use axum::http::request::Parts;
+use axum::http::{HeaderMap, header};
+use hyper::body::Bytes;
+use serde::de::DeserializeOwned;
+use std::sync::Arc;
+
+/// The parameters of an address, as they stand there.
+#[derive(Clone, Debug)]
+pub struct Pairs(pub Vec<(String, String)>);
+
+impl Pairs {
+    /// The checked parameters; `known` are those that the path takes.
+    ///
+    /// # Errors
+    /// One that it does not take.
+    pub fn checked(self, known: &[&[&str]]) -> Result<Query, Problem> {
+        Query::new(self.0, &known.concat())
+    }
+}
+
+impl<S: Sync> FromRequestParts<S> for Pairs {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, Problem> {
+        let pairs = axum::extract::Query::<Vec<(String, String)>>::try_from_uri(&parts.uri);
+        pairs.map(|pairs| Self(pairs.0)).map_err(|e| Problem::bad_request(format!("the query cannot be read: {e}")))
+    }
+}
+
+/// An address without parameters.
+pub struct Plain;
+
+impl<S: Sync> FromRequestParts<S> for Plain {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Problem> {
+        Pairs::from_request_parts(parts, state).await?.checked(&[]).map(|_| Self)
+    }
+}
+
+/// Parts of the path.
+pub struct Segments<T>(pub T);
+
+impl<T: DeserializeOwned + Send, S: Send + Sync> FromRequestParts<S> for Segments<T> {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Problem> {
+        let path = Path::from_request_parts(parts, state).await;
+        path.map(|Path(own)| Self(own)).map_err(|_| Problem::bad_request("the path cannot be read; it must be UTF-8"))
+    }
+}
+
+/// The collection that the path names.
+pub struct On(pub Arc<Collection>);
+
+#[derive(serde::Deserialize)]
+struct Id {
+    id: String,
+}
+
+impl FromRequestParts<Arc<Service>> for On {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, service: &Arc<Service>) -> Result<Self, Problem> {
+        let Segments(Id { id }) = Segments::from_request_parts(parts, service).await?;
+        service.collection(&id).map(|found| Self(Arc::clone(found)))
+    }
+}
+
+/// Where clients find the server, as they call it.
+pub struct Base(pub String);
+
+impl FromRequestParts<Arc<Service>> for Base {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, service: &Arc<Service>) -> Result<Self, Problem> {
+        let host = host(&parts.headers).map_or_else(|| service.address.to_string(), str::to_owned);
+        // A proxy that speaks TLS says so.
+        let scheme = match text(&parts.headers, "x-forwarded-proto") {
+            Some("https") => "https",
+            _ => "http",
+        };
+        Ok(Self(format!("{scheme}://{host}")))
+    }
+}
+
+fn text<'a>(headers: &'a HeaderMap, name: &str) -> Option<&'a str> {
+    headers.get(name).and_then(|value| value.to_str().ok())
+}
+
+/// The host that a client asks, if it looks like one.
+pub fn host(headers: &HeaderMap) -> Option<&str> {
+    let host = headers.get(header::HOST)?.to_str().ok()?;
+    let plain = |b: u8| b.is_ascii_alphanumeric() || b".:-_[]".contains(&b);
+    (!host.is_empty() && host.bytes().all(plain)).then_some(host)
+}
+
+/// The body of a request, in JSON: an object.
+pub struct Body<T>(pub T);
+
+impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for Body<T> {
+    type Rejection = Problem;
+
+    async fn from_request(request: Request, state: &S) -> Result<Self, Problem> {
+        // Pages of other sites can send anything but this type unasked.
+        let media = text(request.headers(), "content-type").unwrap_or_default();
+        if media.split(';').next().is_none_or(|own| !own.trim().eq_ignore_ascii_case("application/json")) {
+            return Err(Problem::media("the body must be JSON, with `Content-Type: application/json`"));
+        }
+        let bytes = Bytes::from_request(request, state).await.map_err(|e| {
+            if e.status() == axum::http::StatusCode::PAYLOAD_TOO_LARGE {
+                Problem::too_large("the body is too long", "body_bytes_max", super::service::BODY_BYTES as u64)
+            } else {
+                Problem::bad_request("the body cannot be read to its end")
+            }
+        })?;
+        let value: serde_json::Value =
+            serde_json::from_slice(&bytes).map_err(|e| Problem::bad_request(format!("the body is not JSON: {e}")))?;
+        if !value.is_object() {
+            return Err(Problem::bad_request("the body must be a JSON object"));
+        }
+        serde_json::from_value(value).map(Self).map_err(|e| Problem::bad_request(format!("the body: {e}")))
+    }
+}
