@@ -11,15 +11,22 @@ pub struct Problem {
     detail: String,
     /// Members beyond those of the standard, such as the limit that was passed.
     more: Map<String, Value>,
+    hint: Hint,
+}
+
+/// What a header says beside the sentence.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Hint {
+    None,
     /// Seconds after which the client may try again.
-    retry_after_s: Option<u32>,
+    RetryAfter(u32),
     /// Bytes of the answer that a range lies beyond.
-    length: Option<usize>,
+    Length(usize),
 }
 
 impl Problem {
     fn new(status: StatusCode, detail: impl Into<String>) -> Self {
-        Self { status, detail: detail.into(), more: Map::new(), retry_after_s: None, length: None }
+        Self { status, detail: detail.into(), more: Map::new(), hint: Hint::None }
     }
 
     /// 400: a parameter is missing, unknown or out of range.
@@ -50,7 +57,7 @@ impl Problem {
     /// 416: the range lies beyond the end of `length` bytes.
     pub fn range(length: usize) -> Self {
         let detail = format!("the range lies beyond the end; there are {length} bytes");
-        Self { length: Some(length), ..Self::new(StatusCode::RANGE_NOT_SATISFIABLE, detail) }
+        Self { hint: Hint::Length(length), ..Self::new(StatusCode::RANGE_NOT_SATISFIABLE, detail) }
     }
 
     /// 421: the request is meant for another server.
@@ -82,7 +89,7 @@ impl Problem {
 
     /// 429: the client has too much under way.
     pub fn too_many_requests(detail: impl Into<String>) -> Self {
-        Self { retry_after_s: Some(1), ..Self::new(StatusCode::TOO_MANY_REQUESTS, detail) }
+        Self { hint: Hint::RetryAfter(1), ..Self::new(StatusCode::TOO_MANY_REQUESTS, detail) }
     }
 
     /// 500: the fault is the server's.
@@ -92,7 +99,7 @@ impl Problem {
 
     /// 503: the server cannot now.
     pub fn unavailable(detail: impl Into<String>) -> Self {
-        Self { retry_after_s: Some(2), ..Self::new(StatusCode::SERVICE_UNAVAILABLE, detail) }
+        Self { hint: Hint::RetryAfter(2), ..Self::new(StatusCode::SERVICE_UNAVAILABLE, detail) }
     }
 
     /// Its status.
@@ -118,12 +125,13 @@ impl IntoResponse for Problem {
         let headers = response.headers_mut();
         headers.insert(header::CONTENT_TYPE, HeaderValue::from_static("application/problem+json"));
         headers.insert(header::CACHE_CONTROL, HeaderValue::from_static("no-store"));
-        if let Some(seconds) = self.retry_after_s {
-            headers.insert(header::RETRY_AFTER, HeaderValue::from(seconds));
-        }
-        if let Some(length) = self.length {
-            let place = HeaderValue::from_str(&format!("bytes */{length}"));
-            headers.extend(place.ok().map(|place| (header::CONTENT_RANGE, place)));
+        match self.hint {
+            Hint::None => {}
+            Hint::RetryAfter(seconds) => drop(headers.insert(header::RETRY_AFTER, HeaderValue::from(seconds))),
+            Hint::Length(length) => {
+                let place = HeaderValue::from_str(&format!("bytes */{length}"));
+                headers.extend(place.ok().map(|place| (header::CONTENT_RANGE, place)));
+            }
         }
         if self.status == StatusCode::UNAUTHORIZED {
             headers.insert(header::WWW_AUTHENTICATE, HeaderValue::from_static("Bearer"));
