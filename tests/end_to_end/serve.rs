@@ -1,9 +1,15 @@
 //! The terrain server: what it answers is what the program makes, whoever asks and however often, and what cannot be answered is refused.
 
+use sastrugi_mobility::rover::{Navigator, RoverParameters, SchoppersParameters, SojournerParameters, Track, drive};
+use sastrugi_numeric::{Counter, Geometry, Ground, GroundGrid, GroundPoint, NoGround, Streams};
+use sastrugi_server::client::{Client, ClientError, Patch};
 use sastrugi_store::dem;
+use sastrugi_terrain::planetary::{Planetary, RawPlanetary};
 use sastrugi_tests::server::Server;
 use sastrugi_tests::{area, sastrugi_in, write};
-use std::collections::BTreeSet;
+use serde_json::json;
+use std::cell::RefCell;
+use std::collections::{BTreeSet, HashMap};
 use std::fs;
 use std::io::{Read, Write};
 use std::path::Path;
@@ -513,4 +519,107 @@ fn val_changed_files_are_not_served() {
     let answer = server.get(&format!("/v1/collections/{own}/point?x={}&y={}", west + 1.0, south + 1.0));
     assert_eq!(answer.status, 500, "{}", answer.head);
     assert!(answer.json()["detail"].as_str().unwrap().contains("changed"), "{}", answer.json());
+}
+
+/// Ground that comes through a server, in the tiles in which a world is made in process.
+struct ServedGround {
+    client: Client,
+    cell_m: f64,
+    tiles: RefCell<HashMap<[i64; 2], GroundGrid>>,
+}
+
+impl ServedGround {
+    const TILE: i64 = 256;
+
+    /// A tile in cells from its south-west sample, with the first column and row of its neighbours.
+    fn tile(&self, place: [i64; 2]) -> GroundGrid {
+        let side = Self::TILE as usize + 1;
+        let origin_m = place.map(|at| (Self::TILE * at) as f64 * self.cell_m);
+        let patch = Patch { resolution_m: Some(self.cell_m), ..Patch::new("world", origin_m, [side; 2]) };
+        let mut tile = self.client.ground(&patch).unwrap();
+        tile.heights.geometry = Geometry { origin: [-0.5; 2], ..Geometry::square(side, side, 1.0) };
+        tile
+    }
+}
+
+impl Ground for ServedGround {
+    fn at(&self, x_m: f64, y_m: f64) -> Result<GroundPoint, NoGround> {
+        let position = [x_m, y_m].map(|at| at / self.cell_m);
+        let place = position.map(|p| (p.floor() as i64).div_euclid(Self::TILE));
+        let mut tiles = self.tiles.borrow_mut();
+        let tile = tiles.entry(place).or_insert_with(|| self.tile(place));
+        let [x, y] = [0, 1].map(|axis| position[axis] - (Self::TILE * place[axis]) as f64);
+        tile.sample(x, y).ok_or(NoGround { x_m, y_m })
+    }
+
+    fn cell_m(&self) -> f64 {
+        self.cell_m
+    }
+}
+
+/// Rovers of both navigators on ground that comes through the server, by the Rust client, leave the tracks that they leave in process, bit for bit.
+#[test]
+fn val_rovers_fed_by_the_server_leave_the_same_tracks() {
+    let folder = area();
+    write(folder.path(), "world.toml", &WORLD.replace("{ kind = \"primary_craters\", diameter_max_m = 200.0 },", ""));
+    let server = Server::start(folder.path(), &["world.toml"], &[]);
+    let client = Client::new(&format!("http://{}", server.address));
+    let parameters = RoverParameters { rovers: 3, radius_m: 6.0, ..RoverParameters::default() };
+    let served = ServedGround { client, cell_m: parameters.cell_m, tiles: RefCell::default() };
+    let processes = json!([{"kind": "texture"}, {"kind": "rocks", "coverage": 0.118}, {"kind": "albedo"}]);
+    let raw = RawPlanetary {
+        size_px: Some([16, 16]),
+        basic_spacing_m: Some(0.005),
+        processes: serde_json::from_value(processes).unwrap(),
+        ..RawPlanetary::default()
+    };
+    let world = Planetary::try_from(raw).unwrap();
+    let streams = Streams::for_seed(11, "terrain");
+    let ground = world.ground(&streams, parameters.cell_m, &[], 400).unwrap();
+    let starts = parameters.starts(&Streams::for_seed(5, "rover"), |_| true);
+    let noise = Counter::new(&mut Streams::for_seed(5, "rover").stream("noise"));
+    let mut cycles = 0;
+    for navigator in
+        [Navigator::Sojourner(SojournerParameters::default()), Navigator::Schoppers(SchoppersParameters::default())]
+    {
+        let task = navigator.task(&parameters);
+        for (k, start) in starts.iter().enumerate() {
+            let one = |ground: &dyn Ground| {
+                let mut track = Track::new(&ground, &task, 0.05);
+                let key = noise.at(k as i64);
+                let end = drive(&ground, &task, navigator.policy().as_mut(), start, key, |cycle| track.add(cycle));
+                (end, track.finish().samples)
+            };
+            let (here, there) = (one(&ground.view()), one(&served));
+            assert_eq!(here, there, "{} {k}", navigator.kind());
+            cycles += here.1.len();
+        }
+    }
+    assert!(cycles > 300, "{cycles}");
+}
+
+/// The client knows what is served, and hears why it is refused.
+#[test]
+fn val_the_client_reads_what_is_served() {
+    let folder = area();
+    world(folder.path());
+    let server = Server::start(folder.path(), &["world.toml"], &[("SASTRUGI_TOKEN", "a-secret")]);
+    let client = Client::new(&format!("http://{}/", server.address));
+    assert!(matches!(client.collections(), Err(ClientError::Refused { status: 401, .. })));
+    let client = client.with_token("a-secret");
+    let all = client.collections().unwrap();
+    assert_eq!((all.len(), all[0].id.as_str(), all[0].cell_m), (1, "world", 0.02));
+    let call = sastrugi_in(folder.path(), &["terrain", "world.toml", "-o", "made.tif"]);
+    assert_eq!(call.code, 0, "{}", call.stderr);
+    let made = dem::read(&folder.path().join("made.tif")).unwrap().grid;
+    let patch = client.patch(&Patch::new("world", [-1.0, 2.0], [300, 200])).unwrap();
+    assert_eq!(patch.values, made.to_f32().values);
+    let [ours, theirs] = [patch.geometry, made.geometry].map(|g| (g.rows, g.cols, g.cell, g.origin));
+    assert!((0..2).all(|axis| (ours.3[axis] - theirs.3[axis]).abs() < 1e-12), "{ours:?} {theirs:?}");
+    let smooth = Patch { phenomena: Some(vec![1]), ..Patch::new("world", [-1.0, 2.0], [300, 200]) };
+    assert_ne!(client.patch(&smooth).unwrap(), patch);
+    match client.patch(&Patch::new("moon", [0.0; 2], [3, 3])) {
+        Err(ClientError::Refused { status: 404, detail }) => assert!(detail.contains("moon"), "{detail}"),
+        other => panic!("{other:?}"),
+    }
 }

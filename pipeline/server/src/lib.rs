@@ -3,10 +3,11 @@
 //! * [`collections`]: what is served: worlds, made on demand, and the rasters of releases. [`samples`]: what they give.
 //! * [`library`]: tiles that were made once.
 //! * [`grid`], [`layers`]: where map tiles lie, and how samples become colours.
-//! * [`http`]: addresses, parameters, answers, limits.
+//! * [`http`]: addresses, parameters, answers, limits. [`client`]: the other end of the line.
 //!
 //! Kernels run on the workers of the library and on blocking threads, never on those of the runtime.
 
+pub mod client;
 pub mod collections;
 pub mod grid;
 pub mod http;

@@ -1,0 +1,254 @@
+//! A client of the server: patches as grids.
+//!
+//! ```no_run
+//! use sastrugi_server::client::{Client, Patch};
+//!
+//! let client = Client::new("http://127.0.0.1:8080");
+//! let patch = Patch { resolution_m: Some(0.02), ..Patch::new("planet", [0.0, 0.0], [512, 512]) };
+//! let heights = client.patch(&patch)?;
+//! println!("{} x {} samples", heights.cols(), heights.rows());
+//! # Ok::<(), sastrugi_server::client::ClientError>(())
+//! ```
+
+use sastrugi_numeric::{Geometry, Grid, GroundGrid};
+use serde::Deserialize;
+use std::time::Duration;
+use ureq::Agent;
+use ureq::http::{HeaderMap, Response};
+
+/// How often a request that the server has no room for is sent again.
+const TRIES: u32 = 10;
+/// Longest wait between two of them, s.
+const WAIT_MAX_S: u64 = 30;
+/// Longest time of a request, s.
+const REQUEST_S: u64 = 600;
+/// From this share of rock on a sample is rock.
+const ROCK: f32 = 0.5;
+
+/// Why there is no answer.
+#[derive(Debug, thiserror::Error)]
+pub enum ClientError {
+    /// The server refused.
+    #[error("{status}: {detail}")]
+    Refused {
+        /// HTTP status.
+        status: u16,
+        /// The server's sentence.
+        detail: String,
+    },
+    /// There was no answer.
+    #[error("{0}")]
+    Transport(#[from] ureq::Error),
+    /// The answer is not one of this server.
+    #[error("{0}")]
+    Answer(String),
+}
+
+/// A field of a ground.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Field {
+    /// Heights, m.
+    #[default]
+    Elevation,
+    /// Albedo, 0 to 1.
+    Albedo,
+    /// Share of the cell that rocks cover, 0 to 1.
+    Class,
+    /// Share of the ground that all rocks may cover, 0 to 1.
+    RockPotential,
+}
+
+impl Field {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Elevation => "elevation",
+            Self::Albedo => "albedo",
+            Self::Class => "class",
+            Self::RockPotential => "rock_potential",
+        }
+    }
+}
+
+/// What is asked for.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Patch {
+    /// Id of the collection.
+    pub collection: String,
+    /// Place of the south-west sample, m.
+    pub origin_m: [f64; 2],
+    /// Columns and rows.
+    pub size: [usize; 2],
+    /// Distance of the samples, m; that of the collection when absent.
+    pub resolution_m: Option<f64>,
+    /// What the samples are.
+    pub field: Field,
+    /// Numbers of the processes that act, from 1; all when absent.
+    pub phenomena: Option<Vec<usize>>,
+    /// Craters and rocks that are not wider are left out, m.
+    pub feature_min_m: f64,
+}
+
+impl Patch {
+    /// Heights of columns and rows of samples from a place on.
+    pub fn new(collection: &str, origin_m: [f64; 2], size: [usize; 2]) -> Self {
+        Self {
+            collection: collection.to_owned(),
+            origin_m,
+            size,
+            resolution_m: None,
+            field: Field::default(),
+            phenomena: None,
+            feature_min_m: 0.0,
+        }
+    }
+
+    /// Path and query of the request.
+    fn address(&self) -> String {
+        // The shortest digits that are the number: the server reads the same.
+        let Self { collection, origin_m: [x, y], size: [cols, rows], field, .. } = self;
+        let mut text = format!(
+            "/v1/collections/{collection}/patch?origin={x:?},{y:?}&size={cols},{rows}&field={}&format=raw",
+            field.name()
+        );
+        if let Some(resolution_m) = self.resolution_m {
+            text.push_str(&format!("&resolution_m={resolution_m:?}"));
+        }
+        if let Some(phenomena) = &self.phenomena {
+            let numbers: Vec<String> = phenomena.iter().map(usize::to_string).collect();
+            text.push_str(&format!("&phenomena={}", numbers.join(",")));
+        }
+        if self.feature_min_m > 0.0 {
+            text.push_str(&format!("&feature_min_m={:?}", self.feature_min_m));
+        }
+        text
+    }
+}
+
+/// A collection, as the server describes it.
+#[derive(Clone, Debug, Deserialize)]
+pub struct CollectionSummary {
+    /// Id in addresses.
+    pub id: String,
+    /// Name for people.
+    pub title: String,
+    /// West, south, east and north, m.
+    pub bounds_m: [f64; 4],
+    /// Distance of samples unasked, m.
+    pub cell_m: f64,
+    /// Finest distance of samples, m.
+    pub spacing_m: f64,
+    /// Its fields.
+    pub fields: Vec<String>,
+}
+
+/// A server.
+#[derive(Clone, Debug)]
+pub struct Client {
+    agent: Agent,
+    base: String,
+    token: Option<String>,
+}
+
+impl Client {
+    /// The server at an address, as `http://127.0.0.1:8080`.
+    pub fn new(base: &str) -> Self {
+        let config = Agent::config_builder()
+            .http_status_as_error(false)
+            .timeout_global(Some(Duration::from_secs(REQUEST_S)))
+            .build();
+        Self { agent: config.into(), base: base.trim_end_matches('/').to_owned(), token: None }
+    }
+
+    /// With a token to show.
+    #[must_use]
+    pub fn with_token(self, token: &str) -> Self {
+        Self { token: Some(token.to_owned()), ..self }
+    }
+
+    /// What is served.
+    ///
+    /// # Errors
+    /// See [`ClientError`].
+    pub fn collections(&self) -> Result<Vec<CollectionSummary>, ClientError> {
+        #[derive(Deserialize)]
+        struct All {
+            collections: Vec<CollectionSummary>,
+        }
+        let (_, body) = self.get("/v1/collections")?;
+        let all: All = serde_json::from_slice(&body).map_err(|e| ClientError::Answer(format!("collections: {e}")))?;
+        Ok(all.collections)
+    }
+
+    /// A patch, row 0 in the north, each sample in the middle of its cell; NaN where there are no data.
+    ///
+    /// # Errors
+    /// See [`ClientError`].
+    pub fn patch(&self, patch: &Patch) -> Result<Grid<f32>, ClientError> {
+        let (head, body) = self.get(&patch.address())?;
+        let figures = |name: &str| -> Option<Vec<f64>> {
+            head.get(name)?.to_str().ok()?.split(',').map(|figure| figure.parse().ok()).collect()
+        };
+        let figure = |name: &str| figures(name).filter(|all| all.len() == 1).map(|all| all[0]);
+        let read = || -> Option<(usize, usize, f64, [f64; 2])> {
+            let (rows, cols) = (figure("grid-rows")? as usize, figure("grid-columns")? as usize);
+            let origin = figures("grid-origin-m").filter(|all| all.len() == 2)?;
+            Some((rows, cols, figure("grid-resolution-m")?, [origin[0], origin[1]]))
+        };
+        let whole = |(rows, cols, ..): &(usize, usize, f64, [f64; 2])| {
+            rows.checked_mul(*cols).and_then(|count| count.checked_mul(4)) == Some(body.len())
+        };
+        let (rows, cols, cell, south_west) = read()
+            .filter(whole)
+            .ok_or_else(|| ClientError::Answer("the answer is not a patch; is this a terrain server?".to_owned()))?;
+        let origin = south_west.map(|at| at - 0.5 * cell);
+        let values = body.chunks_exact(4).map(|v| f32::from_le_bytes([v[0], v[1], v[2], v[3]])).collect();
+        Ok(Grid::new(Geometry { rows, cols, cell: [cell; 2], origin }, values))
+    }
+
+    /// Heights, and rock and albedo where the collection has them, as ground to drive on; `patch.field` does not matter.
+    ///
+    /// # Errors
+    /// See [`ClientError`].
+    pub fn ground(&self, patch: &Patch) -> Result<GroundGrid, ClientError> {
+        let collections = self.collections()?;
+        let own = collections.iter().find(|c| c.id == patch.collection);
+        let has = |field: Field| own.is_some_and(|c| c.fields.iter().any(|name| name == field.name()));
+        let of = |field: Field| self.patch(&Patch { field, ..patch.clone() });
+        let some = |field: Field| has(field).then(|| of(field)).transpose();
+        let class = some(Field::Class)?.map(|g| g.values.iter().map(|share| u8::from(*share >= ROCK)).collect());
+        let albedo = some(Field::Albedo)?.map(|g| g.values);
+        Ok(GroundGrid { heights: of(Field::Elevation)?, class, albedo })
+    }
+
+    /// An answer with its head; asks again where the server has no room.
+    fn get(&self, path: &str) -> Result<(HeaderMap, Vec<u8>), ClientError> {
+        let mut tries = 1;
+        loop {
+            let mut request = self.agent.get(format!("{}{path}", self.base));
+            if let Some(token) = &self.token {
+                request = request.header("authorization", format!("Bearer {token}"));
+            }
+            let mut answer = request.call()?;
+            if let Some(seconds) = wait_s(&answer).filter(|_| tries < TRIES) {
+                tries += 1;
+                std::thread::sleep(Duration::from_secs(seconds));
+                continue;
+            }
+            let status = answer.status().as_u16();
+            let body = answer.body_mut().with_config().limit(u64::MAX).read_to_vec()?;
+            if status == 200 {
+                return Ok((answer.headers().clone(), body));
+            }
+            let problem: Option<serde_json::Value> = serde_json::from_slice(&body).ok();
+            let detail = problem.as_ref().and_then(|p| p["detail"].as_str()).unwrap_or("no reason is given");
+            return Err(ClientError::Refused { status, detail: detail.to_owned() });
+        }
+    }
+}
+
+/// How long the server asks to wait, s; `None` where it did not turn the request away for want of room.
+fn wait_s<B>(answer: &Response<B>) -> Option<u64> {
+    let busy = matches!(answer.status().as_u16(), 429 | 503);
+    let asked = answer.headers().get("retry-after").and_then(|value| value.to_str().ok());
+    busy.then(|| asked.and_then(|text| text.parse().ok()).unwrap_or(1).min(WAIT_MAX_S))
+}
