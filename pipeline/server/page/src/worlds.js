@@ -15,7 +15,7 @@ export function worldsPanel(choose) {
       groups.set(name, [...(groups.get(name) ?? []), one]);
     }
     list.replaceChildren(...[...groups].flatMap(([name, ones]) => [h('h3', {}, name), h('ul', { class: 'list' }, ones.map(item))]));
-    if (!found.length) list.append(h('p', { class: 'hint' }, 'No collection has these words.'));
+    if (!found.length) list.append(h('p', { class: 'hint' }, 'No matching collections.'));
   }
   function item(one) {
     const [west, south, east, north] = one.bounds_m;
