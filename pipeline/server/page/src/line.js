@@ -24,7 +24,7 @@ export function linePanel() {
     mark.remove();
     if (feature && drawn.hasFeature(feature)) drawn.removeFeature(feature);
     feature = null;
-    result.replaceChildren(h('p', { class: 'hint' }, 'Click points on the map; double-click to finish.'));
+    result.replaceChildren(h('p', { class: 'hint' }, 'Click or tap points on the map; double-click to finish.'));
   };
 
   async function measure(points) {

@@ -14,7 +14,7 @@ export function looksPanel() {
   const shine = () => { azimuth.set(state.azimuth); elevation.set(state.elevation); };
   function renew() {
     shine();
-    const { layers, phenomena } = state.collection;
+    const { layers, phenomena, credit, license } = state.collection;
     const bases = BASES.filter((name) => layers.includes(name));
     const radio = (name) => {
       const input = h('input', { type: 'radio', name: 'base', value: name, onchange: () => set({ layer: name }) });
@@ -36,7 +36,8 @@ export function looksPanel() {
       layers.includes('class') ? slider('Rock cover overlay', { min: 0, max: 1, step: 0.05, value: state.classOpacity, show: (value) => (value ? `${Math.round(value * 100)} %` : 'off'), onchange: (classOpacity) => set({ classOpacity }) }) : '',
       azimuth, elevation,
       slider('Vertical exaggeration', { min: 1, max: 10, step: 0.5, value: state.exaggeration, show: (value) => `${value} ×`, onchange: (exaggeration) => set({ exaggeration }) }),
-      phenomena.length ? h('fieldset', {}, h('legend', {}, 'Processes'), phenomena.map(check)) : '');
+      phenomena.length ? h('fieldset', {}, h('legend', {}, 'Processes'), phenomena.map(check)) : '',
+      h('p', { class: 'hint' }, [credit, license].filter(Boolean).join(', ')));
   }
   on(['collection'], renew);
   on(['azimuth', 'elevation'], shine);

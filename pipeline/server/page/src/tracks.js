@@ -27,7 +27,7 @@ const told = ({ id, label, outcome, length_m: way, duration_s: time }) =>
 
 export function tracksPanel() {
   const list = h('ul', { class: 'list' });
-  const player = h('div', {});
+  const player = h('div', { class: 'player' });
   const mark = marker(RUST);
   let lines = [], listed = null, filled = null, playback = null;
 
@@ -105,10 +105,11 @@ export function tracksPanel() {
       h('ul', { class: 'list' }, events.map((event) => h('li', {}, h('button', { type: 'button', class: 'item', onclick: () => show(event.time_s) }, h('b', {}, `${plain(event.time_s, 4)} s`), h('span', {}, event.what))))));
     playback = { pause, show: () => show(now) };
     show(first);
+    player.scrollIntoView({ block: 'nearest' });
   }
   on(['collection'], renew);
   on(['track'], () => { if (state.track && filled === state.collection) play(state.track); });
-  const element = h('div', {}, list, player);
+  const element = h('div', {}, player, list);
   return {
     title: 'Tracks', element, renew, open() { renew(); playback?.show(); }, close() { playback?.pause(); mark.remove(); },
   };

@@ -339,14 +339,27 @@ await check('a phone has no horizontal scroll', async () => {
   await page.setViewport({ width: 390, height: 844, isMobile: true, hasTouch: true, deviceScaleFactor: 2 });
   await visit(at(finest * 16));
   await shot('phone');
+  for (const panel of ['worlds', 'ground', 'line', 'box']) {
+    await page.tap(`[data-panel=${panel}]`);
+    await wait(200);
+    await fits(panel);
+  }
   await page.tap('[data-panel=ground]');
-  await wait(300);
+  await wait(200);
   await shot('phone-panel');
-  const wide = await page.evaluate(() => Math.max(document.documentElement.scrollWidth, document.body.scrollWidth));
-  must(wide <= 390, `the page is ${wide} px wide`);
-  const outside = await page.evaluate(() => [...document.querySelectorAll('button, input, select')].filter((one) => { const box = one.getBoundingClientRect(); return box.width && box.height && (box.right > 391 || box.left < -1); }).length);
-  must(outside === 0, `${outside} controls stick out`);
+  await page.tap('[data-panel=relief]');
+  await page.waitForSelector('#space canvas');
+  await fits('relief');
+  await page.tap('.space-bar .main');
+  await page.tap('#panel-close');
+  must(await page.$eval('#panel', (element) => element.hidden), 'the panel does not close');
 });
+async function fits(panel) {
+  const wide = await page.evaluate(() => Math.max(document.documentElement.scrollWidth, document.body.scrollWidth));
+  must(wide <= 390, `${panel}: the page is ${wide} px wide`);
+  const outside = await page.evaluate(() => [...document.querySelectorAll('button, input, select')].filter((one) => { const box = one.getBoundingClientRect(); return box.width && box.height && (box.right > 391 || box.left < -1); }).length);
+  must(outside === 0, `${panel}: ${outside} controls stick out`);
+}
 
 await check('dark', async () => {
   await page.setViewport({ width, height });
