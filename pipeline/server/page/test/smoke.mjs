@@ -244,12 +244,12 @@ await check('a refusal is told in the words of the server', async () => {
   await visit(at(finest * 4));
   await page.click('[data-panel=line]');
   provoked = true;
-  const far = 1e15;
+  const far = 1e200;
   await page.$eval('#panel input', (input, x) => { input.value = `0, 0; ${x}, 0`; }, far);
   await page.evaluate(() => document.querySelector('#panel form').requestSubmit());
   await page.waitForSelector('#panel .refused');
   const shown = await page.$eval('#panel .refused', (element) => element.textContent);
-  const { detail } = await (await fetch(`${url}/v1/collections/${encodeURIComponent(collection.id)}/profile?line=0,0;${far},0&samples=512`)).json();
+  const { detail } = await (await fetch(`${url}/v1/collections/${encodeURIComponent(collection.id)}/profile?line=0,0;${encodeURIComponent(far)},0&samples=512`)).json();
   await shot('refused');
   provoked = false;
   must(shown === detail, `the page says "${shown}", the server "${detail}"`);
@@ -314,11 +314,11 @@ for (const [kind, { collection: ground, track }] of await driven()) await check(
 
 await check('a dense screen gets the next finer level', async () => {
   await page.setViewport({ width: 480, height: 320, deviceScaleFactor: 2 });
-  await visit(at(finest * 8));
+  await visit(at(finest * 2));
   const levels = (await tilesAsked()).map((name) => Number(/\/tiles\/[^/]+\/(\d+)\//.exec(name)[1]));
   await shot('dense');
   await page.setViewport({ width, height });
-  must(Math.max(...levels) === resolutions.length - 3, `levels ${[...new Set(levels)].join(', ')} of ${resolutions.length} were asked for`);
+  must(Math.max(...levels) === resolutions.length - 1, `levels ${[...new Set(levels)].join(', ')} of ${resolutions.length} were asked for`);
 });
 
 await check('every control is reached by keys', async () => {
