@@ -41,7 +41,7 @@ export async function get(path, signal) {
     response = await fetch(path, { signal, headers: sent ? { Authorization: `Bearer ${sent}` } : {} });
   } catch (error) {
     if (error.name === 'AbortError') throw error;
-    throw new Problem(0, 'The server does not answer. Check that it is still running.');
+    throw new Problem(0, 'The server is not responding; check that it is still running.');
   }
   if (response.status === 401) {
     if (token === sent) await ask();

@@ -8,6 +8,7 @@ import { get, query, base } from './api.js';
 import { failed } from './tell.js';
 import { state, phenomena, light, on } from './state.js';
 import { h, bytes, save, plain, length } from './dom.js';
+import { fieldName, formatName } from './names.js';
 import { line as ink, RUST } from './ink.js';
 
 const BYTES = { tif: 4, npy: 4, raw: 4, png: 2 };
@@ -17,11 +18,11 @@ export function boxPanel() {
   const sides = ['West', 'South', 'East', 'North'].map((name) => h('input', { type: 'number', step: 'any', 'aria-label': `${name} (m)`, oninput: changed }));
   const resolution = h('input', { type: 'number', step: 'any', min: '0', oninput: tellSize });
   const field = h('select', { onchange: tellSize });
-  const format = h('select', { onchange: tellSize }, ['tif', 'npy', 'raw', 'png'].map((name) => h('option', { value: name }, { tif: 'GeoTIFF', npy: 'NumPy', raw: 'raw float32', png: 'PNG' }[name])));
+  const format = h('select', { onchange: tellSize }, ['tif', 'npy', 'raw', 'png'].map((name) => h('option', { value: name }, formatName(name))));
   const size = h('p', { class: 'hint', 'aria-live': 'polite' });
   const text = h('pre', { tabindex: '0', hidden: true });
   const copy = h('button', { type: 'button', hidden: true, onclick: async () => { try { await navigator.clipboard.writeText(text.textContent); copy.textContent = 'Copied'; } catch { getSelection().selectAllChildren(text); } } }, 'Copy');
-  const study = h('button', { type: 'button', onclick: snippet }, 'Study snippet');
+  const study = h('button', { type: 'button', onclick: snippet }, 'Study TOML');
   const refused = h('p', { class: 'refused', role: 'alert', hidden: true });
 
   const extent = () => sides.map((side) => Number(side.value));
@@ -46,7 +47,7 @@ export function boxPanel() {
   }
   function tellSize() {
     refused.hidden = true;
-    if (!good()) { size.textContent = 'Draw a box on the map (two clicks), or type its edges.'; return; }
+    if (!good()) { size.textContent = 'Draw a box on the map (two clicks) or enter its edges.'; return; }
     const [columns, rows] = samples();
     const image = field.value === 'image' || format.value === 'png';
     size.textContent = `${columns} × ${rows} samples, ${length(columns * resolution.value)} × ${length(rows * resolution.value)}, ${image ? 'at most ' : ''}${bytes(columns * rows * BYTES[format.value])}`;
@@ -70,7 +71,7 @@ export function boxPanel() {
   }
   function renew() {
     const { fields, cell_m: cell, kind } = state.collection;
-    field.replaceChildren(...fields.map((name) => h('option', { value: name }, name.replace('_', ' '))));
+    field.replaceChildren(...fields.map((name) => h('option', { value: name }, fieldName(name))));
     resolution.value = cell;
     study.hidden = kind !== 'world';
     text.hidden = copy.hidden = true;
@@ -81,7 +82,7 @@ export function boxPanel() {
   const element = h('form', { onsubmit: (event) => { event.preventDefault(); download(); } },
     h('div', { class: 'pairs' }, ['West', 'South', 'East', 'North'].map((name, at) => h('label', {}, `${name} (m)`, sides[at]))),
     h('div', { class: 'pairs' }, h('label', {}, 'Field', field), h('label', {}, 'Format', format)),
-    h('div', { class: 'pairs' }, h('label', {}, 'Resolution (m)', resolution), h('button', { type: 'button', onclick: () => take(windowOf()) }, 'Use the window')),
+    h('div', { class: 'pairs' }, h('label', {}, 'Resolution (m)', resolution), h('button', { type: 'button', onclick: () => take(windowOf()) }, 'Use map view')),
     size, refused, h('div', { class: 'row' }, h('button', { class: 'main' }, 'Download'), study), text, copy);
   return {
     title: 'Download', element, take,

@@ -16,7 +16,7 @@ function ticks(low, high, count) {
 /** `hover(index)` is called with the sample under the pointer, or null. */
 export function chart({ along, heights, label = 'distance (m)', hover = () => {} }) {
   const known = heights.filter((z) => z !== null && Number.isFinite(z));
-  if (known.length < 2 || !(along.at(-1) > along[0])) return h('p', { class: 'hint' }, 'There is no ground along this line.');
+  if (known.length < 2 || !(along.at(-1) > along[0])) return h('p', { class: 'hint' }, 'No data along this line.');
   let low = Math.min(...known), high = Math.max(...known);
   const pad = Math.max((high - low) * 0.08, 1e-4);
   low -= pad; high += pad;
@@ -24,12 +24,12 @@ export function chart({ along, heights, label = 'distance (m)', hover = () => {}
   const px = (value) => LEFT + ((value - first) / (last - first)) * (WIDTH - LEFT - RIGHT);
   const py = (value) => TOP + ((high - value) / (high - low)) * (HEIGHT - TOP - FOOT);
   const svg = s('svg', { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, class: 'chart', role: 'img', tabindex: 0,
-    'aria-label': `Profile from ${plain(Math.min(...known), 4)} m to ${plain(Math.max(...known), 4)} m; arrow keys read it` });
+    'aria-label': `Elevation profile, ${plain(Math.min(...known), 4)} m to ${plain(Math.max(...known), 4)} m; use the arrow keys to read values` });
   const y = ticks(low, high, 4), x = ticks(first, last, 4);
   for (const tick of y.list) svg.append(s('line', { x1: LEFT, x2: WIDTH - RIGHT, y1: py(tick), y2: py(tick), class: 'grid' }),
     s('text', { x: LEFT - 5, y: py(tick) + 3, 'text-anchor': 'end' }, fixed(tick, y.places)));
   for (const tick of x.list) svg.append(s('text', { x: Math.min(px(tick), WIDTH - 14), y: HEIGHT - 12, 'text-anchor': 'middle' }, fixed(tick, x.places)));
-  svg.append(s('text', { x: WIDTH - RIGHT, y: HEIGHT - 1, 'text-anchor': 'end', class: 'axis' }, `height (m) over ${label}`));
+  svg.append(s('text', { x: WIDTH - RIGHT, y: HEIGHT - 1, 'text-anchor': 'end', class: 'axis' }, `elevation (m), ${label}`));
   let path = '', pen = 'M';
   heights.forEach((z, at) => {
     if (z === null || !Number.isFinite(z)) { pen = 'M'; return; }

@@ -57,9 +57,18 @@ export function moveTo({ center, resolution }) {
   view.setCenter(center);
 }
 
+/** Distances of what nothing covers from the edges of the map (px): above, right, below, left. */
+function free() {
+  const panel = document.getElementById('panel').getBoundingClientRect();
+  const padding = [24, 24, 24, 24];
+  if (panel.width && panel.width < 0.5 * innerWidth) padding[3] += panel.right;
+  else if (panel.height) padding[2] += panel.height;
+  return padding;
+}
+
 export function home(animate = true) {
   map.updateSize();
-  map.getView().fit(shown.home_m, { padding: [24, 24, 24, 24], duration: animate && !calm.matches ? 500 : 0 });
+  map.getView().fit(shown.home_m, { padding: free(), duration: animate && !calm.matches ? 500 : 0 });
 }
 
 export function zoomBy(levels) {

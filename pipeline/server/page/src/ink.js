@@ -16,12 +16,12 @@ export const line = (color, width = 2) => [
 export const BLUE = '#1c5f8a';
 export const RUST = '#a8452c';
 
-/** A mark that is moved, not redrawn. With a heading (degrees from north, clockwise) it is an arrow. */
+/** A mark that is moved, not redrawn. With a heading (degrees counterclockwise from east, as in the tables) it is an arrow. */
 export function marker(color) {
   const feature = new Feature(new Point([0, 0]));
   feature.setStyle([]);
   const dot = new Style({ zIndex: 5, image: new Circle({ radius: 5, fill: new Fill({ color }), stroke: new Stroke({ color: '#fff', width: 2 }) }) });
-  const arrow = (degrees) => new Style({ zIndex: 5, image: new RegularShape({ points: 3, radius: 10, scale: [0.75, 1.1], rotation: degrees * Math.PI / 180,
+  const arrow = (degrees) => new Style({ zIndex: 5, image: new RegularShape({ points: 3, radius: 10, scale: [0.75, 1.15], rotation: (90 - degrees) * Math.PI / 180,
     rotateWithView: true, fill: new Fill({ color }), stroke: new Stroke({ color: '#fff', width: 1.5 }) }) });
   return {
     at(place, heading = null) {

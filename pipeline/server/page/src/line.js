@@ -24,7 +24,7 @@ export function linePanel() {
     mark.remove();
     if (feature && drawn.hasFeature(feature)) drawn.removeFeature(feature);
     feature = null;
-    result.replaceChildren(h('p', { class: 'hint' }, 'Click points on the map; double-click ends the line.'));
+    result.replaceChildren(h('p', { class: 'hint' }, 'Click or tap points on the map; double-click to finish.'));
   };
 
   async function measure(points) {
@@ -40,8 +40,8 @@ export function linePanel() {
       const profile = await json(`${base(state.collection)}/profile${query({ line, samples: SAMPLES, ...phenomena() })}`, stop.signal);
       show(profile);
     } catch (error) {
-      if (error.name !== 'AbortError') result.replaceChildren(h('p', { class: 'hint' }, error.message));
-      failed(error);
+      if (error.status === undefined) failed(error);
+      else result.replaceChildren(h('p', { class: 'refused', role: 'alert' }, error.message));
     }
   }
 
@@ -59,19 +59,19 @@ export function linePanel() {
     const csv = () => save(new Blob([`distance_m,x_m,y_m,elevation_m\n${along.map((d, at) => [d, x[at], y[at], heights[at] ?? ''].join(',')).join('\n')}\n`], { type: 'text/csv' }), `${state.collection.id}-profile.csv`);
     result.replaceChildren(
       h('dl', {},
-        row('Distance', length(along.at(-1), 5)),
-        row('Along the surface', whole ? length(surface, 5) : 'gaps in the data'),
+        row('Horizontal distance', length(along.at(-1), 5)),
+        row('Surface distance', whole ? length(surface, 5) : 'gaps in the data'),
         known.length ? row('Relief', length(Math.max(...known) - Math.min(...known))) : [],
-        row('Ascent', length(climb))),
+        row('Total ascent', length(climb))),
       curve,
-      h('p', { class: 'hint' }, `${along.length} samples, ${length(along[1] - along[0])} apart; ground resolved to ${length(step)}.`),
+      h('p', { class: 'hint' }, `${along.length} samples, ${length(along[1] - along[0])} apart; terrain resolution ${length(step)}.`),
       h('button', { type: 'button', onclick: csv }, 'Download CSV'));
     result.dataset.samples = known.length;
   }
 
   const typed = () => {
     const points = place.value.split(';').map((text) => text.trim().split(/[\s,]+/).map(Number)).filter((point) => point.length === 2 && point.every(Number.isFinite));
-    if (points.length < 2) return failed({ status: 0, message: 'A line needs two points or more: x, y; x, y' });
+    if (points.length < 2) return failed({ status: 0, message: 'Enter at least two points: x, y; x, y' });
     measure(points);
   };
   const element = h('div', {}, result, h('form', { class: 'row', onsubmit: (event) => { event.preventDefault(); typed(); } }, place, h('button', {}, 'Measure')));

@@ -19,7 +19,7 @@ import { open3d, close3d } from './window3d.js';
 
 const $ = (id) => document.getElementById(id);
 const panels = { worlds: worldsPanel((one) => go({ id: one.id, place: null, looks: { phenomena: null, track: null } })), ground: looksPanel(), line: linePanel(), tracks: tracksPanel(), box: boxPanel() };
-const NAMES = { worlds: 'Collections', ground: 'Ground: layers, sun, phenomena', line: 'Profile and distance', tracks: 'Tracks', box: 'Download', relief: '3-D view of the window' };
+const NAMES = { worlds: 'Collections', ground: 'Layers, sun and processes', line: 'Profile and distance', tracks: 'Tracks', box: 'Download', relief: '3-D view' };
 let opened = null;
 
 function toggle(name) {
@@ -41,23 +41,25 @@ function furnish() {
   }
   $('panel-close').append(icon('close'));
   $('panel-close').addEventListener('click', () => { const name = opened; toggle(name); $('tools').querySelector(`[data-panel=${name}]`).focus(); });
-  for (const [name, label, run] of [['plus', 'Zoom in', () => zoomBy(1)], ['minus', 'Zoom out', () => zoomBy(-1)], ['home', 'Show all', () => home()]]) $('zoom').append(h('button', { type: 'button', title: label, 'aria-label': label, onclick: run }, icon(name)));
+  for (const [name, label, run] of [['plus', 'Zoom in', () => zoomBy(1)], ['minus', 'Zoom out', () => zoomBy(-1)], ['home', 'Home view', () => home()]]) $('zoom').append(h('button', { type: 'button', title: label, 'aria-label': label, onclick: run }, icon(name)));
   $('message').querySelector('button').append(icon('close'));
   $('message').querySelector('button').addEventListener('click', () => { $('message').hidden = true; });
   $('space').addEventListener('leave', () => { close3d($('space')); });
   addEventListener('keydown', (event) => {
-    if (event.target.closest?.('input, select, textarea, dialog, pre')) return;
+    if (event.target.closest?.('dialog')) return;
     if (event.key === 'Escape' && !$('space').hidden) close3d($('space'));
-    else if (event.key === 'Escape' && opened) toggle(opened);
-    else if ($('space').hidden && !event.ctrlKey && !event.metaKey && event.target.id !== 'map' && ['+', '='].includes(event.key)) zoomBy(1);
-    else if ($('space').hidden && !event.ctrlKey && !event.metaKey && event.target.id !== 'map' && event.key === '-') zoomBy(-1);
+    else if (event.key === 'Escape' && opened) $('panel-close').click();
+    else if (event.target.closest?.('#map, input, select, pre') || !$('space').hidden || event.ctrlKey || event.metaKey) return;
+    else if (['+', '='].includes(event.key)) zoomBy(1);
+    else if (event.key === '-') zoomBy(-1);
   });
   map.setTarget($('map'));
   scaleBar($('scale'));
   on(['collection'], () => {
     const { title, release, credit, license, tracks } = state.collection;
     document.title = `${title} - Sastrugi`;
-    $('title').textContent = release ? `${release} / ${title}` : title;
+    $('title').textContent = title;
+    $('title').title = release ? `${title}, release ${release}` : title;
     $('credit').textContent = [credit, license].filter(Boolean).join(', ');
     $('tools').querySelector('[data-panel=tracks]').hidden = !tracks;
     if (!tracks && opened === 'tracks') toggle('tracks');
@@ -82,14 +84,17 @@ function progress() {
 
 async function go({ id, place, looks }) {
   const known = state.collections.find((one) => one.id === id);
-  if (id && !known) tell(`There is no collection ${id} here. The list shows what there is.`);
-  const collection = known ?? state.collections[0];
-  if (!collection) return tell('The server has no collections yet.', true);
+  if (id && !known) tell(`Collection "${id}" not found; showing another one instead.`);
+  const collection = known ?? state.collections.find(({ kind }) => kind === 'world') ?? state.collections[0];
+  if (!collection) return tell('This server has no collections.', true);
   const same = collection === state.collection;
   if (!$('space').hidden) close3d($('space'));
-  set(looks);
-  if (same && place) moveTo(place); else open(collection, place);
-  set({ collection });
+  const { track, ...ground } = looks;
+  set(ground);
+  if (!same) open(collection, place);
+  else if (place) moveTo(place);
+  else home(false);
+  set({ collection, track });
   if (same && opened === 'ground') panels.ground.renew();
 }
 
@@ -103,7 +108,8 @@ async function start() {
   keep(go)();
   panels.tracks.renew();
   if (innerWidth >= 700) toggle('ground');
-  if (!(await pixelsAreTrue())) tell('This browser alters the pixels of images it decodes, so colours and downloaded screenshots may be off; allow canvas data for this page.', true);
+  if (!read().place) home(false);
+  if (!(await pixelsAreTrue())) tell('This browser alters image pixels (fingerprinting protection), so colours may be wrong; allow this page to read canvas data.', true);
 }
 const ready = start().catch((error) => { failed(error); throw error; });
 ready.catch(() => {});

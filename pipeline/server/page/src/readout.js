@@ -3,8 +3,8 @@
 import { map } from './ground.js';
 import { json, query, base } from './api.js';
 import { failed } from './tell.js';
-import { state, phenomena } from './state.js';
-import { debounce, decimals, fixed } from './dom.js';
+import { state, phenomena, on } from './state.js';
+import { debounce, decimals, fixed, length } from './dom.js';
 import { containsCoordinate } from 'ol/extent.js';
 
 let stop = new AbortController();
@@ -16,7 +16,7 @@ export function readout(element) {
     try {
       const point = await json(`${base(state.collection)}/point${query({ x, y, ...phenomena() })}`, stop.signal);
       height.textContent = point.elevation_m === null ? 'no data' : `${fixed(point.elevation_m, decimals(step))} m`;
-      height.title = `between samples ${point.resolution_m} m apart`;
+      height.title = `interpolated between samples ${length(point.resolution_m)} apart`;
       kind.textContent = point.class ?? '';
       element.dataset.elevation = point.elevation_m ?? '';
     } catch (error) {
@@ -25,7 +25,9 @@ export function readout(element) {
       failed(error);
     }
   }, 120);
+  let last = null;
   const at = ([x, y]) => {
+    last = [x, y];
     stop.abort();
     delete element.dataset.elevation;
     const step = map.getView().getResolution();
@@ -43,5 +45,6 @@ export function readout(element) {
     const touch = matchMedia('(hover: none)').matches;
     if (touch || map.getTargetElement().contains(document.activeElement) && document.activeElement.matches(':focus-visible')) at(map.getView().getCenter());
   });
-  return at;
+  on(['collection'], () => { stop.abort(); last = null; place.textContent = height.textContent = kind.textContent = ''; });
+  on(['phenomena'], () => { if (last) at(last); });
 }

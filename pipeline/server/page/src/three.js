@@ -3,7 +3,9 @@
 import { WebGLRenderer, Scene, PerspectiveCamera, BufferGeometry, BufferAttribute, Mesh, MeshBasicMaterial, Line, LineBasicMaterial, Color, DoubleSide, ArrowHelper, Vector3 } from 'three';
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
 
-const DARK = [92, 83, 77], MIDDLE = [171, 154, 135], PALE = [226, 218, 206];
+const TINTS = [[92, 83, 77], [171, 154, 135], [226, 218, 206]], GREY = [190, 190, 190];
+/** Albedo of ground that is shown as it is tinted, as on the map. */
+const PLAIN_ALBEDO = 0.25;
 
 function el(tag, attributes = {}, ...children) {
   const element = document.createElement(tag);
@@ -17,7 +19,7 @@ const say = (metres) => (metres >= 1000 ? `${+(metres / 1000).toPrecision(3)} km
 function surface({ heights, columns, rows, cell }) {
   let sum = 0, count = 0, low = Infinity, high = -Infinity;
   for (const z of heights) if (Number.isFinite(z)) { sum += z; count++; low = Math.min(low, z); high = Math.max(high, z); }
-  if (!count) throw new Error('There is no ground in this window.');
+  if (!count) throw new Error('No data in this view.');
   const mean = sum / count;
   const unit = 2 / (Math.max(columns, rows) * cell);
   const relative = Float32Array.from(heights, (z) => (z - mean) * unit);
@@ -71,14 +73,30 @@ function shadows({ relative, step }, columns, rows, sun, stretch) {
   return seen;
 }
 
-function paint(shape, field, columns, rows, sun, stretch, cast) {
+const linear = (value) => (value / 255) ** 2.2;
+
+/** Colours of the ground under full light, as the map's base layer has them: tints run over the heights of the window. */
+function groundColours({ relative }, { layer, albedo }) {
+  const colours = new Float32Array(3 * relative.length);
+  const tints = TINTS.map((rgb) => rgb.map(linear)), grey = GREY.map(linear);
+  let low = Infinity, high = -Infinity;
+  for (const z of relative) { if (z < low) low = z; if (z > high) high = z; }
+  relative.forEach((z, at) => {
+    const bright = Number.isFinite(albedo?.[at]) ? albedo[at] : PLAIN_ALBEDO;
+    const share = high > low && Number.isFinite(z) ? Math.min(1.999, ((z - low) / (high - low)) * 2) : 1;
+    const [from, to] = share < 1 ? [tints[0], tints[1]] : [tints[1], tints[2]];
+    for (let k = 0; k < 3; k++) {
+      const tint = from[k] + (share % 1) * (to[k] - from[k]);
+      colours[3 * at + k] = layer === 'hillshade' ? grey[k] : layer === 'albedo' ? linear(Math.min(255, 510 * bright)) : tint * (0.4 + 0.6 * bright / PLAIN_ALBEDO) ** 2.2;
+    }
+  });
+  return colours;
+}
+
+function paint(shape, field, colours, columns, rows, sun, stretch, cast) {
   const { relative, step } = field;
   const seen = cast ? shadows(field, columns, rows, sun, stretch) : null;
   const color = shape.attributes.color.array;
-  let low = Infinity, high = -Infinity;
-  for (const z of relative) { if (z < low) low = z; if (z > high) high = z; }
-  const linear = (v) => (v / 255) ** 2.2;
-  const [dark, middle, pale] = [DARK, MIDDLE, PALE].map((rgb) => rgb.map(linear));
   for (let r = 0, at = 0; r < rows; r++) for (let c = 0; c < columns; c++, at++) {
     const z = relative[at];
     const or = (k) => (Number.isFinite(relative[k]) ? relative[k] : z);
@@ -86,10 +104,8 @@ function paint(shape, field, columns, rows, sun, stretch, cast) {
     const gx = ((east - west) / ((c && c + 1 < columns ? 2 : 1) * step)) * stretch;
     const gy = ((north - south) / ((r && r + 1 < rows ? 2 : 1) * step)) * stretch;
     const lit = Math.max(0, (-gx * sun[0] - gy * sun[1] + sun[2]) / Math.sqrt(1 + gx * gx + gy * gy)) * (seen ? seen[at] : 1);
-    const share = high > low ? ((z - low) / (high - low)) * 2 : 1;
-    const [from, to, t] = share < 1 ? [dark, middle, share] : [middle, pale, share - 1];
-    const bright = 0.1 + 1.05 * lit / Math.max(0.55, sun[2]);
-    for (let k = 0; k < 3; k++) color[3 * at + k] = (from[k] + t * (to[k] - from[k])) * bright * [1, 1, 1 + 0.12 * (1 - lit)][k];
+    const bright = 0.1 + 0.95 * lit / Math.max(0.55, sun[2]);
+    for (let k = 0; k < 3; k++) color[3 * at + k] = colours[3 * at + k] * bright * [1, 1, 1 + 0.12 * (1 - lit)][k];
   }
   shape.attributes.color.needsUpdate = true;
 }
@@ -119,12 +135,13 @@ function paths(tracks, { mean, unit }, { corner, columns, rows, cell }) {
 export function show(element, scenery) {
   const { columns, rows, cell } = scenery;
   const field = surface(scenery);
-  const canvas = el('canvas', { tabindex: '0', 'aria-label': '3-D view: arrow keys turn it, plus and minus zoom' });
+  const colours = groundColours(field, scenery);
+  const canvas = el('canvas', { tabindex: '0', 'aria-label': '3-D view: arrow keys rotate, plus and minus zoom' });
   let renderer;
   try {
     renderer = new WebGLRenderer({ canvas, antialias: true });
   } catch {
-    throw new Error('This browser offers no WebGL, which the 3-D view needs.');
+    throw new Error('The 3-D view needs WebGL, which this browser does not offer.');
   }
   renderer.setPixelRatio(Math.min(2, devicePixelRatio));
   const night = matchMedia('(prefers-color-scheme: dark)').matches;
@@ -160,9 +177,9 @@ export function show(element, scenery) {
   const relight = () => {
     ground.scale.y = stretch;
     const sun = direction(azimuth, elevation);
-    paint(shape, field, columns, rows, sun, stretch, false);
+    paint(shape, field, colours, columns, rows, sun, stretch, false);
     clearTimeout(timer);
-    timer = setTimeout(() => { paint(shape, field, columns, rows, sun, stretch, true); draw(); }, 120);
+    timer = setTimeout(() => { paint(shape, field, colours, columns, rows, sun, stretch, true); draw(); }, 120);
     draw();
   };
   let asked = 0;
@@ -174,6 +191,7 @@ export function show(element, scenery) {
     const input = el('input', { type: 'range', min, max, step, 'aria-label': name });
     input.value = value;
     input.addEventListener('input', () => { out.textContent = `${input.value}${unit}`; run(Number(input.value)); relight(); });
+    input.addEventListener('change', () => scenery.shone(azimuth, elevation));
     return el('label', { class: 'slider' }, el('span', {}, name), out, input);
   };
   const leave = el('button', { type: 'button', class: 'main' }, 'Back to the map');

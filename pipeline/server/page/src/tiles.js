@@ -7,6 +7,8 @@ import { get, query, base } from './api.js';
 import { failed } from './tell.js';
 import { light, phenomena } from './state.js';
 
+/** Pixels of a tile along a pixel of the page: dense screens get the next finer level at half its size. */
+const DENSITY = devicePixelRatio > 1.2 ? 2 : 1;
 const loading = new Map();
 const BUSY = [429, 503];
 
@@ -15,7 +17,8 @@ export class Tiles extends TileImage {
     const grid = collection.tile_grid;
     super({
       projection,
-      tileGrid: new TileGrid({ origin: grid.origin_m, resolutions: grid.resolutions_m, tileSize: grid.tile_size, sizes: grid.matrix_sizes }),
+      tileGrid: new TileGrid({ origin: grid.origin_m, resolutions: grid.resolutions_m.map((step) => step * DENSITY), tileSize: grid.tile_size / DENSITY, sizes: grid.matrix_sizes }),
+      tilePixelRatio: DENSITY,
       tileLoadFunction: load,
       transition: matchMedia('(prefers-reduced-motion: reduce)').matches ? 0 : 180,
       wrapX: false,
@@ -29,7 +32,7 @@ export class Tiles extends TileImage {
 
   /** Tiles finer than the finest level are the samples themselves: squares, not a blur. */
   getInterpolate() {
-    return !this.view || this.view.getResolution() > 0.75 * this.finest;
+    return !this.view || this.view.getResolution() > 0.75 * this.finest * devicePixelRatio;
   }
 
   redraw() {

@@ -8,6 +8,7 @@ import { failed } from './tell.js';
 import { state, set, on } from './state.js';
 import { chart } from './chart.js';
 import { h, slider, length, plain } from './dom.js';
+import { outcomeName, vehicleName } from './names.js';
 import { line as ink, marker, BLUE, RUST } from './ink.js';
 
 /** Lines that are drawn at once; the others of a long list are drawn when they are chosen. */
@@ -21,30 +22,39 @@ export const trackOf = async (id) => {
 };
 export const tracksShown = new Map();
 
+const told = ({ id, label, outcome, length_m: way, duration_s: time }) =>
+  [vehicleName(label.replace(id, '').trim()), outcomeName(outcome), Number.isFinite(way) && length(way), Number.isFinite(time) && `${plain(time)} s`].filter(Boolean).join(', ');
+
 export function tracksPanel() {
   const list = h('ul', { class: 'list' });
-  const player = h('div', {});
+  const player = h('div', { class: 'player' });
   const mark = marker(RUST);
-  let lines = [], frame = 0, listed = null;
+  let lines = [], listed = null, filled = null, playback = null;
 
   async function renew() {
     if (listed === state.collection) return;
     listed = state.collection;
-    cancelAnimationFrame(frame);
+    stop();
     lines = [];
     tracksShown.clear();
     list.replaceChildren();
     player.replaceChildren();
-    if (!state.collection.tracks) { list.append(h('li', { class: 'hint' }, 'Nothing was driven here. Releases list their missions and rovers with each terrain.')); return; }
+    if (!state.collection.tracks) { list.append(h('li', { class: 'hint' }, 'There are no tracks here. A release lists the missions and rovers of each terrain.')); return; }
     const asked = state.collection;
     try {
       const { tracks } = await json(`${base(asked)}/tracks`);
       if (asked !== state.collection) return;
       for (const track of tracks) list.append(h('li', {}, h('button', { type: 'button', class: 'item', 'data-track': track.id, onclick: () => set({ track: track.id }) },
-        h('b', {}, track.label), h('span', {}, `${track.kind}, ${track.outcome}, ${length(track.length_m)}, ${plain(track.duration_s, 4)} s`))));
+        h('b', {}, track.id), h('span', {}, told(track)))));
       await Promise.all(tracks.slice(0, DRAWN_MAX).map(({ id }) => draw(id, asked)));
+      filled = asked;
       if (state.track) play(state.track);
     } catch (error) { failed(error); }
+  }
+  function stop() {
+    playback?.pause();
+    playback = null;
+    mark.hide();
   }
   async function draw(id, asked = state.collection) {
     const path = await trackOf(id);
@@ -58,7 +68,7 @@ export function tracksPanel() {
     return path;
   }
   async function play(id) {
-    cancelAnimationFrame(frame);
+    stop();
     try {
       const path = await draw(id);
       for (const feature of lines) feature.setStyle(ink(feature.get('track') === id ? RUST : BLUE, feature.get('track') === id ? 2.4 : 1.4));
@@ -67,9 +77,9 @@ export function tracksPanel() {
     } catch (error) { failed(error); }
   }
   function controls(path) {
-    const { time_s: time, x_m: x, y_m: y, z_m: z, heading_deg: heading, events } = path;
+    const { time_s: time, x_m: x, y_m: y, z_m: z, heading_deg: heading, events = [] } = path;
     const first = time[0], last = time.at(-1);
-    let now = first, speed = 10, playing = false, before = 0;
+    let now = first, speed = 10, playing = false, before = 0, frame = 0;
     const index = (t) => { let low = 0, high = time.length - 1; while (high - low > 1) { const mid = (low + high) >> 1; if (time[mid] <= t) low = mid; else high = mid; } return low; };
     const show = (t) => {
       now = t;
@@ -82,22 +92,25 @@ export function tracksPanel() {
     };
     const clock = slider('Time', { min: first, max: last, step: (last - first) / 1000 || 1, value: first, show: (t) => `${t.toFixed(1)} s`, onchange: show });
     const rate = h('select', { 'aria-label': 'Speed', onchange: () => { speed = Number(rate.value); } }, [1, 10, 60, 300].map((k) => h('option', { value: String(k), selected: k === speed }, `${k} ×`)));
-    const button = h('button', { type: 'button', class: 'main', onclick: () => { playing = !playing; if (playing && now >= last) now = first; before = performance.now(); button.textContent = playing ? 'Pause' : 'Play'; frame = requestAnimationFrame(step); } }, 'Play');
+    const button = h('button', { type: 'button', class: 'main', onclick: () => { if (playing) return pause(); if (now >= last) now = first; before = performance.now(); playing = true; button.textContent = 'Pause'; frame = requestAnimationFrame(step); } }, 'Play');
+    const pause = () => { playing = false; cancelAnimationFrame(frame); button.textContent = 'Play'; };
     const step = (stamp) => {
       if (!playing) return;
       show(Math.min(last, now + (Math.max(0, stamp - before) / 1000) * speed));
       before = stamp;
-      if (now >= last) { playing = false; button.textContent = 'Play'; } else frame = requestAnimationFrame(step);
+      if (now >= last) pause(); else frame = requestAnimationFrame(step);
     };
     const figure = chart({ along: time, heights: z, label: 'time (s)', hover: (at) => { if (at !== null) show(time[at]); } });
     player.replaceChildren(figure, clock, h('div', { class: 'row' }, button, rate),
       h('ul', { class: 'list' }, events.map((event) => h('li', {}, h('button', { type: 'button', class: 'item', onclick: () => show(event.time_s) }, h('b', {}, `${plain(event.time_s, 4)} s`), h('span', {}, event.what))))));
+    playback = { pause, show: () => show(now) };
     show(first);
+    player.scrollIntoView({ block: 'nearest' });
   }
   on(['collection'], renew);
-  on(['track'], () => { if (state.track && listed === state.collection) play(state.track); });
-  const element = h('div', {}, list, player);
+  on(['track'], () => { if (state.track && filled === state.collection) play(state.track); });
+  const element = h('div', {}, player, list);
   return {
-    title: 'Tracks', element, renew, open() { renew(); }, close() { cancelAnimationFrame(frame); mark.remove(); },
+    title: 'Tracks', element, renew, open() { renew(); playback?.show(); }, close() { playback?.pause(); mark.remove(); },
   };
 }

@@ -3,7 +3,7 @@
 import { map, windowOf } from './ground.js';
 import { get, query, base } from './api.js';
 import { failed } from './tell.js';
-import { state, phenomena } from './state.js';
+import { state, set, phenomena } from './state.js';
 import { tracksShown } from './tracks.js';
 import { getIntersection } from 'ol/extent.js';
 
@@ -13,6 +13,13 @@ const ACROSS_MAX = 384;
 function spacing(span, { tile_grid: grid, spacing_m: finest }) {
   const steps = [...grid.resolutions_m, finest].sort((a, b) => a - b);
   return steps.find((step) => span / step <= ACROSS_MAX) ?? steps.at(-1);
+}
+
+/** Whether the ground has an albedo: a world loses it with the process that makes it. */
+function hasAlbedo() {
+  const { fields, phenomena: processes } = state.collection;
+  const own = processes.find(({ kind }) => kind === 'albedo');
+  return state.layer !== 'hillshade' && fields.includes('albedo') && (!own || !state.phenomena || state.phenomena.includes(own.number));
 }
 
 let view = null;
@@ -26,15 +33,16 @@ export async function open3d(element, done) {
   const origin = [snap(extent[0], state.collection.bounds_m[0]), snap(extent[1], state.collection.bounds_m[1])];
   document.body.classList.add('busy');
   try {
-    const path = `${base(state.collection)}/patch${query({ origin: origin.join(','), size: size.join(','), resolution_m: step, field: 'elevation', format: 'raw', feature_min_m: state.collection.kind === 'world' ? 2 * step : null, ...phenomena() })}`;
-    const [{ show }, response] = await Promise.all([import('./three.js'), get(path)]);
-    const heights = new Float32Array(await response.arrayBuffer());
+    const patch = (field) => get(`${base(state.collection)}/patch${query({ origin: origin.join(','), size: size.join(','), resolution_m: step, field, format: 'raw', feature_min_m: state.collection.kind === 'world' ? 2 * step : null, ...phenomena() })}`);
+    const [{ show }, response, bright] = await Promise.all([import('./three.js'), patch('elevation'), hasAlbedo() ? patch('albedo') : null]);
+    const [heights, albedo] = await Promise.all([response, bright].map(async (one) => one && new Float32Array(await one.arrayBuffer())));
     const columns = Number(response.headers.get('Grid-Columns') ?? size[0]);
     const rows = Number(response.headers.get('Grid-Rows') ?? size[1]);
     const cell = Number(response.headers.get('Grid-Cell-M') ?? step);
     const corner = (response.headers.get('Grid-Origin-M') ?? origin.join(',')).split(',').map(Number);
     element.hidden = false;
-    view = show(element, { heights, columns, rows, cell, corner, azimuth: state.azimuth, elevation: state.elevation, tracks: [...tracksShown.values()], title: state.collection.title });
+    view = show(element, { heights, albedo, columns, rows, cell, corner, layer: state.layer, azimuth: state.azimuth, elevation: state.elevation, tracks: [...tracksShown.values()], title: state.collection.title,
+      shone: (azimuth, elevation) => set({ azimuth, elevation }) });
     done?.();
   } catch (error) {
     element.hidden = true;

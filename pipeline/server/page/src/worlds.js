@@ -14,8 +14,8 @@ export function worldsPanel(choose) {
       const name = one.kind === 'world' ? 'Worlds' : one.release ? `Release ${one.release}` : 'Terrains';
       groups.set(name, [...(groups.get(name) ?? []), one]);
     }
-    list.replaceChildren(...[...groups].flatMap(([name, ones]) => [h('h3', {}, name), h('ul', { class: 'list' }, ones.map(item))]));
-    if (!found.length) list.append(h('p', { class: 'hint' }, 'No collection has these words.'));
+    list.replaceChildren(...[...groups].sort(([a], [b]) => (b === 'Worlds') - (a === 'Worlds')).flatMap(([name, ones]) => [h('h3', {}, name), h('ul', { class: 'list' }, ones.map(item))]));
+    if (!found.length) list.append(h('p', { class: 'hint' }, 'No matching collections.'));
   }
   function item(one) {
     const [west, south, east, north] = one.bounds_m;

@@ -1,5 +1,6 @@
 // Smoke test of the page: node test/smoke.mjs URL FOLDER. Needs Chromium (CHROMIUM names it when it is not on the path).
-// SMOKE_ONLY, a regular expression, picks checks by their names; SMOKE_SECONDS is the patience with each.
+// SMOKE_ONLY, a regular expression, picks checks by their names; SMOKE_SECONDS is the patience with each; SMOKE_SIZE is the size of the
+// window, at least 960x640.
 // Each check prints one line; the screenshots go into FOLDER; the exit code is 1 when a check failed.
 
 import puppeteer from 'puppeteer-core';
@@ -10,6 +11,7 @@ const url = (process.argv[2] ?? 'http://127.0.0.1:8080').replace(/\/$/, '');
 const folder = process.argv[3] ?? 'smoke';
 const CHROMIUM = [process.env.CHROMIUM, '/usr/bin/chromium', '/usr/bin/chromium-browser', '/usr/bin/google-chrome'].find((path) => path && existsSync(path));
 const ONLY = process.env.SMOKE_ONLY && new RegExp(process.env.SMOKE_ONLY);
+const [width, height] = (process.env.SMOKE_SIZE ?? '1280x900').split('x').map(Number);
 const PATIENCE = Number(process.env.SMOKE_SECONDS ?? 60) * 1000;
 if (!CHROMIUM) {
   console.error('Chromium was not found: install it or name it in the variable CHROMIUM.');
@@ -21,23 +23,37 @@ const browser = await puppeteer.launch({ executablePath: CHROMIUM, headless: tru
 const page = await browser.newPage();
 page.setDefaultTimeout(PATIENCE);
 const complaints = [];
-page.on('console', (message) => { if (message.type() === 'error') complaints.push(message.text()); });
-page.on('pageerror', (error) => complaints.push(String(error)));
-page.on('response', (response) => { if (response.status() >= 400) complaints.push(`${response.status()} ${response.url()}`); });
-page.on('requestfailed', (request) => { const why = request.failure()?.errorText; if (why !== 'net::ERR_ABORTED') complaints.push(`${why} ${request.url()}`); });
+let provoked = false;
+const complain = (text) => { if (!provoked) complaints.push(text); };
+page.on('console', (message) => { if (message.type() === 'error') complain(message.text()); });
+page.on('pageerror', (error) => complain(String(error)));
+page.on('response', (response) => { if (response.status() >= 400) complain(`${response.status()} ${response.url()}`); });
+page.on('requestfailed', (request) => { const why = request.failure()?.errorText; if (why !== 'net::ERR_ABORTED') complain(`${why} ${request.url()}`); });
 
 let failures = 0;
 async function check(name, run) {
   if (ONLY && !ONLY.test(name)) return;
   try {
+    const start = Date.now();
     const note = await run();
-    console.log(`ok    ${name}${note ? `: ${note}` : ''}`);
+    console.log(`ok    ${name}${note ? `: ${note}` : ''} (${((Date.now() - start) / 1000).toFixed(1)} s)`);
   } catch (error) {
     failures++;
     console.log(`FAIL  ${name}: ${error.message}`);
   }
 }
 function must(truth, sentence) { if (!truth) throw new Error(sentence); }
+const wait = (milliseconds) => new Promise((resolve) => setTimeout(resolve, milliseconds));
+/** Waits until something is true in the page; says so when it never is. */
+async function until(sentence, test, ...values) {
+  await page.waitForFunction(test, { polling: 50 }, ...values).catch((error) => { throw error.name === 'TimeoutError' ? new Error(sentence) : error; });
+}
+const slide = (label, value) => page.evaluate((name, to) => {
+  const input = [...document.querySelectorAll(`input[aria-label="${name}"]`)].at(-1);
+  input.value = to;
+  for (const kind of ['input', 'change']) input.dispatchEvent(new Event(kind, { bubbles: true }));
+}, label, value);
+const tilesAsked = () => page.evaluate(() => performance.getEntriesByType('resource').map(({ name }) => name).filter((name) => name.includes('/map/tiles/')));
 const shot = (name) => page.screenshot({ path: join(folder, `${name}.png`) });
 const settled = () => page.evaluate(() => new Promise((resolve) => {
   const { map } = window.sastrugi;
@@ -64,7 +80,7 @@ const colour = (x, y, half) => page.evaluate((cx, cy, size) => {
   return mean;
 }, x, y, half);
 
-await page.setViewport({ width: 1280, height: 900 });
+await page.setViewport({ width, height });
 await visit();
 const collection = await page.evaluate(() => window.sastrugi.state.collection);
 await check('the page loads and tiles come', async () => {
@@ -80,6 +96,8 @@ const resolutions = collection.tile_grid.resolutions_m;
 const finest = resolutions.at(-1);
 const at = (resolution, more = '', place = middle) => `#c=${encodeURIComponent(collection.id)}&x=${place[0]}&y=${place[1]}&r=${resolution}${more}`;
 
+// A small window, since each scale needs its own tiles made.
+await page.setViewport({ width: width >> 1, height: height / 3 | 0 });
 await check('four scales', async () => {
   const coarse = Math.log(resolutions[0]), fine = Math.log(finest / 8);
   for (let k = 0; k < 4; k++) {
@@ -112,6 +130,7 @@ await check('levels agree across a tile seam', async () => {
   return `mean colours within ${jump.toFixed(1)} of 255`;
 });
 
+await page.setViewport({ width, height });
 await check('the elevation readout equals /point', async () => {
   await visit(at(finest));
   await page.mouse.move(700, 420);
@@ -130,10 +149,10 @@ await check('the elevation readout equals /point', async () => {
 await check('a permalink comes back', async () => {
   const more = '&layer=hillshade&class=0.5&sun=120,20&exaggeration=2';
   await visit(at(finest * 4, more));
-  await new Promise((resolve) => setTimeout(resolve, 700));
+  await wait(700);
   const first = await page.evaluate(() => location.hash);
   await visit(first);
-  await new Promise((resolve) => setTimeout(resolve, 700));
+  await wait(700);
   const second = await page.evaluate(() => location.hash);
   must(first === second, `${first} became ${second}`);
   must(second.includes('sun=120,20') && second.includes('layer=hillshade') && second.includes('class=0.5'), `looks were lost: ${second}`);
@@ -143,27 +162,25 @@ await check('a permalink comes back', async () => {
 
 await check('back and forward', async () => {
   await visit(at(finest * 4));
-  await new Promise((resolve) => setTimeout(resolve, 500));
+  await wait(700);
+  const first = await page.evaluate(() => location.hash);
   const before = await page.evaluate(() => window.sastrugi.map.getView().getResolution());
   await page.focus('#map');
   await page.keyboard.press('+');
   await page.keyboard.press('+');
-  await new Promise((resolve) => setTimeout(resolve, 1200));
-  const closer = await page.evaluate(() => window.sastrugi.map.getView().getResolution());
-  must(closer < 0.6 * before, 'the key + does not zoom');
+  await until('the key + does not zoom', (coarse) => window.sastrugi.map.getView().getResolution() < 0.6 * coarse && !window.sastrugi.map.getView().getAnimating(), before);
+  await until('the address does not follow', (hash) => location.hash !== hash, first);
   await page.evaluate(() => history.back());
-  await new Promise((resolve) => setTimeout(resolve, 800));
-  const after = await page.evaluate(() => window.sastrugi.map.getView().getResolution());
-  must(Math.abs(after / before - 1) < 1e-3, `back leads to ${after} m a pixel, not ${before}`);
+  await until(`back does not lead back to ${before} m a pixel`, (coarse) => Math.abs(window.sastrugi.map.getView().getResolution() / coarse - 1) < 1e-3, before);
 });
 
 await check('a profile gives numbers', async () => {
   await visit(at(finest * 4));
   await page.click('[data-panel=line]');
   await page.mouse.click(520, 400);
-  await new Promise((resolve) => setTimeout(resolve, 400));
+  await wait(400);
   await page.mouse.click(900, 560);
-  await new Promise((resolve) => setTimeout(resolve, 400));
+  await wait(400);
   await page.mouse.click(900, 560);
   await page.waitForSelector('.result[data-samples]');
   const samples = await page.$eval('.result', (element) => Number(element.dataset.samples));
@@ -179,7 +196,7 @@ await check('a download says its size beforehand', async () => {
   await page.click('[data-panel=box]');
   await page.mouse.click(520, 400);
   await page.mouse.move(700, 500);
-  await new Promise((resolve) => setTimeout(resolve, 300));
+  await wait(300);
   await page.mouse.click(760, 560);
   await page.waitForFunction(() => /samples/.test(document.querySelector('#panel .hint').textContent));
   await shot('download');
@@ -190,8 +207,8 @@ await check('the 3-D view opens', async () => {
   await visit(at(finest * 8));
   await page.click('[data-panel=relief]');
   await page.waitForSelector('#space canvas');
-  await new Promise((resolve) => setTimeout(resolve, 2500));
-  const picture = await shot('space');
+  let picture = await shot('space');
+  for (const end = Date.now() + PATIENCE; picture.length <= 80000 && Date.now() < end;) picture = await shot('space');
   must(!complaints.some((text) => text.includes('THREE')), 'three.js complains of a shader');
   must(picture.length > 80000, `the picture is empty: ${picture.length} bytes`);
   const words = await page.$eval('.space-bar p', (element) => element.innerText);
@@ -200,42 +217,154 @@ await check('the 3-D view opens', async () => {
   return words.replace(/\s+/g, ' ');
 });
 
-const { collections } = await (await fetch(`${url}/v1/collections`)).json();
-const driven = collections.find((one) => one.tracks);
-if (driven) await check('tracks are listed and played', async () => {
-  await visit(`#c=${encodeURIComponent(driven.id)}`);
-  await page.click('[data-panel=tracks]');
-  await page.waitForSelector('#panel [data-track]');
-  await page.click('#panel [data-track]');
-  await page.waitForSelector('#panel .chart');
-  await page.evaluate(() => [...document.querySelectorAll('#panel button')].find((button) => button.textContent === 'Play').click());
-  await new Promise((resolve) => setTimeout(resolve, 1500));
-  const clock = await page.$eval('#panel .slider output', (element) => parseFloat(element.textContent));
-  await shot('tracks');
-  must(clock > 0, 'the clock of the playback stands still');
+await check('one sun for the map and the 3-D view', async () => {
+  await visit(at(finest * 8));
   await page.click('[data-panel=relief]');
   await page.waitForSelector('#space canvas');
-  await new Promise((resolve) => setTimeout(resolve, 2500));
-  await shot('space-tracks');
+  await slide('Sun azimuth', 100);
+  await page.click('.space-bar .main');
+  await until('the map keeps another sun', () => location.hash.includes('sun=100,45'));
+  await settled();
+  must((await page.$eval('#panel input[aria-label="Sun azimuth"]', (input) => input.value)) === '100', 'the slider of the map shows another sun');
+  must((await tilesAsked()).some((name) => name.includes('sun_azimuth_deg=100')), 'no tile under that sun was asked for');
+});
+
+if (collection.phenomena.length) await check('processes can be switched off, all of them', async () => {
+  await visit(at(finest * 8));
+  const relief = () => page.evaluate(() => document.querySelectorAll('#panel .check input:checked').length);
+  for (let left = await relief(); left > 0; left--) await page.click('#panel .check input:checked');
+  must(await relief() === 0, 'a process cannot be switched off');
+  await until('no tile of the base ground was asked for', () => performance.getEntriesByType('resource').some(({ name }) => /\/tiles\/.*[?&]phenomena=(&|$)/.test(name)));
+  await settled();
+  must(await page.$eval('#message', (element) => element.hidden), await page.$eval('#message', (element) => element.innerText));
+  await shot('base-ground');
+});
+
+await check('a refusal is told in the words of the server', async () => {
+  await visit(at(finest * 4));
+  await page.click('[data-panel=line]');
+  provoked = true;
+  const far = 1e200;
+  await page.$eval('#panel input', (input, x) => { input.value = `0, 0; ${x}, 0`; }, far);
+  await page.evaluate(() => document.querySelector('#panel form').requestSubmit());
+  await page.waitForSelector('#panel .refused');
+  const shown = await page.$eval('#panel .refused', (element) => element.textContent);
+  const { detail } = await (await fetch(`${url}/v1/collections/${encodeURIComponent(collection.id)}/profile?line=0,0;${encodeURIComponent(far)},0&samples=512`)).json();
+  await shot('refused');
+  provoked = false;
+  must(shown === detail, `the page says "${shown}", the server "${detail}"`);
+  return shown;
+});
+
+/** The first collection with a track of each kind. */
+async function driven() {
+  const { collections } = await (await fetch(`${url}/v1/collections`)).json();
+  const found = new Map();
+  for (const one of collections.filter(({ tracks }) => tracks)) {
+    const { tracks } = await (await fetch(`${url}/v1/collections/${encodeURIComponent(one.id)}/tracks`)).json();
+    for (const track of tracks) if (!found.has(track.kind)) found.set(track.kind, { collection: one, track });
+  }
+  return [...found];
+}
+for (const [kind, { collection: ground, track }] of await driven()) await check(`a ${kind} is listed and played`, async () => {
+  await visit(`#c=${encodeURIComponent(ground.id)}`);
+  await page.click('[data-panel=tracks]');
+  await page.waitForSelector('#panel [data-track]');
+  await page.click(`#panel [data-track="${track.id}"]`);
+  await page.waitForSelector('#panel .chart');
+  const speed = [300, 60, 10, 1].find((factor) => track.duration_s / factor >= 2.5) ?? 1;
+  await page.select('#panel select[aria-label=Speed]', String(speed));
+  const seen = page.evaluate(() => new Promise((resolve) => {
+    const frames = [];
+    const features = () => window.sastrugi.map.getLayers().getArray().at(-1).getSource().getFeatures();
+    const look = () => {
+      for (const feature of features()) {
+        const image = feature.getStyle()?.getImage?.();
+        if (image?.getPoints?.() === 3) frames.push([...feature.getGeometry().getCoordinates(), image.getRotation()]);
+      }
+      if (performance.now() < end) requestAnimationFrame(look); else resolve(frames);
+    };
+    const end = performance.now() + 2500;
+    [...document.querySelectorAll('#panel button')].find((button) => button.textContent === 'Play').click();
+    look();
+  }));
+  await wait(1000);
+  await shot(`tracks-${kind}`);
+  const frames = await seen;
+  const clock = await page.$eval('#panel .slider output', (element) => parseFloat(element.textContent));
+  must(clock > 0, 'the clock of the playback stands still');
+  // Directions over moves that are long beside the rounding of a place and beside a turn on the spot.
+  let from = 0, moves = 0, along = 0;
+  for (let to = 1; to < frames.length; to++) {
+    const [dx, dy] = [0, 1].map((k) => frames[to][k] - frames[from][k]);
+    if (Math.hypot(dx, dy) < 0.01 * track.length_m) continue;
+    const rotation = frames[(from + to) >> 1][2];
+    moves++;
+    if (Math.sin(rotation) * dx + Math.cos(rotation) * dy > Math.SQRT1_2 * Math.hypot(dx, dy)) along++;
+    from = to;
+  }
+  must(moves >= 5, `the marker moved ${moves} times only`);
+  must(along >= 0.9 * moves, `the arrow points along the motion in ${along} of ${moves} moves only`);
+  await page.click('[data-panel=relief]');
+  await page.waitForSelector('#space canvas');
+  await wait(800);
+  await shot(`space-tracks-${kind}`);
+  return `${ground.id}, ${track.id}: the arrow points along the motion in ${along} of ${moves} moves`;
+});
+
+await check('a dense screen gets the next finer level', async () => {
+  await page.setViewport({ width: 480, height: 320, deviceScaleFactor: 2 });
+  await visit(at(finest * 2));
+  const levels = (await tilesAsked()).map((name) => Number(/\/tiles\/[^/]+\/(\d+)\//.exec(name)[1]));
+  await shot('dense');
+  await page.setViewport({ width, height });
+  must(Math.max(...levels) === resolutions.length - 1, `levels ${[...new Set(levels)].join(', ')} of ${resolutions.length} were asked for`);
+});
+
+await check('every control is reached by keys', async () => {
+  await visit(at(finest * 8));
+  const names = new Set();
+  for (let k = 0; k < 60; k++) {
+    await page.keyboard.press('Tab');
+    const name = await page.evaluate(() => { const one = document.activeElement; return one === document.body ? null : one.getAttribute('aria-label') ?? one.name ?? one.id; });
+    if (name) names.add(name);
+  }
+  const missing = ['Zoom in', 'Zoom out', 'Home view', 'Close', 'Collections', 'Profile and distance', 'Sun azimuth'].filter((name) => !names.has(name));
+  must(!missing.length, `not reached: ${missing.join(', ')}`);
+  await page.keyboard.press('Escape');
+  must(await page.$eval('#panel', (element) => element.hidden), 'Escape does not close the panel');
 });
 
 await check('a phone has no horizontal scroll', async () => {
-  await page.setViewport({ width: 390, height: 844, isMobile: true, hasTouch: true, deviceScaleFactor: 2 });
+  await page.setViewport({ width: 390, height: 844, isMobile: true, hasTouch: true, deviceScaleFactor: 1 });
   await visit(at(finest * 16));
   await shot('phone');
+  for (const panel of ['worlds', 'ground', 'line', 'box']) {
+    await page.tap(`[data-panel=${panel}]`);
+    await wait(200);
+    await fits(panel);
+  }
   await page.tap('[data-panel=ground]');
-  await new Promise((resolve) => setTimeout(resolve, 300));
+  await wait(200);
   await shot('phone-panel');
-  const wide = await page.evaluate(() => Math.max(document.documentElement.scrollWidth, document.body.scrollWidth));
-  must(wide <= 390, `the page is ${wide} px wide`);
-  const outside = await page.evaluate(() => [...document.querySelectorAll('button, input, select')].filter((one) => { const box = one.getBoundingClientRect(); return box.width && box.height && (box.right > 391 || box.left < -1); }).length);
-  must(outside === 0, `${outside} controls stick out`);
+  await page.tap('[data-panel=relief]');
+  await page.waitForSelector('#space canvas');
+  await fits('relief');
+  await page.tap('.space-bar .main');
+  await page.tap('#panel-close');
+  must(await page.$eval('#panel', (element) => element.hidden), 'the panel does not close');
 });
+async function fits(panel) {
+  const wide = await page.evaluate(() => Math.max(document.documentElement.scrollWidth, document.body.scrollWidth));
+  must(wide <= 390, `${panel}: the page is ${wide} px wide`);
+  const outside = await page.evaluate(() => [...document.querySelectorAll('button, input, select')].filter((one) => { const box = one.getBoundingClientRect(); return box.width && box.height && (box.right > 391 || box.left < -1); }).length);
+  must(outside === 0, `${panel}: ${outside} controls stick out`);
+}
 
 await check('dark', async () => {
-  await page.setViewport({ width: 1280, height: 900 });
+  await page.setViewport({ width, height });
   await page.emulateMediaFeatures([{ name: 'prefers-color-scheme', value: 'dark' }]);
-  await visit(at(finest * 64));
+  await visit(at(finest * 8));
   await page.click('[data-panel=worlds]');
   await shot('dark');
 });
