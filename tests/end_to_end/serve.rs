@@ -141,6 +141,7 @@ fn val_wrong_requests_are_refused() {
         (400, format!("{c}/patch?origin=0,0&size=5,5&rotate=45")),
         (400, format!("{c}/patch?origin=0,0&size=5,5&downsample=1")),
         (400, format!("{c}/patch?origin=0,0&size=5,5&phenomena=9")),
+        (400, format!("{c}/patch?origin=0,0&size=5,5&phenomena=1&field=albedo")),
         (400, format!("{c}/patch?origin=0,0&size=5,5&fromat=npy")),
         (400, format!("{c}/patch?origin=0,0&origin=1,1&size=5,5")),
         (400, format!("{c}/point?x=1")),

@@ -58,7 +58,8 @@ distance_limit_m = 60.0
 fn val_the_page_agrees_with_the_server() {
     let Some(page) = page() else { return };
     if !has_browser() {
-        return skipped("Chromium is not installed, and CHROMIUM does not name it");
+        // No test installs a browser: without one it is as with `.ci/look`.
+        return eprintln!("SKIPPED: Chromium is not installed, and CHROMIUM does not name it");
     }
     let folder = area();
     write(folder.path(), "study.toml", DRIVEN);

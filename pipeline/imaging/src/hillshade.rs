@@ -30,9 +30,20 @@ fn brightness(grid: &Grid, row: usize, col: usize, exaggeration: f64) -> f64 {
     if !grid.at(row, col).is_finite() {
         return f64::NAN;
     }
-    let [p, q] = gradient(grid, row, col).map(|v| v * exaggeration);
+    lit(gradient(grid, row, col).map(|v| v * exaggeration), LIGHT)
+}
+
+/// Brightness of a facet of a gradient east and north.
+fn lit([p, q]: [f64; 2], light: [f64; 3]) -> f64 {
     let length = (1.0 + p * p + q * q).sqrt();
-    ((LIGHT[2] - p * LIGHT[0] - q * LIGHT[1]) / length).max(0.0)
+    ((light[2] - p * light[0] - q * light[1]) / length).max(0.0)
+}
+
+/// Eight cells times the gradient east and north of 3 x 3 heights, row 0 in the north (Horn, 1981).
+fn differences(z: impl Fn(usize, usize) -> f64) -> [f64; 2] {
+    let east = z(0, 2) + 2.0 * z(1, 2) + z(2, 2) - z(0, 0) - 2.0 * z(1, 0) - z(2, 0);
+    let north = z(0, 0) + 2.0 * z(0, 1) + z(0, 2) - z(2, 0) - 2.0 * z(2, 1) - z(2, 2);
+    [east, north]
 }
 
 /// Gradient east and north.
@@ -47,8 +58,7 @@ fn gradient(grid: &Grid, row: usize, col: usize) -> [f64; 2] {
         let v = grid.at(r + dr - 1, c + dc - 1);
         if v.is_finite() { v } else { centre }
     };
-    let east = z(0, 2) + 2.0 * z(1, 2) + z(2, 2) - z(0, 0) - 2.0 * z(1, 0) - z(2, 0);
-    let north = z(0, 0) + 2.0 * z(0, 1) + z(0, 2) - z(2, 0) - 2.0 * z(2, 1) - z(2, 2);
+    let [east, north] = differences(z);
     [east / (8.0 * grid.geometry.cell[0]), north / (8.0 * grid.geometry.cell[1])]
 }
 
@@ -76,11 +86,7 @@ pub fn shade_inner(
                 let difference = f64::from(lines[r][col + c - 1]) - f64::from(centre);
                 if difference.is_nan() { 0.0 } else { difference }
             };
-            let east = z(0, 2) + 2.0 * z(1, 2) + z(2, 2) - z(0, 0) - 2.0 * z(1, 0) - z(2, 0);
-            let north = z(0, 0) + 2.0 * z(0, 1) + z(0, 2) - z(2, 0) - 2.0 * z(2, 1) - z(2, 2);
-            let (p, q) = (east * per_difference, north * per_difference);
-            let length = (1.0 + p * p + q * q).sqrt();
-            shades.push(((light[2] - p * light[0] - q * light[1]) / length).max(0.0) as f32);
+            shades.push(lit(differences(z).map(|d| d * per_difference), light) as f32);
         }
     }
     shades

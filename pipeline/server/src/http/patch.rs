@@ -190,7 +190,12 @@ impl Treatment {
 
     /// Values of the field.
     fn values(&self, samples: &Samples, geometry: Geometry) -> Result<Vec<f32>, Problem> {
-        let there = |field: &Option<Vec<f32>>| field.clone().ok_or_else(|| Problem::internal("the field is not there"));
+        let there = |field: &Option<Vec<f32>>| {
+            let name = self.field;
+            field.clone().ok_or_else(|| {
+                Problem::bad_request(format!("`field`: no process that acts gives {name}; `phenomena` leaves it out"))
+            })
+        };
         match self.field {
             "albedo" => there(&samples.albedo),
             "class" => there(&samples.rock),

@@ -278,13 +278,13 @@ impl RawProcess {
     /// What it is, in a few words.
     pub fn summary(&self) -> String {
         match self {
-            Self::BaseSlope(_) => "a smooth slope".to_owned(),
-            Self::Texture(p) => format!("roughness of {} m at 1 m, Hurst exponent {}", p.roughness_m, p.hurst),
-            Self::PrimaryCraters(p) => format!("craters of {} to {} m", p.diameter_min_m, p.diameter_max_m),
-            Self::SecondaryCraters(_) => "craters of what other impacts threw out".to_owned(),
+            Self::BaseSlope(_) => "regional slope".to_owned(),
+            Self::Texture(p) => format!("roughness {} m at 1 m, Hurst exponent {}", p.roughness_m, p.hurst),
+            Self::PrimaryCraters(p) => format!("crater diameters {} m to {} m", p.diameter_min_m, p.diameter_max_m),
+            Self::SecondaryCraters(_) => "craters formed by ejecta of larger ones".to_owned(),
             Self::Rocks(p) => format!("rocks over {:.1} % of the ground", 100.0 * p.coverage),
-            Self::Albedo(_) => "how bright the ground is".to_owned(),
-            Self::Dust(p) => format!("dust of {} m", p.thickness_m),
+            Self::Albedo(_) => "surface albedo".to_owned(),
+            Self::Dust(p) => format!("dust layer {} m thick", p.thickness_m),
         }
     }
 
