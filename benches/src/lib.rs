@@ -1,6 +1,6 @@
 //! What benches share: floors that other programs set in the same run.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Figures that a script of `floors/` prints, measured in a process of its own with one thread; `None` where Python lacks
@@ -11,13 +11,21 @@ pub fn floor(script: &str, arguments: &[&str]) -> Option<Vec<f64>> {
 
 /// As [`floor`], with the Python of another environment of `.cache`.
 pub fn floor_in(environment: &str, script: &str, arguments: &[&str]) -> Option<Vec<f64>> {
-    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let own = here.join("../.cache").join(environment).join("bin/python");
-    let python = if own.exists() { own.as_path() } else { Path::new("python3") };
-    let script = here.join("floors").join(script);
+    let python = python(environment).unwrap_or_else(|| PathBuf::from("python3"));
     let mut command = Command::new(python);
-    command.arg(script).args(arguments).env("OMP_NUM_THREADS", "1").env("PYTHONDONTWRITEBYTECODE", "1");
+    command.arg(script_of(script)).args(arguments).env("OMP_NUM_THREADS", "1").env("PYTHONDONTWRITEBYTECODE", "1");
     let run = command.output().ok()?;
     let words = String::from_utf8(run.stdout).ok().filter(|_| run.status.success())?;
     words.split_whitespace().map(|w| w.parse().ok()).collect()
+}
+
+/// Python of an environment of `.cache`, where it was made.
+pub fn python(environment: &str) -> Option<PathBuf> {
+    let own = Path::new(env!("CARGO_MANIFEST_DIR")).join("../.cache").join(environment).join("bin/python");
+    own.exists().then_some(own)
+}
+
+/// A script of `floors/`.
+pub fn script_of(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("floors").join(name)
 }

@@ -10,6 +10,7 @@ mod photoclinometry;
 mod route;
 mod rover;
 mod serve;
+mod serve_faults;
 mod team;
 mod traverse;
 

@@ -1,7 +1,7 @@
 //! A terrain server that a test has started, and a client for it.
 
 use crate::program;
-use std::io::{BufRead, BufReader, Read, Write};
+use std::io::{self, BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
@@ -51,14 +51,17 @@ impl Server {
     /// # Panics
     /// When it does not come up.
     pub fn start(folder: &Path, arguments: &[&str], environment: &[(&str, &str)]) -> Self {
-        let mut process = Command::new(program())
-            .args(["serve", "--listen", "127.0.0.1:0"])
-            .args(arguments)
-            .current_dir(folder)
-            .envs(environment.iter().copied())
-            .stdout(Stdio::piped())
-            .spawn()
-            .expect("the program starts");
+        let mut command = Command::new(program());
+        command.args(["serve", "--listen", "127.0.0.1:0"]).args(arguments);
+        Self::start_command(command.current_dir(folder).envs(environment.iter().copied()))
+    }
+
+    /// Starts a server by a command that becomes it.
+    ///
+    /// # Panics
+    /// When it does not come up.
+    pub fn start_command(command: &mut Command) -> Self {
+        let mut process = command.stdout(Stdio::piped()).spawn().expect("the program starts");
         let mut line = String::new();
         let out = process.stdout.take().expect("it prints");
         BufReader::new(out).read_line(&mut line).expect("it prints its address");
@@ -100,6 +103,36 @@ impl Server {
         answer(&bytes)
     }
 
+    /// A connection that is kept.
+    ///
+    /// # Errors
+    /// There is no server any more, or it takes no connection.
+    pub fn client(&self) -> io::Result<Client> {
+        Client::connect(&self.address)
+    }
+
+    /// A figure of its process in kB, as `VmHWM`, the most memory that it has held, or `VmRSS`, what it holds.
+    ///
+    /// # Panics
+    /// Where the system does not tell.
+    pub fn memory_kb(&self, figure: &str) -> u64 {
+        let status = std::fs::read_to_string(format!("/proc/{}/status", self.process.id())).expect("the server runs");
+        let line = status.lines().find_map(|line| line.strip_prefix(figure)?.strip_prefix(':'));
+        line.and_then(|line| line.split_whitespace().next()?.parse().ok()).expect("the system knows the figure")
+    }
+
+    /// Processor time of its process so far, s.
+    ///
+    /// # Panics
+    /// Where the system does not tell.
+    pub fn processor_s(&self) -> f64 {
+        let text = std::fs::read_to_string(format!("/proc/{}/stat", self.process.id())).expect("the server runs");
+        let after = text.rsplit(')').next().unwrap_or_default();
+        let ticks = after.split_whitespace().skip(11).take(2).filter_map(|word| word.parse::<f64>().ok());
+        // Linux counts hundredths here on every machine.
+        ticks.sum::<f64>() / 100.0
+    }
+
     /// Kills it at once.
     pub fn kill(&mut self) {
         // It may be gone already.
@@ -128,6 +161,68 @@ impl Server {
 impl Drop for Server {
     fn drop(&mut self) {
         self.kill();
+    }
+}
+
+/// A connection that is kept from one request to the next. It gives whole answers or none.
+pub struct Client {
+    stream: BufReader<TcpStream>,
+}
+
+impl Client {
+    /// Connects.
+    ///
+    /// # Errors
+    /// Nobody listens.
+    pub fn connect(address: &str) -> io::Result<Self> {
+        let stream = TcpStream::connect(address)?;
+        stream.set_nodelay(true)?;
+        stream.set_read_timeout(Some(Duration::from_secs(120)))?;
+        Ok(Self { stream: BufReader::with_capacity(1 << 16, stream) })
+    }
+
+    /// The stream, for what is no request.
+    pub fn stream(&mut self) -> &mut TcpStream {
+        self.stream.get_mut()
+    }
+
+    /// `GET`.
+    ///
+    /// # Errors
+    /// The connection ends before the answer is whole.
+    pub fn get(&mut self, path: &str) -> io::Result<Answer> {
+        let mut body = Vec::new();
+        let (status, head) = self.get_into(path, &mut body)?;
+        Ok(Answer { status, head, body })
+    }
+
+    /// `GET`, with the body in memory that is there; status and head, lower case.
+    ///
+    /// # Errors
+    /// The connection ends before the answer is whole.
+    pub fn get_into(&mut self, path: &str, body: &mut Vec<u8>) -> io::Result<(u16, String)> {
+        let request = format!("GET {path} HTTP/1.1\r\nHost: localhost\r\n\r\n");
+        self.stream.get_mut().write_all(request.as_bytes())?;
+        self.answer_into(body)
+    }
+
+    /// The answer to what was written to [`Client::stream`].
+    ///
+    /// # Errors
+    /// The connection ends before the answer is whole.
+    pub fn answer_into(&mut self, body: &mut Vec<u8>) -> io::Result<(u16, String)> {
+        let mut head = String::new();
+        while !head.ends_with("\r\n\r\n") {
+            if self.stream.read_line(&mut head)? == 0 {
+                return Err(io::ErrorKind::UnexpectedEof.into());
+            }
+        }
+        let head = head.trim_end().to_lowercase();
+        let status = head.split(' ').nth(1).and_then(|s| s.parse().ok()).ok_or(io::ErrorKind::InvalidData)?;
+        let length = head.lines().find_map(|line| line.strip_prefix("content-length: ")?.parse().ok()).unwrap_or(0);
+        body.resize(length, 0);
+        self.stream.read_exact(body)?;
+        Ok((status, head))
     }
 }
 
