@@ -96,10 +96,15 @@ impl Window {
         Self { zoom: self.zoom + 1, west, south, cols, rows, centred: false }
     }
 
+    /// The south-west and the north-east point, lattice units.
+    pub(super) fn corners(&self) -> [[f64; 2]; 2] {
+        [[self.x(0), self.y(0)], [self.x(self.cols - 1), self.y(self.rows - 1)]]
+    }
+
     /// Whether a place is so far outside that no point lies within `reach` of it along either axis; lattice units.
-    pub(super) fn misses(&self, [x, y]: [f64; 2], reach: f64) -> bool {
-        let beyond = |at: f64, first: f64, last: f64| at + reach < first || at - reach > last;
-        beyond(x, self.x(0), self.x(self.cols - 1)) || beyond(y, self.y(0), self.y(self.rows - 1))
+    pub(super) fn misses(&self, at: [f64; 2], reach: f64) -> bool {
+        let [first, last] = self.corners();
+        (0..2).any(|axis| at[axis] + reach < first[axis] || at[axis] - reach > last[axis])
     }
 
     /// The points within `reach` of a place along either axis, `None` when there is none; lattice units.

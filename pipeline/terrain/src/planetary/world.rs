@@ -97,6 +97,8 @@ struct Survey<'w> {
     world: &'w World,
     feature_min_m: f64,
     cancel: Option<&'w AtomicBool>,
+    /// For every step, the craters that may reach what is looked at.
+    craters: Vec<Index>,
     planes: RefCell<HashMap<Place, Plane>>,
     families: Families,
 }
@@ -129,14 +131,14 @@ impl World {
         }
         let Request { feature_min_m, cancel, .. } = *request;
         let (planes, families) = (RefCell::default(), RefCell::default());
-        let survey = Survey { world: self, feature_min_m, cancel, planes, families };
-        let craters = survey.index(&Near { cancel, ..self.near(window) });
-        patch.heights = survey.ground(window, &craters);
+        let mut survey = Survey { world: self, feature_min_m, cancel, craters: Vec::new(), planes, families };
+        survey.craters = survey.index(&Near { cancel, ..self.near(window) });
+        patch.heights = survey.ground(window);
         if let Some(albedo) = &self.albedo {
             patch.albedo = albedo.of_sand(window);
         }
         if let Some((rocks, after)) = &self.rocks {
-            survey.set_rocks(rocks, &craters[*after..], &craters, &mut patch);
+            survey.set_rocks(rocks, *after, &mut patch);
         }
         patch
     }
@@ -207,10 +209,10 @@ impl Survey<'_> {
         found
     }
 
-    /// Heights of the ground without rocks, m; `craters` by step.
-    fn ground(&self, window: &Window, craters: &[Index]) -> Vec<f64> {
+    /// Heights of the ground without rocks, m.
+    fn ground(&self, window: &Window) -> Vec<f64> {
         let mut heights = vec![0.0; window.len()];
-        for (number, (step, craters)) in self.world.steps.iter().zip(craters).enumerate() {
+        for (number, (step, craters)) in self.world.steps.iter().zip(&self.craters).enumerate() {
             self.act(number, step, window, &mut heights, craters.of(window));
         }
         heights
@@ -220,12 +222,17 @@ impl Survey<'_> {
     fn ground_before(&self, last: usize, crater: &Crater, window: &Window) -> Vec<f64> {
         let mut heights = vec![0.0; window.len()];
         for (number, step) in self.world.steps[..=last].iter().enumerate() {
-            let mut wider = match step {
-                Step::Bombardment(b) => self.craters(b, &self.near(window), crater.diameter_m),
-                _ => Vec::new(),
-            };
-            wider.retain(|c| number < last || c.order(crater).is_lt());
-            self.act(number, step, window, &mut heights, wider.iter());
+            let earlier = |c: &&Crater| number < last || c.order(crater).is_lt();
+            match (step, self.craters[number].wider(crater, window)) {
+                (Step::Bombardment(b), None) => {
+                    let found = self.craters(b, &self.near(window), crater.diameter_m);
+                    self.act(number, step, window, &mut heights, found.iter().filter(earlier));
+                }
+                (_, known) => {
+                    let known = known.into_iter().flatten().filter(earlier);
+                    self.act(number, step, window, &mut heights, known);
+                }
+            }
         }
         heights
     }
@@ -262,9 +269,9 @@ impl Survey<'_> {
         plane
     }
 
-    /// Rock potential, and rocks on the ground; `later` are the craters of the steps after the rocks' place in the list.
-    fn set_rocks(&self, rocks: &Rocks, later: &[Index], all: &[Index], patch: &mut Patch) {
-        let window = patch.window;
+    /// Rock potential, and rocks on the ground, whose place in the list is after so many steps.
+    fn set_rocks(&self, rocks: &Rocks, after: usize, patch: &mut Patch) {
+        let (window, later) = (patch.window, &self.craters[after..]);
         for (k, potential) in patch.rock_potential.iter_mut().enumerate() {
             *potential = rocks.coverage([window.x(k % window.cols), window.y(k / window.cols)]);
         }
@@ -281,7 +288,7 @@ impl Survey<'_> {
             let (zoom, i, j) = rocks.base(&rock);
             let base = match window.find(zoom, i, j) {
                 Some(k) => ground[k],
-                None => self.ground(&Window::point(zoom, i, j), all)[0],
+                None => self.ground(&Window::point(zoom, i, j))[0],
             };
             let albedo = self.world.albedo.map(|albedo| albedo.value(albedo.rock, rock.albedo));
             rocks.cover(&rock, &window, |k, height| {

@@ -11,7 +11,10 @@ const SIDE: usize = 16;
 pub struct Index {
     /// In order of time.
     pub craters: Vec<Crater>,
-    origin: [f64; 2],
+    /// South-west and north-east corner of the ground that is looked at, lattice units.
+    corners: [[f64; 2]; 2],
+    /// Distance of the window's points, lattice units.
+    unit: f64,
     square: [f64; 2],
     /// Places in `craters`, rising, by square.
     reaching: Vec<Vec<u32>>,
@@ -21,11 +24,12 @@ impl Index {
     /// An index of all craters that reach what is looked at.
     pub fn new(craters: Vec<Crater>, near: &Near<'_>) -> Self {
         let Near { window, margin, .. } = near;
+        let [low, high] = window.corners();
+        let corners = [low.map(|at| at - margin), high.map(|at| at + margin)];
         // A lattice unit more, so that the last points lie inside.
-        let origin = [window.x(0) - margin, window.y(0) - margin];
-        let span = |count: usize| (count - 1) as f64 * spacing(window.zoom) + 2.0 * margin + 1.0;
-        let square = [span(window.cols), span(window.rows)].map(|s| s / SIDE as f64);
-        let mut index = Self { craters: Vec::new(), origin, square, reaching: vec![Vec::new(); SIDE * SIDE] };
+        let square = [0, 1].map(|axis| (corners[1][axis] - corners[0][axis] + 1.0) / SIDE as f64);
+        let (unit, reaching) = (spacing(window.zoom), vec![Vec::new(); SIDE * SIDE]);
+        let mut index = Self { craters: Vec::new(), corners, unit, square, reaching };
         for (number, crater) in craters.iter().enumerate() {
             let reach = EJECTA_RADII * crater.radius;
             let [(west, east), (south, north)] = [0, 1].map(|axis| {
@@ -43,7 +47,7 @@ impl Index {
 
     /// Column or row of a place, the nearest for places outside.
     fn along(&self, axis: usize, at: f64) -> usize {
-        (((at - self.origin[axis]) / self.square[axis]).max(0.0) as usize).min(SIDE - 1)
+        (((at - self.corners[0][axis]) / self.square[axis]).max(0.0) as usize).min(SIDE - 1)
     }
 
     /// Craters that may reach a place within the margin, in order of time.
@@ -55,5 +59,27 @@ impl Index {
     /// Craters that may reach a window: those of its place when it is one point within the margin, else all; in order of time.
     pub fn of<'a>(&'a self, window: &Window) -> Box<dyn Iterator<Item = &'a Crater> + 'a> {
         if window.len() == 1 { Box::new(self.at([window.x(0), window.y(0)])) } else { Box::new(self.craters.iter()) }
+    }
+
+    /// Craters wider than one that may reach its retained points, a window, in order of time; `None` where the index does not know all of
+    /// them: where the window leaves the ground that is looked at, or where wider craters may lie between the points of that ground.
+    pub fn wider(&self, crater: &Crater, window: &Window) -> Option<Vec<&Crater>> {
+        let [low, high] = window.corners();
+        let [lowest, highest] = self.corners;
+        let inside = (0..2).all(|axis| low[axis] >= lowest[axis] && high[axis] <= highest[axis]);
+        // A little more than the distance of the points, so that rounding cannot part them.
+        if !inside || 2.0 * EJECTA_RADII * crater.radius < 1.001 * self.unit {
+            return None;
+        }
+        let [(west, east), (south, north)] =
+            [0, 1].map(|axis| (self.along(axis, low[axis]), self.along(axis, high[axis])));
+        let squares = (south..=north).flat_map(|row| (west..=east).map(move |col| row * SIDE + col));
+        let wide = |n: &u32| self.craters[*n as usize].diameter_m > crater.diameter_m;
+        let mut numbers: Vec<u32> = squares.flat_map(|k| self.reaching[k].iter().copied().filter(wide)).collect();
+        if (west, south) != (east, north) {
+            numbers.sort_unstable();
+            numbers.dedup();
+        }
+        Some(numbers.into_iter().map(|n| &self.craters[n as usize]).collect())
     }
 }

@@ -137,3 +137,28 @@ fn val_expected_visits_follow_the_bound() {
     }
     assert_eq!(last, 0.0);
 }
+
+/// Samples of a tile, the planes of whose craters come from the craters that the tile knows, against each sample made alone, where every plane
+/// looks for its craters anew.
+#[test]
+fn prop_tiles_agree_with_samples_made_alone() {
+    let world = world(everything(), 9);
+    for zoom in [0, 1, 3, 5, 7, 9, 11] {
+        for bound in [0.0, 0.5, 2.0] {
+            let bound_m = bound * 0.01 * f64::from(1u32 << zoom);
+            if bound == 0.0 && zoom > 5 {
+                continue;
+            }
+            let area = window(zoom, -40, 17, 96, 80);
+            let tile = world.patch_for(&request(area, bound_m)).unwrap();
+            for k in (0..area.len()).step_by(479) {
+                let [row, col] = [k / area.cols, k % area.cols];
+                let alone = window(zoom, area.west + col as i64, area.south + row as i64, 1, 1);
+                let alone = world.patch_for(&request(alone, bound_m)).unwrap();
+                assert_eq!(alone.heights[0].to_bits(), tile.heights[k].to_bits(), "zoom {zoom}, {bound_m} m, {k}");
+                assert_eq!(alone.rock_potential[0].to_bits(), tile.rock_potential[k].to_bits());
+                assert_eq!((alone.class[0], alone.albedo[0]), (tile.class[k], tile.albedo[k]));
+            }
+        }
+    }
+}
