@@ -7,6 +7,8 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may end where it stands")]
 
+mod server;
+
 use sastrugi_tests::{Called, area, called, sastrugi_in, write};
 use serde_json::Value;
 use std::fmt::Write;

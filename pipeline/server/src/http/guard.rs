@@ -3,7 +3,7 @@
 use super::Problem;
 use super::extract::host;
 use super::query::TOKEN;
-use super::service::Service;
+use super::service::{BODY_BYTES, Service};
 use axum::body::Body;
 use axum::extract::{MatchedPath, Query, Request, State};
 use axum::http::{HeaderName, HeaderValue, header};
@@ -15,8 +15,8 @@ use std::net::{IpAddr, SocketAddr};
 use std::pin::Pin;
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, MutexGuard, PoisonError};
-use std::task::{Context, Poll};
-use std::time::Instant;
+use std::task::{Context, Poll, ready};
+use std::time::{Duration, Instant};
 
 /// Where a request comes from.
 #[derive(Clone, Copy, Debug)]
@@ -25,6 +25,11 @@ pub struct Peer(pub SocketAddr);
 /// The page takes everything from here.
 const POLICY: &str =
     "default-src 'self'; img-src 'self' blob: data:; style-src 'self' 'unsafe-inline'; frame-ancestors 'none'";
+
+/// Bytes of a body that are handed over at once.
+const PIECE: usize = 256 << 10;
+/// Longest time that a client may take for its answer.
+const SENDING: Duration = Duration::from_secs(600);
 
 /// Lets a request through, or says why not.
 pub async fn guard(State(service): State<Arc<Service>>, request: Request, next: Next) -> Response {
@@ -100,9 +105,13 @@ impl Drop for Load {
     }
 }
 
-/// A body that keeps its place among requests, and its bytes among those on their way, until it is sent.
+/// A body that keeps its place among requests, and its bytes among those on their way, until it is sent: a piece goes out when the one before has
+/// gone.
 struct Held {
     body: Body,
+    /// What is left of the last frame.
+    rest: Bytes,
+    until: Instant,
     _seat: Option<Seat>,
     _load: Load,
 }
@@ -112,15 +121,34 @@ impl HttpBody for Held {
     type Error = axum::Error;
 
     fn poll_frame(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<Option<Result<Frame<Bytes>, axum::Error>>> {
-        Pin::new(&mut self.body).poll_frame(cx)
+        if Instant::now() > self.until {
+            return Poll::Ready(Some(Err(axum::Error::new("the client took its answer too slowly"))));
+        }
+        if self.rest.is_empty() {
+            match ready!(Pin::new(&mut self.body).poll_frame(cx)) {
+                Some(Ok(frame)) => match frame.into_data() {
+                    Ok(data) => self.rest = data,
+                    Err(other) => return Poll::Ready(Some(Ok(other))),
+                },
+                other => return Poll::Ready(other),
+            }
+        }
+        let piece = self.rest.len().min(PIECE);
+        Poll::Ready(Some(Ok(Frame::data(self.rest.split_to(piece)))))
     }
 
     fn is_end_stream(&self) -> bool {
-        self.body.is_end_stream()
+        self.rest.is_empty() && self.body.is_end_stream()
     }
 
     fn size_hint(&self) -> SizeHint {
-        self.body.size_hint()
+        let (rest, hint) = (self.rest.len() as u64, self.body.size_hint());
+        let mut all = SizeHint::new();
+        all.set_lower(hint.lower() + rest);
+        if let Some(upper) = hint.upper() {
+            all.set_upper(upper + rest);
+        }
+        all
     }
 }
 
@@ -129,7 +157,8 @@ fn send(service: &Arc<Service>, response: Response, seat: Option<Seat>) -> Respo
     let Some(load) = Load::take(service, bytes) else {
         return Problem::unavailable("too many bytes are on their way to clients; try again in 2 s").into_response();
     };
-    response.map(|body| Body::new(Held { body, _seat: seat, _load: load }))
+    let (rest, until) = (Bytes::new(), Instant::now() + SENDING);
+    response.map(|body| Body::new(Held { body, rest, until, _seat: seat, _load: load }))
 }
 
 fn admit(service: &Arc<Service>, request: &Request) -> Result<Option<Seat>, Problem> {
@@ -139,6 +168,10 @@ fn admit(service: &Arc<Service>, request: &Request) -> Result<Option<Seat>, Prob
         return Err(Problem::uri_too_long(format!("the address has {length} bytes; at most {most} are read")));
     }
     check_host(service, request)?;
+    let announced = request.headers().get(header::CONTENT_LENGTH).and_then(|value| value.to_str().ok());
+    if announced.and_then(|text| text.parse::<u64>().ok()).is_some_and(|bytes| bytes > BODY_BYTES as u64) {
+        return Err(Problem::too_large("the body is too long", "body_bytes_max", BODY_BYTES as u64));
+    }
     let path = request.uri().path();
     if let Some(token) = &service.token
         && (path.starts_with("/v1") || path == "/metrics")

@@ -26,8 +26,11 @@ fn number(low: f64, high: f64) -> Value {
     json!({ "type": "number", "minimum": low, "maximum": high })
 }
 
-fn pair() -> Value {
-    json!({ "type": "string", "pattern": "^-?[0-9]{1,9}(\\.[0-9]{1,6})?,-?[0-9]{1,9}(\\.[0-9]{1,6})?$" })
+/// A place, `a,b`.
+const PLACE: &str = r"-?[0-9]{1,9}(\.[0-9]{1,6})?,-?[0-9]{1,9}(\.[0-9]{1,6})?";
+
+fn text(pattern: &str, example: &str) -> Value {
+    json!({ "type": "string", "pattern": format!("^{pattern}$"), "examples": [example] })
 }
 
 fn selection() -> Vec<Value> {
@@ -47,10 +50,14 @@ fn sun() -> Vec<Value> {
 
 fn window() -> Vec<Value> {
     vec![
-        query("origin", pair(), "Place of the south-west sample, m"),
-        query("center", pair(), "Place of the centre, m; to the nearest sample"),
-        query("size", pair(), "Columns and rows"),
-        query("size_m", pair(), "Size east-west and north-south, m"),
+        query("origin", text(PLACE, "0,0"), "Place of the south-west sample, m; give it or `center`"),
+        query("center", text(PLACE, "0,0"), "Place of the centre, m, moved to the nearest sample"),
+        query("size", text("[1-9][0-9]{0,3},[1-9][0-9]{0,3}", "64,64"), "Columns and rows; give it or `size_m`"),
+        query(
+            "size_m",
+            text(r"[1-9][0-9]{0,5}(\.[0-9]{1,6})?,[1-9][0-9]{0,5}(\.[0-9]{1,6})?", "2,2"),
+            "Size east-west and north-south, m",
+        ),
         query("resolution_m", number(1e-6, 1e9), "Distance of the samples, m"),
     ]
 }
@@ -109,7 +116,7 @@ fn operations() -> Vec<Operation> {
         query("resolution_m", number(1e-6, 1e9), "Distance of the samples that the point lies between, m"),
     ];
     let profile = vec![
-        required(query("line", json!({ "type": "string" }), "Places, as 0,0;10,5")),
+        required(query("line", text(&format!("{PLACE}(;{PLACE}){{1,99}}"), "0,0;10,5"), "Places along the line")),
         query("samples", json!({ "type": "integer", "minimum": 2, "maximum": 4096 }), "Number of samples"),
         query("resolution_m", number(1e-6, 1e9), "Distance of the samples of the ground, m"),
     ];

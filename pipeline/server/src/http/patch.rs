@@ -59,6 +59,7 @@ impl Window {
     /// Parameters that are missing, exclude each other, or ask for too much.
     pub fn of(query: &Query, collection: &Collection, most: u64) -> Result<Self, Problem> {
         let [cell_m, _] = collection.spacings_m();
+        let (origin, center) = (query.pair("origin")?, query.pair("center")?);
         let step_m = query.number("resolution_m", [1e-6, 1e9])?.unwrap_or(cell_m);
         let shape = match (query.pair("size")?, query.pair("size_m")?) {
             (Some(size), None) => size,
@@ -83,7 +84,7 @@ impl Window {
             ));
         }
         let [cols, rows] = shape.map(|n| n as usize);
-        let origin_m = match (query.pair("origin")?, query.pair("center")?) {
+        let origin_m = match (origin, center) {
             (Some(origin), None) => origin,
             (None, Some(center)) => {
                 let half = [cols, rows].map(|n| 0.5 * (n - 1) as f64 * step_m);
@@ -294,10 +295,9 @@ pub async fn patch(
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
     let query = pairs.checked(&[&KNOWN])?;
-    let treatment = Treatment::of(&query, &collection)?;
+    let (treatment, selection) = (Treatment::of(&query, &collection)?, selection(&collection, &query)?);
     let most = service.limits.samples / if treatment.field == "image" { IMAGE_PART } else { 1 };
     let window = Window::of(&query, &collection, most.max(1))?;
-    let selection = selection(&collection, &query)?;
     let what = format!("patch {} {window:?} {treatment:?} {selection:?}", collection.digest());
     let make = async {
         let samples = ground(&service, &collection, &window, &selection).await?;

@@ -31,7 +31,10 @@ const TOUCH: Duration = Duration::from_secs(60);
 pub struct Disk {
     folder: PathBuf,
     limit: u64,
+    /// Of all records, as far as is known.
     bytes: AtomicU64,
+    /// Of the records that were written since the folder was last looked at.
+    own: AtomicU64,
     pub(super) damaged: AtomicU64,
     evicted: AtomicU64,
     unwritten: AtomicU64,
@@ -83,6 +86,7 @@ impl Disk {
             folder: folder.to_owned(),
             limit,
             bytes: AtomicU64::new(bytes),
+            own: zero(),
             damaged: zero(),
             evicted: zero(),
             unwritten: zero(),
@@ -127,7 +131,9 @@ impl Disk {
         }
         match atomic::write(&self.path(key), &bytes) {
             Ok(()) => {
-                self.bytes.fetch_add(bytes.len() as u64, Ordering::Relaxed);
+                let written = bytes.len() as u64;
+                self.bytes.fetch_add(written, Ordering::Relaxed);
+                self.own.fetch_add(written, Ordering::Relaxed);
                 self.make_room();
             }
             Err(error) => {
@@ -147,8 +153,10 @@ impl Disk {
     }
 
     /// Removes the records that were not used for longest, down to nine tenths of the limit, once they pass it. One process at a time does it.
+    /// After every sixteenth of the limit that this process has written it looks at the folder, to which others may write too.
     fn make_room(&self) {
-        if self.bytes.load(Ordering::Relaxed) <= self.limit {
+        let is_due = self.own.load(Ordering::Relaxed) > self.limit / 16;
+        if self.bytes.load(Ordering::Relaxed) <= self.limit && !is_due {
             return;
         }
         let Ok(lock) = File::options().create(true).truncate(false).write(true).open(self.folder.join(LOCK)) else {
@@ -159,6 +167,7 @@ impl Disk {
             Ok(()) | Err(TryLockError::Error(_)) => {}
             Err(TryLockError::WouldBlock) => return,
         }
+        self.own.store(0, Ordering::Relaxed);
         let mut all = records(&self.folder);
         all.sort_by(|a, b| a.used.cmp(&b.used).then_with(|| a.path.cmp(&b.path)));
         let mut bytes: u64 = all.iter().map(|r| r.bytes).sum();
