@@ -153,7 +153,8 @@ impl HttpBody for Held {
 }
 
 fn send(service: &Arc<Service>, response: Response, seat: Option<Seat>) -> Response {
-    let bytes = response.body().size_hint().lower();
+    // Small answers always go: clients that read nothing cannot keep others from them, and the number of connections bounds them.
+    let bytes = Some(response.body().size_hint().lower()).filter(|bytes| *bytes > PIECE as u64).unwrap_or(0);
     let Some(load) = Load::take(service, bytes) else {
         return Problem::unavailable("too many bytes are on their way to clients; try again in 2 s").into_response();
     };
