@@ -71,7 +71,7 @@ impl Assembly {
         }
         if let Some(primaries) = self.primaries.clone().filter(|_| p.per_primary > 0) {
             let parameters = p.around_primaries();
-            self.add_craters(Box::new(Secondaries { primaries, process, counter: counter.at(1), parameters }));
+            self.add_craters(Box::new(Secondaries::new(primaries, process, counter.at(1), parameters)));
         }
     }
 

@@ -130,7 +130,7 @@ impl World {
             return patch;
         }
         let Request { feature_min_m, cancel, .. } = *request;
-        let (planes, families) = (RefCell::default(), RefCell::default());
+        let (planes, families) = (RefCell::default(), Families::wider_than(feature_min_m));
         let mut survey = Survey { world: self, feature_min_m, cancel, craters: Vec::new(), planes, families };
         survey.craters = survey.index(&Near { cancel, ..self.near(window) });
         patch.heights = survey.ground(window);

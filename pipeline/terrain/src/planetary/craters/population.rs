@@ -17,6 +17,9 @@ const ACROSS: i64 = 2;
 const TIME: i64 = 3;
 const TEXTURE: i64 = 4;
 
+/// A little more than 1: bounds by which craters are passed over hold whatever the rounding.
+const MORE: f64 = 1.0 + 1e-9;
+
 /// Which crater of all: process, bin, diamond, number, and, from 1 on, number among the secondaries of that primary; else 0.
 pub type Place = (usize, u32, i64, i64, i64, i64);
 
@@ -86,7 +89,25 @@ impl Near<'_> {
 }
 
 /// Secondaries of primaries that were met before.
-pub type Families = RefCell<HashMap<Place, Rc<[Crater]>>>;
+#[derive(Default)]
+pub struct Families {
+    /// Those that are not wider are never asked for, m.
+    least_m: f64,
+    met: RefCell<HashMap<Place, Rc<[Crater]>>>,
+}
+
+impl Families {
+    /// None yet; nobody will ask for secondaries that are not wider than `least_m`.
+    pub fn wider_than(least_m: f64) -> Self {
+        Self { least_m, met: RefCell::default() }
+    }
+
+    /// All that are known.
+    #[cfg(test)]
+    pub fn members(&self) -> usize {
+        self.met.borrow().values().map(|family| family.len()).sum()
+    }
+}
 
 /// A set of craters that can be asked for those near a place.
 pub trait Population: Send + Sync {
@@ -182,6 +203,11 @@ impl PowerLaw {
                 }
                 let diamond = self.counter.at(j).at(i);
                 for n in 0..i64::from(bin.per_diamond.count(diamond.uniform())) {
+                    // Most are too far even for the widest of the bin: they need no diameter.
+                    let centre = Self::centre(bin, [i, j], diamond.at(n));
+                    if !near.touches(centre, radii * 0.5 * bin.diameter_max_m * MORE / self.spacing_m) {
+                        continue;
+                    }
                     let crater = self.crater(bin, [i, j], n, diamond.at(n));
                     if crater.diameter_m > diameter_min_m && near.touches(crater.centre, radii * crater.radius) {
                         f(crater);
@@ -191,14 +217,18 @@ impl PowerLaw {
         }
     }
 
+    fn centre(bin: &Bin, [i, j]: [i64; 2], own: Counter) -> [f64; 2] {
+        let [s, t] = [ALONG, ACROSS].map(|word| (own.at(word).uniform() - 0.5) * spacing(bin.zoom));
+        [i as f64 + (s + t), j as f64 + (s - t)]
+    }
+
     fn crater(&self, bin: &Bin, [i, j]: [i64; 2], n: i64, own: Counter) -> Crater {
         let [low, span] = bin.power;
         let diameter_m = libm::pow(low - own.at(DIAMETER).uniform() * span, -1.0 / self.exponent);
-        let [s, t] = [ALONG, ACROSS].map(|word| (own.at(word).uniform() - 0.5) * spacing(bin.zoom));
         Crater {
             time: own.at(TIME).uniform(),
             place: (self.process, bin.zoom, j, i, n, 0),
-            centre: [i as f64 + (s + t), j as f64 + (s - t)],
+            centre: Self::centre(bin, [i, j], own),
             radius: 0.5 * diameter_m / self.spacing_m,
             diameter_m,
             texture: own.at(TEXTURE),
@@ -245,6 +275,8 @@ pub struct Secondaries {
     pub counter: Counter,
     /// Parameters.
     pub parameters: SecondaryParameters,
+    /// D^-A of the smallest secondary over that of the largest.
+    power: f64,
 }
 
 /// Parameters of secondaries around primaries.
@@ -279,22 +311,35 @@ impl SecondaryParameters {
 }
 
 impl Secondaries {
-    /// All secondaries of a primary, the widest first.
-    fn family(&self, primary: &Crater) -> Rc<[Crater]> {
+    /// The secondaries of some primaries, of process number `process`.
+    pub fn new(primaries: PowerLaw, process: usize, counter: Counter, parameters: SecondaryParameters) -> Self {
+        let power = libm::pow(parameters.smallest_share, -parameters.exponent);
+        Self { primaries, process, counter, parameters, power }
+    }
+
+    /// The secondaries of a primary, the widest first; some that are not wider than `least_m` may be left out.
+    fn family(&self, primary: &Crater, least_m: f64) -> Rc<[Crater]> {
+        let p = &self.parameters;
         let (_, bin, j, i, n, _) = primary.place;
         let root = self.counter.at(i64::from(bin)).at(j).at(i).at(n);
-        let members = 0..i64::from(self.parameters.count);
+        // D^-A falls with D: what is above that of the bound is too narrow, and needs no diameter.
+        let most = libm::pow(least_m / (p.largest_ratio * primary.diameter_m), -p.exponent) * MORE;
+        let wide = |m: &i64| self.relative_power(root.at(*m)) <= most;
+        let members = (0..i64::from(p.count)).filter(wide);
         let mut family: Vec<Crater> = members.map(|m| self.secondary(primary, m, root.at(m))).collect();
         family.sort_unstable_by(|a, b| b.diameter_m.total_cmp(&a.diameter_m).then_with(|| a.place.cmp(&b.place)));
         family.into()
     }
 
+    /// D^-A of a secondary, over that of the largest.
+    fn relative_power(&self, own: Counter) -> f64 {
+        self.power - own.at(DIAMETER).uniform() * (self.power - 1.0)
+    }
+
     fn secondary(&self, primary: &Crater, m: i64, own: Counter) -> Crater {
         let p = &self.parameters;
         let largest_m = p.largest_ratio * primary.diameter_m;
-        // D^-A, over that of the largest.
-        let power = libm::pow(p.smallest_share, -p.exponent);
-        let diameter_m = largest_m * libm::pow(power - own.at(DIAMETER).uniform() * (power - 1.0), -1.0 / p.exponent);
+        let diameter_m = largest_m * libm::pow(self.relative_power(own), -1.0 / p.exponent);
         // Density r^-2 over a ring: log r is uniform.
         let [near, far] = p.ring_radii;
         let distance = primary.radius * near * libm::pow(far / near, own.at(ALONG).uniform());
@@ -318,7 +363,10 @@ impl Population for Secondaries {
         self.primaries.visit(near, p.reach_radii(), p.parent_min_m(diameter_min_m), |primary| {
             let (_, bin, j, i, n, _) = primary.place;
             let key = (self.process, bin, j, i, n, 0);
-            let family = families.borrow_mut().entry(key).or_insert_with(|| self.family(&primary)).clone();
+            let family = {
+                let mut met = families.met.borrow_mut();
+                met.entry(key).or_insert_with(|| self.family(&primary, families.least_m)).clone()
+            };
             let wide = family.iter().take_while(|c| c.diameter_m > diameter_min_m);
             found.extend(wide.filter(|c| near.touches(c.centre, EJECTA_RADII * c.radius)));
         });

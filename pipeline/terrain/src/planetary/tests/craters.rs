@@ -321,7 +321,7 @@ fn val_expected_objects_hold_those_found() {
         b.populations.iter().for_each(|p| p.find(&near, 0.0, &all, &mut found));
     }
     let rocks = made.rocks.as_ref().unwrap().0.find(&area, 0.0, None, |_| 0.6).len();
-    let held = (found.len() + rocks + all.borrow().values().map(|f| f.len()).sum::<usize>()) as f64;
+    let held = (found.len() + rocks + all.members()) as f64;
     let (objects, work) = (made.expected_objects(&area), made.expected_visits(&area, 0.0));
     eprintln!("{held} objects held, {objects:.0} expected, {work:.0} with diamonds");
     assert!(held > 1e4 && objects > held && objects < 6.0 * held && work > objects);
