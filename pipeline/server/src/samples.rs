@@ -19,9 +19,6 @@ pub struct Samples {
     pub rock_potential: Option<Vec<f32>>,
 }
 
-/// A value from four samples, the north-west one at `(0, 0)`, and how far from it the place lies down and right.
-type Rule = fn(&dyn Fn(usize, usize) -> f32, [f64; 2]) -> f32;
-
 /// How samples are thinned.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Thinning {
@@ -136,10 +133,13 @@ impl Samples {
         })
     }
 
-    /// Bilinear values at places counted in samples from the north-west one; rock by the nearest sample. Places lie inside.
-    pub fn between(&self, shape: [usize; 2], place: impl Fn(usize, usize) -> [f64; 2]) -> Self {
-        let made = self.each(shape, |values| self.values_at(values, shape, &place, bilinear));
-        let rock = self.rock.as_deref().map(|values| self.values_at(values, shape, &place, nearest));
+    /// Bilinear values on a grid of places, rows `down` and columns `right` counted in samples from the north-west one; rock by the nearest
+    /// sample. Places lie inside.
+    pub fn between(&self, down: &[f64], right: &[f64]) -> Self {
+        let (rows, cols) = (Spots::new(down, self.rows), Spots::new(right, self.cols));
+        let shape = [down.len(), right.len()];
+        let made = self.each(shape, |values| self.values_at(values, &rows, &cols, bilinear));
+        let rock = self.rock.as_deref().map(|values| self.values_at(values, &rows, &cols, nearest));
         Self { rock, ..made }
     }
 
@@ -155,40 +155,54 @@ impl Samples {
     fn values_at(
         &self,
         values: &[f32],
-        [rows, cols]: [usize; 2],
-        place: impl Fn(usize, usize) -> [f64; 2],
-        rule: Rule,
+        rows: &Spots,
+        cols: &Spots,
+        rule: impl Fn([f32; 4], [f64; 2]) -> f32,
     ) -> Vec<f32> {
-        let at = |k: usize| {
-            let [down, right] = place(k / cols, k % cols);
-            let before = |at: f64, count: usize| (at.max(0.0) as usize).min(count.saturating_sub(2));
-            let (r, c) = (before(down, self.rows), before(right, self.cols));
-            rule(&|dr, dc| values[(r + dr) * self.cols + c + dc], [down - r as f64, right - c as f64])
-        };
-        (0..rows * cols).map(at).collect()
+        let mut made = Vec::with_capacity(rows.0.len() * cols.0.len());
+        for &(row, down) in &rows.0 {
+            let [north, south] =
+                [row, (row + 1).min(self.rows - 1)].map(|r| &values[r * self.cols..(r + 1) * self.cols]);
+            made.extend(cols.0.iter().map(|&(col, right)| {
+                let east = (col + 1).min(self.cols - 1);
+                rule([north[col], north[east], south[col], south[east]], [down, right])
+            }));
+        }
+        made
     }
 }
 
-/// Between four samples; one that has no weight need not have data.
-fn bilinear(value: &dyn Fn(usize, usize) -> f32, [down, right]: [f64; 2]) -> f32 {
-    let mix = |a: f64, b: &dyn Fn() -> f64, w: f64| if w == 0.0 { a } else { a + (b() - a) * w };
-    let v = |dr, dc| f64::from(value(dr, dc));
-    let north = || mix(v(0, 0), &|| v(0, 1), right);
-    let south = || mix(v(1, 0), &|| v(1, 1), right);
+/// The sample before each place along an axis, and how far beyond it the place lies.
+struct Spots(Vec<(usize, f64)>);
+
+impl Spots {
+    fn new(places: &[f64], count: usize) -> Self {
+        let before = |at: f64| (at.max(0.0) as usize).min(count.saturating_sub(2));
+        Self(places.iter().map(|at| (before(*at), at - before(*at) as f64)).collect())
+    }
+}
+
+/// Between the north-west, north-east, south-west and south-east sample, `down` and `right` of the first; one that has no weight need not have
+/// data.
+fn bilinear([nw, ne, sw, se]: [f32; 4], [down, right]: [f64; 2]) -> f32 {
+    let mix = |a: f32, b: f32| {
+        let a = f64::from(a);
+        if right == 0.0 { a } else { a + (f64::from(b) - a) * right }
+    };
     // From the south, as [`sastrugi_numeric::GroundGrid`] does.
     let up = 1.0 - down;
     (if up == 0.0 {
-        south()
+        mix(sw, se)
     } else if down == 0.0 {
-        north()
+        mix(nw, ne)
     } else {
-        let (low, high) = (south(), north());
+        let (low, high) = (mix(sw, se), mix(nw, ne));
         low + (high - low) * up
     }) as f32
 }
 
-fn nearest(value: &dyn Fn(usize, usize) -> f32, [down, right]: [f64; 2]) -> f32 {
-    value(usize::from(down > 0.5), usize::from(right >= 0.5))
+fn nearest(corners: [f32; 4], [down, right]: [f64; 2]) -> f32 {
+    corners[2 * usize::from(down > 0.5) + usize::from(right >= 0.5)]
 }
 
 #[cfg(test)]
@@ -224,11 +238,11 @@ mod tests {
         let plane = |down: f64, right: f64| 3.0 - 0.25 * down + 0.5 * right;
         let heights = (0..rows * cols).map(|k| plane((k / cols) as f64, (k % cols) as f64) as f32).collect();
         let s = Samples { heights, ..Samples::empty(rows, cols) };
-        let place = |r: usize, c: usize| [0.3 + 0.9 * r as f64, 0.1 + 0.77 * c as f64];
-        let made = s.between([5, 10], place);
+        let down: Vec<f64> = (0..5).map(|r| 0.3 + 0.9 * f64::from(r)).collect();
+        let right: Vec<f64> = (0..10).map(|c| 0.1 + 0.77 * f64::from(c)).collect();
+        let made = s.between(&down, &right);
         for (k, z) in made.heights.iter().enumerate() {
-            let [down, right] = place(k / 10, k % 10);
-            assert!((f64::from(*z) - plane(down, right)).abs() < 1e-6);
+            assert!((f64::from(*z) - plane(down[k / 10], right[k % 10])).abs() < 1e-6);
         }
     }
 
@@ -237,8 +251,8 @@ mod tests {
     fn val_holes_stay_holes() {
         let mut s = numbered(3, 3);
         s.heights[4] = f32::NAN;
-        assert_eq!(s.between([1, 1], |_, _| [1.0, 0.0]).heights[0], s.heights[3]);
-        assert!(s.between([1, 1], |_, _| [1.0, 0.2]).heights[0].is_nan());
+        assert_eq!(s.between(&[1.0], &[0.0]).heights[0], s.heights[3]);
+        assert!(s.between(&[1.0], &[0.2]).heights[0].is_nan());
         assert!(s.clone().thinned(0, Thinning::Mean).unwrap().heights[4].is_nan());
         assert!(s.thinned(1, Thinning::Mean).is_err());
     }

@@ -203,11 +203,18 @@ impl Level {
         // A place within rounding of a sample is that sample.
         let settle = |at: f64| if (at - at.round()).abs() < 1e-6 { at.round() } else { at };
         let clamp = |at: f64, count: usize| settle(at.clamp(0.0, (count - 1) as f64));
-        let made = self.samples.between([rows, cols], |r, c| [clamp(down(r), g.rows), clamp(right(c), g.cols)]);
+        let down: Vec<f64> = (0..rows).map(|r| clamp(down(r), g.rows)).collect();
+        let right: Vec<f64> = (0..cols).map(|c| clamp(right(c), g.cols)).collect();
+        let made = self.samples.between(&down, &right);
         let inside = |at: f64, axis: usize| {
             let from = (at - whole.origin[axis]) / whole.cell[axis];
             (-1e-6..=whole.size()[axis] / whole.cell[axis] + 1e-6).contains(&from)
         };
-        made.without(|k| !(inside(x(k % cols), 0) && inside(y(k / cols), 1)))
+        let (cols_in, rows_in): (Vec<bool>, Vec<bool>) =
+            ((0..cols).map(|c| inside(x(c), 0)).collect(), (0..rows).map(|r| inside(y(r), 1)).collect());
+        if cols_in.iter().chain(&rows_in).all(|is_in| *is_in) {
+            return made;
+        }
+        made.without(|k| !(rows_in[k / cols] && cols_in[k % cols]))
     }
 }

@@ -419,7 +419,9 @@ impl World {
         let fine = self.lattice(maker, zoom, first, [own_rows, own_cols], selection, piece).await?;
         let across = |c: usize| (origin_m[0] + c as f64 * step_m) / own_m - first[0] as f64;
         let up = |r: usize| (origin_m[1] + (rows - 1 - r) as f64 * step_m) / own_m - first[1] as f64;
-        Ok(fine.between(shape, |r, c| [(own_rows - 1) as f64 - up(r), across(c)]))
+        let down: Vec<f64> = (0..rows).map(|r| (own_rows - 1) as f64 - up(r)).collect();
+        let right: Vec<f64> = (0..cols).map(across).collect();
+        Ok(fine.between(&down, &right))
     }
 
     /// Samples at lattice points, from the tiles that they lie in.
