@@ -24,7 +24,7 @@ fn allowed() -> BTreeMap<&'static str, BTreeSet<&'static str>> {
         ("server", "stages terrain imaging store numeric schemas"),
         ("cli", "stages server report store schemas"),
         ("fixtures", "numeric"),
-        ("tests", "schemas numeric statistics terrain mobility imaging store stages fixtures"),
+        ("tests", "schemas numeric statistics terrain mobility imaging store stages server fixtures"),
         (
             "benches",
             "schemas numeric roughness statistics terrain texture mobility navigation imaging store stages report fixtures",
@@ -34,7 +34,7 @@ fn allowed() -> BTreeMap<&'static str, BTreeSet<&'static str>> {
 }
 
 /// Crates that only one room may name.
-const SOLE_USERS: [(&str, &str); 17] = [
+const SOLE_USERS: [(&str, &str); 18] = [
     ("arrow-array", "store"),
     ("arrow-schema", "store"),
     ("parquet", "store"),
@@ -49,6 +49,7 @@ const SOLE_USERS: [(&str, &str); 17] = [
     ("hyper", "server"),
     ("tokio", "server"),
     ("tower-http", "server"),
+    ("ureq", "server"),
     ("clap", "cli"),
     ("indicatif", "cli"),
     ("miette", "cli"),
