@@ -627,3 +627,63 @@ fn val_the_client_reads_what_is_served() {
         other => panic!("{other:?}"),
     }
 }
+
+/// A measured DEM with finer detail is served as `terrain` makes it, bit for bit; its map ends with its posts, and its pixels are its points.
+#[test]
+fn val_elaborated_dems_are_served() {
+    let folder = area();
+    let dem = "kind = \"planetary\"\nseed = 4\nsize_px = [60, 50]\ncell_m = 5.12\nbasic_spacing_m = 0.01\norigin_m = [1024.0, 2048.0]\n\
+               processes = [{ kind = \"base_slope\", gradient = [0.1, 0.05] }, { kind = \"texture\", roughness_m = 0.05, hurst = 0.7 }]\n";
+    let site = "kind = \"elaborate\"\nseed = 5\ndem = \"dem.tif\"\nsize_px = [300, 200]\ncell_m = 0.04\nbasic_spacing_m = 0.01\n\
+                origin_m = [1130.0, 2150.0]\nprocesses = [{ kind = \"rocks\", coverage = 0.118 }, { kind = \"albedo\" }]\n";
+    write(folder.path(), "dem.toml", dem);
+    write(folder.path(), "site.toml", site);
+    for (spec, output) in [("dem.toml", "dem.tif"), ("site.toml", "site.tif")] {
+        let call = sastrugi_in(folder.path(), &["terrain", spec, "-o", output]);
+        assert_eq!(call.code, 0, "{}", call.stderr);
+    }
+    let made = dem::read(&folder.path().join("site.tif")).unwrap().grid;
+    let posts = dem::read(&folder.path().join("dem.tif")).unwrap().grid;
+    let server = Server::start(folder.path(), &["site.toml"], &[]);
+    let c = "/v1/collections/site";
+    let patch = server.get(&format!("{c}/patch?origin=1130,2150&size=300,200&format=raw")).floats();
+    assert!(made.values.iter().zip(&patch).all(|(a, b)| (*a as f32).to_bits() == b.to_bits()));
+    let smooth = server.get(&format!("{c}/patch?origin=1130,2150&size=300,200&format=raw&phenomena=")).floats();
+    assert!(patch.iter().zip(&smooth).filter(|(a, b)| a != b).count() > 100);
+    // At a post, whatever is left out.
+    let post = [posts.geometry.x(30), posts.geometry.y(20)];
+    for more in ["", "&feature_min_m=3", "&resolution_m=0.64"] {
+        let point = server.get(&format!("{c}/point?x={}&y={}{more}", post[0], post[1])).json();
+        assert!(
+            (point["elevation_m"].as_f64().unwrap() - posts.at(20, 30)).abs() < 0.02,
+            "{point} {}",
+            posts.at(20, 30)
+        );
+    }
+    // A pixel of each level, and what lies beyond the posts.
+    let described = server.get(c).json();
+    let grid = &described["tile_grid"];
+    let [west, north] = [0, 1].map(|k| grid["origin_m"][k].as_f64().unwrap());
+    let levels = grid["levels"].as_u64().unwrap();
+    assert_eq!(levels, 8, "pixels of 2 cm to 2.56 m, half the posts: {described}");
+    for level in 0..levels {
+        let step = grid["resolutions_m"][level as usize].as_f64().unwrap();
+        let [col, row] = [(1180.0 - west) / step, (north - 2190.0) / step].map(|at| at as u32);
+        let tile = server.get(&format!("{c}/styles/terrarium/map/tiles/site/{level}/{}/{}", row / 256, col / 256));
+        let [red, green, blue, _] = rgba(&tile.body)[(256 * (row % 256) + col % 256) as usize];
+        let seen = f64::from(red) * 256.0 + f64::from(green) + f64::from(blue) / 256.0 - 32768.0;
+        let [x, y] = [west + (f64::from(col) + 0.5) * step, north - (f64::from(row) + 0.5) * step];
+        let point = server.get(&format!("{c}/point?x={x}&y={y}&feature_min_m={}", 2.0 * step)).json();
+        assert!((seen - point["elevation_m"].as_f64().unwrap()).abs() < 0.003, "level {level}: {seen} {point}");
+    }
+    assert!(server.get(&format!("{c}/point?x=1000&y=2150")).json()["elevation_m"].is_null());
+    let coarse = server.get(&format!("{c}/patch?origin=1130,2150&size=5,5&resolution_m=20"));
+    assert_eq!(coarse.status, 400, "{}", coarse.json());
+    assert_eq!(server.get(&format!("{c}/study?origin=1130,2150&size=5,5")).status, 400);
+    // Another DEM of that name is another collection.
+    let tag = server.get(&format!("{c}/patch?origin=1130,2150&size=5,5")).header("etag").unwrap().to_owned();
+    write(folder.path(), "dem.toml", &dem.replace("seed = 4", "seed = 6"));
+    assert_eq!(sastrugi_in(folder.path(), &["terrain", "dem.toml", "-o", "dem.tif"]).code, 0);
+    let again = Server::start(folder.path(), &["site.toml"], &[]);
+    assert_ne!(again.get(&format!("{c}/patch?origin=1130,2150&size=5,5")).header("etag"), Some(tag.as_str()));
+}

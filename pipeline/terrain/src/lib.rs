@@ -15,6 +15,8 @@ pub mod registry;
 pub mod size;
 pub mod spheroids;
 pub mod weierstrass_mandelbrot;
+pub mod windows;
 
 pub use generator::{Generator, Holds, Input, Levels, Line, MAPS, Map, MapKind, NamedInput, Terrain, TerrainError};
 pub use registry::{kinds, prepare};
+pub use windows::Windows;

@@ -61,7 +61,10 @@ impl Collection {
     /// Its fields.
     pub fn fields(&self) -> Vec<&'static str> {
         let [albedo, class, potential] = match &self.ground {
-            Ground::World(w) => [w.has("albedo"), w.has("rocks"), w.has("rocks")],
+            Ground::World(w) => {
+                let [albedo, rocks] = w.has();
+                [albedo, rocks, rocks]
+            }
             Ground::Raster(r) => [r.has("albedo"), r.has("class"), r.has("rock-potential")],
         };
         let fields =

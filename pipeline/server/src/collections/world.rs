@@ -8,9 +8,11 @@ use crate::grid::{TILE, TileGrid, TileIndex};
 use crate::http::Problem;
 use crate::library::{Library, Priority, TileKey, Unavailable};
 use crate::samples::Samples;
+use sastrugi_numeric::Geometry;
 use sastrugi_stages::Error;
 use sastrugi_stages::verbs::served::ServedWorld;
 use sastrugi_terrain::planetary::{self, Patch, Request, Window};
+use sastrugi_terrain::{Input, Windows};
 use serde_json::{Value, json};
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -26,8 +28,8 @@ pub const FEATURE_PIXELS: f64 = 2.0;
 const LATTICE_MAX: f64 = (1u64 << 52) as f64;
 /// Coarsest samples that are made, in doublings of the basic spacing.
 const ZOOM_MAX: u32 = 40;
-/// Most sets of processes whose worlds are kept.
-const WORLDS: usize = 32;
+/// Most sets of processes whose grounds are kept.
+const GROUNDS: usize = 32;
 /// Samples of a window that is made by itself.
 const FEW: usize = 16;
 /// Tiles of one request that are asked of the library at once.
@@ -74,7 +76,11 @@ pub struct World {
     /// Hash of all that samples depend on: parameters, streams, sources of the generator.
     pub digest: String,
     range_m: [f64; 2],
-    worlds: Mutex<HashMap<Option<Vec<usize>>, Arc<planetary::World>>>,
+    /// Where lattice point 0 lies, m.
+    offset_m: [f64; 2],
+    /// Most doublings of the basic spacing.
+    zoom_max: u32,
+    grounds: Mutex<HashMap<Option<Vec<usize>>, Arc<dyn Windows>>>,
 }
 
 impl World {
@@ -83,9 +89,11 @@ impl World {
     /// # Errors
     /// An input that is missing.
     pub fn open(served: ServedWorld) -> Result<Self, Error> {
-        let finest_m = FINEST_SPACINGS * served.world.spacing_m();
-        let side = finest_m * TILE as f64 * f64::from(1u32 << (LEVELS - 1));
-        let grid = TileGrid { origin_m: [-0.5 * side, 0.5 * side], size_m: [side; 2], finest_m, levels: LEVELS };
+        let (spacing_m, offset_m) = (served.spacing_m(), served.offset_m());
+        let (grid, zoom_max) = match served.extent()? {
+            None => (square(spacing_m), ZOOM_MAX),
+            Some((bounds_m, coarsest_m)) => bounded(spacing_m, offset_m, bounds_m, coarsest_m),
+        };
         // Where it starts does not matter to what it is.
         let mut parameters = served.parameters.clone();
         if let Value::Object(map) = &mut parameters {
@@ -93,42 +101,47 @@ impl World {
                 map.remove(key);
             }
         }
-        let digest = super::digest(&format!("{} {} {parameters}", crate::revision(), served.streams.label()));
-        let mut world = Self { served, grid, digest, range_m: [0.0; 2], worlds: Mutex::default() };
+        let inputs: Vec<String> = served.inputs.iter().map(content).collect();
+        let what = format!("{} {} {parameters} {offset_m:?} {inputs:?}", crate::revision(), served.streams.label());
+        let digest = super::digest(&what);
+        let range_m = [0.0; 2];
+        let mut world = Self { served, grid, digest, range_m, offset_m, zoom_max, grounds: Mutex::default() };
         world.range_m = world.look()?;
         Ok(world)
     }
 
     /// Heights that nine tenths of the map lie between, by some of its samples.
     fn look(&self) -> Result<[f64; 2], Error> {
-        let [west, south, east, _] = self.grid.bounds_m();
-        let zoom = self.zoom_below((east - west) / LOOK as f64);
+        let [west, south, east, north] = self.grid.bounds_m();
+        let zoom = self.zoom_below((east - west).max(north - south) / LOOK as f64);
         let step = self.step_m(zoom);
-        let at = |m: f64| (m / step).round() as i64;
-        let window = Window { zoom, west: at(west), south: at(south), cols: LOOK, rows: LOOK, centred: false };
+        let [west, south] = self.to_lattice([west, south]).map(|m| (m / step).round() as i64);
+        let window = Window { zoom, west, south, cols: LOOK, rows: LOOK, centred: false };
         let request = Request { window, feature_min_m: FEATURE_PIXELS * step, cancel: None };
-        let patch = self.world(&None)?.patch_for(&request);
+        let patch = self.ground(&None)?.patch_for(&request);
         let mut heights = patch.map_or_else(Vec::new, |patch| patch.heights);
+        heights.retain(|z| z.is_finite());
         heights.sort_by(f64::total_cmp);
         let part = |share: f64| heights.get((share * heights.len() as f64) as usize).copied().unwrap_or_default();
         Ok([part(0.05), part(0.95)])
     }
 
-    fn world(&self, phenomena: &Option<Vec<usize>>) -> Result<Arc<planetary::World>, Error> {
-        let mut worlds = self.worlds.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(world) = worlds.get(phenomena) {
-            return Ok(Arc::clone(world));
+    fn ground(&self, phenomena: &Option<Vec<usize>>) -> Result<Arc<dyn Windows>, Error> {
+        let mut grounds = self.grounds.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(ground) = grounds.get(phenomena) {
+            return Ok(Arc::clone(ground));
         }
-        if worlds.len() >= WORLDS {
-            worlds.clear();
+        if grounds.len() >= GROUNDS {
+            grounds.clear();
         }
-        let made = self
-            .served
-            .world
-            .world_of(&self.served.streams, |place| phenomena.as_ref().is_none_or(|list| list.contains(&place)))?;
-        let made = Arc::new(made);
-        worlds.insert(phenomena.clone(), Arc::clone(&made));
+        let made = self.served.ground(|place| phenomena.as_ref().is_none_or(|list| list.contains(&place)))?;
+        grounds.insert(phenomena.clone(), Arc::clone(&made));
         Ok(made)
+    }
+
+    /// A place as distances from lattice point 0, m.
+    fn to_lattice(&self, place_m: [f64; 2]) -> [f64; 2] {
+        [0, 1].map(|axis| place_m[axis] - self.offset_m[axis])
     }
 
     /// Id in addresses.
@@ -143,20 +156,19 @@ impl World {
 
     /// Basic spacing, m.
     pub fn spacing_m(&self) -> f64 {
-        self.served.world.spacing_m()
+        self.served.spacing_m()
     }
 
     /// Distance of samples that its file asks for, m.
     pub fn cell_m(&self) -> f64 {
-        self.served.world.raw().cell_m
+        self.served.window().1
     }
 
     /// The window of its file: west, south, east and north, m.
     pub fn home_m(&self) -> [f64; 4] {
-        let raw = self.served.world.raw();
-        let [west, south] = raw.origin_m;
-        let [cols, rows] = raw.size_px.unwrap_or([512; 2]);
-        [west, south, west + f64::from(cols) * raw.cell_m, south + f64::from(rows) * raw.cell_m]
+        let ([west, south], cell_m, size_px) = self.served.window();
+        let [cols, rows] = size_px.unwrap_or([512; 2]);
+        [west, south, west + f64::from(cols) * cell_m, south + f64::from(rows) * cell_m]
     }
 
     /// Heights that nine tenths of its map lie between, m.
@@ -165,18 +177,18 @@ impl World {
     }
 
     fn kinds(&self) -> impl Iterator<Item = &'static str> {
-        self.served.world.raw().processes.iter().map(planetary::RawProcess::kind)
+        self.served.processes().iter().map(planetary::RawProcess::kind)
     }
 
-    /// Whether a process of a kind is in its list.
-    pub fn has(&self, kind: &str) -> bool {
-        self.kinds().any(|k| k == kind)
+    /// Whether it has an albedo, and rocks.
+    pub fn has(&self) -> [bool; 2] {
+        self.ground(&None).map_or([false; 2], |ground| [ground.has_albedo(), ground.has_rocks()])
     }
 
     /// Its processes.
     pub fn phenomena(&self) -> Value {
         let process = |(n, process): (usize, &planetary::RawProcess)| json!({ "number": n + 1, "kind": process.kind(), "summary": process.summary() });
-        self.served.world.raw().processes.iter().enumerate().map(process).collect()
+        self.served.processes().iter().enumerate().map(process).collect()
     }
 
     /// The processes of some numbers, counted from 1.
@@ -185,7 +197,7 @@ impl World {
     /// A number that the list does not have.
     pub fn choose(&self, numbers: Option<Vec<usize>>) -> Result<Option<Vec<usize>>, Problem> {
         let Some(mut numbers) = numbers else { return Ok(None) };
-        let count = self.served.world.raw().processes.len();
+        let count = self.served.processes().len();
         if let Some(n) = numbers.iter().find(|n| !(1..=count).contains(*n)) {
             return Err(Problem::bad_request(format!(
                 "`phenomena`: there is no process {n}; this world has 1 to {count}: {}",
@@ -210,13 +222,20 @@ impl World {
         map.insert("size_px".to_owned(), json!(size_px));
         map.insert("cell_m".to_owned(), json!(cell_m));
         map.insert("origin_m".to_owned(), json!(origin_m));
-        sastrugi_terrain::prepare(planetary::KIND, &parameters).map_err(|e| {
+        let kind = self.served.kind();
+        if kind != planetary::KIND {
+            return Err(Problem::bad_request(format!(
+                "sections are for worlds of kind `{}`; a study makes this one as its file does",
+                planetary::KIND
+            )));
+        }
+        sastrugi_terrain::prepare(kind, &parameters).map_err(|e| {
             Problem::bad_request(format!(
                 "a study cannot make this patch, whose samples lie between those of a lattice: {e}"
             ))
         })?;
         let (head, seed) = seed_lines(&self.served.streams.label(), self.id());
-        sastrugi_stages::verbs::served::section(&head, seed, planetary::KIND, &parameters).map_err(failed)
+        sastrugi_stages::verbs::served::section(&head, seed, kind, &parameters).map_err(failed)
     }
 
     /// Distance of samples after some doublings, m.
@@ -226,12 +245,12 @@ impl World {
 
     /// The doublings after which samples are no farther apart than that.
     fn zoom_below(&self, step_m: f64) -> u32 {
-        (0..=ZOOM_MAX).take_while(|k| self.step_m(*k) <= step_m * (1.0 + SAME)).last().unwrap_or(0)
+        (0..=self.zoom_max).take_while(|k| self.step_m(*k) <= step_m * (1.0 + SAME)).last().unwrap_or(0)
     }
 
     /// How many doublings make that distance of samples, if some do.
     pub fn zoom_of(&self, step_m: f64) -> Option<u32> {
-        (0..=ZOOM_MAX).find(|zoom| (self.step_m(*zoom) / step_m - 1.0).abs() <= SAME)
+        (0..=self.zoom_max).find(|zoom| (self.step_m(*zoom) / step_m - 1.0).abs() <= SAME)
     }
 
     /// Refuses columns or rows of a lattice beyond the end of the world.
@@ -254,6 +273,40 @@ impl World {
         let whole = (quotient - quotient.round()).abs() <= WHOLE + 4.0 * f64::EPSILON * quotient.abs();
         whole.then(|| quotient.round() as i64)
     }
+}
+
+/// The square about the origin that the map of a world without end shows.
+fn square(spacing_m: f64) -> TileGrid {
+    let finest_m = FINEST_SPACINGS * spacing_m;
+    let side = finest_m * TILE as f64 * f64::from(1u32 << (LEVELS - 1));
+    TileGrid { origin_m: [-0.5 * side, 0.5 * side], size_m: [side; 2], finest_m, levels: LEVELS }
+}
+
+/// The map of a ground between four edges, in pixels of two basic spacings to `coarsest_m`, and the most doublings of the spacing.
+fn bounded(spacing_m: f64, offset_m: [f64; 2], edges_m: [f64; 4], coarsest_m: f64) -> (TileGrid, u32) {
+    let zoom_max = (1..ZOOM_MAX).take_while(|k| spacing_m * (1u64 << k) as f64 <= coarsest_m).last().unwrap_or(1);
+    let step_m = spacing_m * (1u64 << zoom_max) as f64;
+    let [west, south, east, north] = edges_m;
+    let edge = |at: f64, axis: usize, to: fn(f64) -> f64| to((at - offset_m[axis]) / step_m) * step_m + offset_m[axis];
+    let (west, north) = (edge(west, 0, f64::floor), edge(north, 1, f64::ceil));
+    let size_m = [edge(east, 0, f64::ceil) - west, north - edge(south, 1, f64::floor)];
+    (TileGrid { origin_m: [west, north], size_m, finest_m: FINEST_SPACINGS * spacing_m, levels: zoom_max }, zoom_max)
+}
+
+/// A short name for what an input holds.
+fn content(input: &Input) -> String {
+    let mut hash = blake3::Hasher::new();
+    let mut add = |value: &f64| {
+        hash.update(&value.to_le_bytes());
+    };
+    match input {
+        Input::Grid(grid) => {
+            let Geometry { rows, cols, cell, origin } = grid.geometry;
+            [rows as f64, cols as f64].iter().chain(&cell).chain(&origin).chain(&grid.values).for_each(&mut add);
+        }
+        Input::Points(points) => points.iter().flatten().for_each(&mut add),
+    }
+    hash.finalize().to_hex()[..32].to_owned()
 }
 
 /// A comment on how to come to the same draws, and the seed that the section states.
@@ -290,12 +343,13 @@ impl World {
         tile: TileIndex,
         phenomena: Option<&[usize]>,
     ) -> Result<Arc<Samples>, Problem> {
-        let zoom = LEVELS - tile.level;
-        let half = (TILE as i64 / 2) << tile.level;
-        let (west, north) = (TILE as i64 * i64::from(tile.col) - half, half - TILE as i64 * i64::from(tile.row));
-        let side = TILE + 2;
-        let window =
-            Window { zoom, west: west - 1, south: north - TILE as i64 - 1, cols: side, rows: side, centred: true };
+        // The finest pixels are two basic spacings wide.
+        let zoom = self.grid.levels - tile.level;
+        let corner = self.to_lattice(self.grid.origin_m).map(|m| (m / self.step_m(zoom)).round() as i64);
+        let side = TILE as i64;
+        let (west, north) = (corner[0] + side * i64::from(tile.col), corner[1] - side * i64::from(tile.row));
+        let (west, south, cols) = (west - 1, north - side - 1, TILE + 2);
+        let window = Window { zoom, west, south, cols, rows: cols, centred: true };
         let selection = Selection {
             phenomena: phenomena.map(<[usize]>::to_vec),
             feature_min_m: FEATURE_PIXELS * self.grid.resolution_m(tile.level),
@@ -310,12 +364,12 @@ impl World {
             "{} {:?} {:?} {zoom} {west} {south} {cols} {rows} {centred}",
             self.digest, selection.phenomena, selection.feature_min_m
         ));
-        let world = self.made_of(&selection.phenomena)?;
-        self.check_seconds(&world, &window, selection.feature_min_m, [1.0, TILE_SECONDS])?;
+        let ground = self.made_of(&selection.phenomena)?;
+        self.check_seconds(&*ground, &window, selection.feature_min_m, [1.0, TILE_SECONDS])?;
         let feature_min_m = selection.feature_min_m;
         let make = move |cancel: &std::sync::atomic::AtomicBool| {
             let request = Request { window, feature_min_m, cancel: Some(cancel) };
-            Some(from_south(&world, &world.patch_for(&request)?, feature_min_m))
+            Some(from_south(&*ground, &ground.patch_for(&request)?, feature_min_m))
         };
         maker.library.tile(key, maker.priority, make).await.map_err(|e| match e {
             Unavailable::Busy => Problem::unavailable("the queue of tiles is full; try again in 2 s"),
@@ -323,9 +377,9 @@ impl World {
         })
     }
 
-    /// The world of some of its processes.
-    fn made_of(&self, phenomena: &Option<Vec<usize>>) -> Result<Arc<planetary::World>, Problem> {
-        self.world(phenomena).map_err(|e| Problem::internal(e.to_string()))
+    /// The ground of some of its processes.
+    fn made_of(&self, phenomena: &Option<Vec<usize>>) -> Result<Arc<dyn Windows>, Problem> {
+        self.ground(phenomena).map_err(|e| Problem::internal(e.to_string()))
     }
 
     /// Refuses tiles of the lattice that are expected to take too long: all of them together, or one.
@@ -333,22 +387,22 @@ impl World {
     /// # Errors
     /// A sentence with a `feature_min_m` that would do.
     pub fn check_work(&self, zoom: u32, tiles: u64, selection: &Selection, seconds_max: f64) -> Result<(), Problem> {
-        let world = self.made_of(&selection.phenomena)?;
+        let ground = self.made_of(&selection.phenomena)?;
         let window = Window { zoom, west: 0, south: 0, cols: TILE, rows: TILE, centred: false };
-        self.check_seconds(&world, &window, selection.feature_min_m, [1.0, TILE_SECONDS])?;
-        self.check_seconds(&world, &window, selection.feature_min_m, [tiles as f64, seconds_max])
+        self.check_seconds(&*ground, &window, selection.feature_min_m, [1.0, TILE_SECONDS])?;
+        self.check_seconds(&*ground, &window, selection.feature_min_m, [tiles as f64, seconds_max])
     }
 
     /// Refuses a number of tiles like a window that are expected to take longer than a limit on one core.
     fn check_seconds(
         &self,
-        world: &planetary::World,
+        ground: &dyn Windows,
         window: &Window,
         feature_min_m: f64,
         [tiles, limit_s]: [f64; 2],
     ) -> Result<(), Problem> {
         let expected_s = |feature_min_m: f64| {
-            tiles * world.expected_seconds(&Request { window: *window, feature_min_m, cancel: None })
+            tiles * ground.expected_seconds(&Request { window: *window, feature_min_m, cancel: None })
         };
         let wanted_s = expected_s(feature_min_m);
         if wanted_s <= limit_s {
@@ -403,25 +457,38 @@ impl World {
     ) -> Result<Samples, Problem> {
         let zoom = self.zoom_below(step_m);
         let own_m = self.step_m(zoom);
+        if step_m > 2.0 * own_m {
+            return Err(Problem::bad_request(format!(
+                "`resolution_m` is {step_m}; the posts of the DEM show no more from {} m on: take the DEM itself",
+                2.0 * own_m
+            )));
+        }
+        let from_m = self.to_lattice(origin_m);
         let same = (step_m / own_m - 1.0).abs() <= SAME;
         let [rows, cols] = shape;
         if let (true, Some(west), Some(south)) =
-            (same, Self::on_lattice(origin_m[0], own_m), Self::on_lattice(origin_m[1], own_m))
+            (same, Self::on_lattice(from_m[0], own_m), Self::on_lattice(from_m[1], own_m))
         {
             return self.lattice(maker, zoom, [west, south], shape, selection, piece).await;
         }
-        let first = origin_m.map(|at| (at / own_m).floor() as i64);
+        let first = from_m.map(|at| (at / own_m).floor() as i64);
         let last = |at: f64, count: usize, first: i64| {
             let end = ((at + (count - 1) as f64 * step_m) / own_m).floor() as i64;
             (end - first + 2) as usize
         };
-        let (own_cols, own_rows) = (last(origin_m[0], cols, first[0]), last(origin_m[1], rows, first[1]));
+        let (own_cols, own_rows) = (last(from_m[0], cols, first[0]), last(from_m[1], rows, first[1]));
         let fine = self.lattice(maker, zoom, first, [own_rows, own_cols], selection, piece).await?;
-        let across = |c: usize| (origin_m[0] + c as f64 * step_m) / own_m - first[0] as f64;
-        let up = |r: usize| (origin_m[1] + (rows - 1 - r) as f64 * step_m) / own_m - first[1] as f64;
+        let across = |c: usize| (from_m[0] + c as f64 * step_m) / own_m - first[0] as f64;
+        let up = |r: usize| (from_m[1] + (rows - 1 - r) as f64 * step_m) / own_m - first[1] as f64;
         let down: Vec<f64> = (0..rows).map(|r| (own_rows - 1) as f64 - up(r)).collect();
         let right: Vec<f64> = (0..cols).map(across).collect();
         Ok(fine.between(&down, &right))
+    }
+
+    /// The place nearest to another that stands on a lattice of that distance of samples.
+    pub fn settled(&self, at_m: [f64; 2], step_m: f64) -> [f64; 2] {
+        let on = self.to_lattice(at_m).map(|m| (m / step_m).round() * step_m);
+        [0, 1].map(|axis| on[axis] + self.offset_m[axis])
     }
 
     /// Samples at lattice points, from the tiles that they lie in.
@@ -507,14 +574,14 @@ impl Samples {
 }
 
 /// A patch with row 0 in the north, in single precision as files hold it; rocks that were left out count by their share.
-fn from_south(world: &planetary::World, patch: &Patch, feature_min_m: f64) -> Samples {
+fn from_south(ground: &dyn Windows, patch: &Patch, feature_min_m: f64) -> Samples {
     let Window { rows, cols, .. } = patch.window;
     let turned =
         |values: &[f64]| -> Vec<f32> { values.chunks_exact(cols).rev().flatten().map(|v| *v as f32).collect() };
-    let rock = world.rocks.as_ref().map(|(rocks, _)| {
+    let rock = ground.has_rocks().then(|| {
         let share = |k: usize| match patch.class[k] {
             planetary::ROCK => 1.0,
-            _ => rocks.parameters().cover_below(patch.rock_potential[k], feature_min_m),
+            _ => ground.rock_cover_below(patch.rock_potential[k], feature_min_m),
         };
         turned(&(0..rows * cols).map(share).collect::<Vec<f64>>())
     });
@@ -522,8 +589,8 @@ fn from_south(world: &planetary::World, patch: &Patch, feature_min_m: f64) -> Sa
         rows,
         cols,
         heights: turned(&patch.heights),
-        albedo: world.albedo.is_some().then(|| turned(&patch.albedo)),
+        albedo: ground.has_albedo().then(|| turned(&patch.albedo)),
         rock,
-        rock_potential: world.rocks.is_some().then(|| turned(&patch.rock_potential)),
+        rock_potential: ground.has_rocks().then(|| turned(&patch.rock_potential)),
     }
 }

@@ -109,7 +109,7 @@ impl Window {
 /// The nearest place that has samples of its own: a window about a centre may move by half a sample.
 fn settled(collection: &Collection, at: [f64; 2], step_m: f64) -> [f64; 2] {
     match &collection.ground {
-        Ground::World(_) => at.map(|m| (m / step_m).round() * step_m),
+        Ground::World(world) => world.settled(at, step_m),
         Ground::Raster(raster) => {
             let g = &raster.geometry;
             [0, 1].map(|a| ((at[a] - g.origin[a]) / step_m - 0.5).round() * step_m + g.origin[a] + 0.5 * step_m)

@@ -8,11 +8,13 @@ use sastrugi_numeric::Streams;
 use sastrugi_schemas::manifest::Source;
 use sastrugi_schemas::tables::TerrainRow;
 use sastrugi_store::release::Release;
-use sastrugi_terrain::Generator;
-use sastrugi_terrain::planetary::{self, Planetary, RawPlanetary};
+use sastrugi_terrain::elaborate::{self, Elaborate, RawElaborate};
+use sastrugi_terrain::planetary::{self, Planetary, RawPlanetary, RawProcess};
+use sastrugi_terrain::{Generator, Input, Windows};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// Name of the heights in metres beside a DEM that is in degrees.
 const METRIC: &str = "metric";
@@ -22,14 +24,91 @@ const METRIC: &str = "metric";
 pub struct ServedWorld {
     /// Name of the file, or id of the item in its study.
     pub id: String,
-    /// The world, with the inputs that it follows.
-    pub world: Planetary,
+    /// What it is made from.
+    pub surface: Surface,
+    /// The inputs that it follows.
+    pub inputs: Vec<Input>,
     /// Its full parameters.
     pub parameters: Value,
     /// Its random streams.
     pub streams: Streams,
     /// Licence of the study that it stands in, SPDX.
     pub license: Option<String>,
+}
+
+/// A generator that can make any window.
+#[derive(Clone, Debug)]
+pub enum Surface {
+    /// A world without end, with the inputs that it follows.
+    Planetary(Planetary),
+    /// A DEM with finer detail.
+    Elaborate(Box<Elaborate>),
+}
+
+impl ServedWorld {
+    /// The ground with the processes at some places of its list, from 0; the others keep their draws.
+    ///
+    /// # Errors
+    /// Inputs that cannot be used.
+    pub fn ground(&self, acts: impl Fn(usize) -> bool) -> Result<Arc<dyn Windows>, Error> {
+        Ok(match &self.surface {
+            Surface::Planetary(world) => Arc::new(world.world_of(&self.streams, acts)?),
+            Surface::Elaborate(form) => {
+                let made = form.elaborated(&self.streams, &self.inputs, acts);
+                Arc::new(made.map_err(|e| Error::Input(e.to_string()))?)
+            }
+        })
+    }
+
+    /// Name of its generator.
+    pub fn kind(&self) -> &'static str {
+        match &self.surface {
+            Surface::Planetary(_) => planetary::KIND,
+            Surface::Elaborate(_) => elaborate::KIND,
+        }
+    }
+
+    /// Basic spacing, m.
+    pub fn spacing_m(&self) -> f64 {
+        match &self.surface {
+            Surface::Planetary(world) => world.spacing_m(),
+            Surface::Elaborate(form) => form.spacing_m(),
+        }
+    }
+
+    /// Place of lattice point 0, m.
+    pub fn offset_m(&self) -> [f64; 2] {
+        match &self.surface {
+            Surface::Planetary(_) => [0.0; 2],
+            Surface::Elaborate(form) => form.offset_m(),
+        }
+    }
+
+    /// The window of its file: place of the south-west sample and distance of samples, m, and columns and rows.
+    pub fn window(&self) -> ([f64; 2], f64, Option<[u32; 2]>) {
+        match &self.surface {
+            Surface::Planetary(world) => (world.raw().origin_m, world.raw().cell_m, world.raw().size_px),
+            Surface::Elaborate(form) => (form.raw().origin_m, form.raw().cell_m, form.raw().size_px),
+        }
+    }
+
+    /// Its processes.
+    pub fn processes(&self) -> &[RawProcess] {
+        match &self.surface {
+            Surface::Planetary(world) => &world.raw().processes,
+            Surface::Elaborate(form) => &form.raw().processes,
+        }
+    }
+
+    /// Where it ends: west, south, east and north, m, and the coarsest samples that it has, m; `None` where it has no end.
+    ///
+    /// # Errors
+    /// Inputs that are missing.
+    pub fn extent(&self) -> Result<Option<([f64; 4], f64)>, Error> {
+        let Surface::Elaborate(form) = &self.surface else { return Ok(None) };
+        let (bounds_m, post_m) = form.posts_of(&self.inputs).map_err(|e| Error::Input(e.to_string()))?;
+        Ok(Some((bounds_m, 0.5 * post_m)))
+    }
 }
 
 /// A file of a release.
@@ -69,7 +148,7 @@ pub enum Served {
     Release(Box<Release>, Vec<ServedRaster>),
 }
 
-/// What there is to serve: the `planetary` world of a terrain file or all those of a study, or the heights of a release.
+/// What there is to serve: the `planetary` or `elaborate` surface of a terrain file, the `planetary` worlds of a study, or the heights of a release.
 ///
 /// # Errors
 /// A file that is neither, or wrong; one without anything to serve.
@@ -101,14 +180,26 @@ fn world_of_file(path: &Path) -> Result<ServedWorld, Error> {
         )));
     }
     let prepared = prepare(&spec, &[], None)?;
-    let (kind, parameters) = (prepared.kind().to_owned(), prepared.parameters());
-    if kind != planetary::KIND {
-        let known = planetary::KIND;
-        return Err(Error::Usage(format!("{spec}: `kind` is `{kind}`; only patches of `{known}` are made on demand")));
-    }
-    let world = world(&parameters)?.with_inputs(&prepared.inputs()?).map_err(|e| Error::Input(e.to_string()))?;
+    let (parameters, inputs) = (prepared.parameters(), || prepared.inputs());
+    let (surface, inputs) = match prepared.kind() {
+        planetary::KIND => {
+            let inputs = inputs()?;
+            let world = world(&parameters)?.with_inputs(&inputs).map_err(|e| Error::Input(e.to_string()))?;
+            (Surface::Planetary(world), inputs)
+        }
+        elaborate::KIND => {
+            let raw: RawElaborate = sastrugi_schemas::kind::read_parameters(&parameters)?;
+            (Surface::Elaborate(Box::new(Elaborate::try_from(raw)?)), inputs()?)
+        }
+        kind => {
+            let (world, dem) = (planetary::KIND, elaborate::KIND);
+            let message =
+                format!("{spec}: `kind` is `{kind}`; only patches of `{world}` and `{dem}` are made on demand");
+            return Err(Error::Usage(message));
+        }
+    };
     let id = id_of(&path.file_stem().unwrap_or_default().to_string_lossy());
-    Ok(ServedWorld { id, world, parameters, streams: prepared.streams(), license: None })
+    Ok(ServedWorld { id, surface, inputs, parameters, streams: prepared.streams(), license: None })
 }
 
 /// An id for addresses and studies from the name of a file: lower case, `-` for what else than letters, digits, `-` and `_` stands there.
@@ -138,7 +229,8 @@ fn worlds_of_study(path: &Path, text: &str) -> Result<Vec<ServedWorld>, Error> {
             }
             worlds.push(ServedWorld {
                 id: id.clone(),
-                world,
+                surface: Surface::Planetary(world),
+                inputs: Vec::new(),
                 parameters,
                 streams: streams.clone(),
                 license: license.clone(),

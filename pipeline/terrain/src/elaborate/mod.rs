@@ -44,14 +44,16 @@ mod fit;
 mod params;
 #[cfg(test)]
 mod tests;
+mod windows;
 
 #[cfg(test)]
 pub(crate) use fit::seen_through_the_lags;
 pub use fit::{TextureFit, fit};
 pub use params::{Elaborate, RawElaborate};
+pub use windows::Elaborated;
 
 use crate::generator::{Generator, Input, Map, NamedInput, Terrain, TerrainError};
-use crate::planetary::{self, Assembly, Patch, Potential, RawProcess, Window, World};
+use crate::planetary::{self, Assembly, Patch, Potential, RawProcess, Request, Window, World};
 use altimetry::{AltimetryError, Correction, Points, Posts};
 use background::Background;
 use bounds::Bound;
@@ -110,6 +112,14 @@ struct Inputs<'a> {
     /// `[x, y, z, sigma]`, m.
     points: Vec<[f64; 4]>,
     potential: Option<&'a Grid>,
+}
+
+/// What all windows of an elaborated DEM have in common.
+struct Model {
+    background: Arc<Background>,
+    /// The background with the detail.
+    world: World,
+    notes: Vec<String>,
 }
 
 impl NamedInput {
@@ -203,7 +213,7 @@ impl Elaborate {
         Ok(Some(TextureFit { roughness_m: self.raw.roughness_m.unwrap_or(fitted.roughness_m), ..fitted }))
     }
 
-    /// The world of the detail, on the background.
+    /// The world of the detail, on the background; of its processes act those at some places of the list.
     fn world(
         &self,
         background: Arc<Background>,
@@ -211,6 +221,7 @@ impl Elaborate {
         texture: Option<TextureFit>,
         anchor: u32,
         streams: &Streams,
+        acts: impl Fn(usize) -> bool,
     ) -> World {
         let mut assembly = Assembly::new(self.spacing_m, anchor);
         let own = self.clone();
@@ -218,7 +229,7 @@ impl Elaborate {
         if let Some(t) = texture {
             assembly.add_texture(t.roughness_m, t.hurst, Counter::new(&mut streams.stream("texture-1")));
         }
-        assembly.with(processes, streams, potential, |_| true)
+        assembly.with(processes, streams, potential, acts)
     }
 
     /// A quantity of the detail at the posts of a part, interpolated as backgrounds are.
@@ -250,17 +261,17 @@ impl Elaborate {
     }
 
     /// How far altimetry moves the surface that is `world` less `residual`.
-    fn correction(&self, points: &Points, world: &World, residual: &Background) -> Correction {
+    fn correction(&self, points: &Points, world: Bounded<'_>, residual: &Background) -> Correction {
         let corners = points.corners();
         let height =
-            |&[i, j]: &[i64; 2]| sample(world, [i, j]).heights[0] - residual.at(self.place([i as f64, j as f64]));
+            |&[i, j]: &[i64; 2]| world.sample([i, j]).heights[0] - residual.at(self.place([i as f64, j as f64]));
         let heights: Vec<f64> = corners.par_iter().map(height).collect();
         let known: BTreeMap<[i64; 2], f64> = corners.into_iter().zip(heights).collect();
         points.correction(|corner| known.get(&corner).copied().unwrap_or(f64::NAN))
     }
 
     /// The measured albedo at the window's samples, with the detail of the processes.
-    fn measured_albedo(&self, albedo: &Grid, world: &World, patch: &mut Patch) -> Result<(), DemError> {
+    fn measured_albedo(&self, albedo: &Grid, world: Bounded<'_>, patch: &mut Patch) -> Result<(), DemError> {
         let g = albedo.geometry;
         self.check_size(&g)?;
         let part = self.posts(&g, 0.0)?;
@@ -269,7 +280,7 @@ impl Elaborate {
             return Err(DemError::NoAlbedo { albedo: albedo.values[k], x: g.x(k % g.cols), y: g.y(k / g.cols) });
         }
         let measured = Background::new(without_holes(albedo));
-        let detail = self.detail(g, &part, |point| sample(world, point).albedo[0]);
+        let detail = self.detail(g, &part, |point| world.sample(point).albedo[0]);
         self.change(&mut patch.albedo, |point, own| {
             let place = self.place(point);
             (measured.at(place) + (own - detail.at(place))).clamp(0.0, 1.0)
@@ -277,12 +288,32 @@ impl Elaborate {
         Ok(())
     }
 
-    fn refine(&self, streams: &Streams, inputs: &Inputs<'_>) -> Result<Terrain, TerrainError> {
+    /// What all windows have in common; of the processes act those at some places of the list.
+    fn model(
+        &self,
+        streams: &Streams,
+        inputs: &Inputs<'_>,
+        acts: impl Fn(usize) -> bool,
+    ) -> Result<Model, TerrainError> {
         let dem = inputs.dem;
         let of_dem = |e: DemError| self.dem().failed(&e);
         let g = &dem.geometry;
         self.check_size(g).map_err(of_dem)?;
-        let post_m = g.cell[0].min(g.cell[1]);
+        let (processes, bound_note) = self.bounded(g.cell[0].min(g.cell[1])).map_err(of_dem)?;
+        let potential = self.potential(inputs)?;
+        let texture = self.texture(dem).map_err(of_dem)?;
+        let anchor = planetary::nearest_zoom(g.mean_cell() / self.spacing_m);
+        let background = Arc::new(Background::new(without_holes(dem)));
+        let world = self.world(background.clone(), (&processes, potential), texture, anchor, streams, acts);
+        let mut notes = texture.map_or_else(Vec::new, |t| self.texture_notes(&t, g));
+        notes.extend(bound_note);
+        Ok(Model { background, world, notes })
+    }
+
+    /// The posts that the window is made from, and the altimetry that matters to it.
+    fn surroundings(&self, inputs: &Inputs<'_>) -> Result<(Part, Points), TerrainError> {
+        let (dem, of_dem) = (inputs.dem, |e: DemError| self.dem().failed(&e));
+        let g = &dem.geometry;
         let of_points = |e: AltimetryError| {
             let listed = || NamedInput::points("altimetry_points_m", "altimetry_points_m");
             self.altimetry().unwrap_or_else(listed).failed(&DemError::Altimetry(e))
@@ -293,33 +324,47 @@ impl Elaborate {
         let posts = self.posts(g, beyond_m).map_err(of_dem)?;
         let margin = if self.raw.processes.is_empty() { 0 } else { CRATER_POSTS };
         self.check_raster(dem, &posts, margin).map_err(of_dem)?;
-        let (processes, bound_note) = self.bounded(post_m).map_err(of_dem)?;
-        let potential = self.potential(inputs)?;
-        let texture = self.texture(dem).map_err(of_dem)?;
-        let anchor = planetary::nearest_zoom(g.mean_cell() / self.spacing_m);
-        let background = Arc::new(Background::new(without_holes(dem)));
-        let world = self.world(background.clone(), (&processes, potential), texture, anchor, streams);
-        let mut patch = world.tiled_patch(&self.window);
-        let residual = self.detail(*g, &posts, |[i, j]| {
-            sample(&world, [i, j]).heights[0] - background.at(self.place([i as f64, j as f64]))
+        Ok((posts, points))
+    }
+
+    /// Makes samples of the model into those of the surface, which goes through the posts and the altimetry; with a measured albedo its own.
+    fn settle(
+        &self,
+        inputs: &Inputs<'_>,
+        (posts, points): (Part, Points),
+        model: &Model,
+        least_m: f64,
+        patch: &mut Patch,
+    ) -> Result<Option<Correction>, TerrainError> {
+        let world = Bounded { world: &model.world, least_m };
+        let residual = self.detail(inputs.dem.geometry, &posts, |[i, j]| {
+            world.sample([i, j]).heights[0] - model.background.at(self.place([i as f64, j as f64]))
         });
         self.change(&mut patch.heights, |point, z| z - residual.at(self.place(point)));
-        let correction = (!points.is_empty()).then(|| self.correction(&points, &world, &residual));
+        let correction = (!points.is_empty()).then(|| self.correction(&points, world, &residual));
         if let Some(correction) = &correction {
             self.change(&mut patch.heights, |point, z| z + correction.at(point));
         }
         if let (Some(albedo), Some(name)) = (inputs.albedo, self.albedo()) {
-            self.measured_albedo(albedo, &world, &mut patch).map_err(|e| name.failed(&e))?;
+            self.measured_albedo(albedo, world, patch).map_err(|e| name.failed(&e))?;
         }
-        let mut maps = planetary::maps(&world, self.geometry(), &patch);
-        if inputs.albedo.is_some() && world.albedo.is_none() {
+        Ok(correction)
+    }
+
+    fn refine(&self, streams: &Streams, inputs: &Inputs<'_>) -> Result<Terrain, TerrainError> {
+        self.check_size(&inputs.dem.geometry).map_err(|e| self.dem().failed(&e))?;
+        let surroundings = self.surroundings(inputs)?;
+        let model = self.model(streams, inputs, |_| true)?;
+        let mut patch = model.world.tiled_patch(&self.window);
+        let correction = self.settle(inputs, surroundings, &model, 0.0, &mut patch)?;
+        let mut maps = planetary::maps(&model.world, self.geometry(), &patch);
+        if inputs.albedo.is_some() && model.world.albedo.is_none() {
             maps.push(Map { name: "albedo", values: planetary::to_grid(self.geometry(), &patch.albedo) });
         }
         let heights = planetary::to_grid(self.geometry(), &patch.heights);
-        let mut notes = texture.map_or_else(Vec::new, |t| self.texture_notes(&t, g));
-        notes.extend(bound_note);
+        let mut notes = model.notes;
         notes.extend(correction.map(|c| c.note()));
-        notes.extend(planetary::potential_note(&world, &self.window));
+        notes.extend(planetary::potential_note(&model.world, &self.window));
         Ok(Terrain { heights, maps, lines: Vec::new(), notes })
     }
 
@@ -381,9 +426,23 @@ impl Elaborate {
     }
 }
 
-/// One lattice point of a world.
-fn sample(world: &World, [west, south]: [i64; 2]) -> Patch {
-    world.patch(&Window { zoom: 0, west, south, cols: 1, rows: 1, centred: false })
+/// A world without craters and rocks that are not wider than that, m.
+#[derive(Clone, Copy)]
+struct Bounded<'a> {
+    world: &'a World,
+    least_m: f64,
+}
+
+impl Bounded<'_> {
+    /// One lattice point.
+    fn sample(self, [west, south]: [i64; 2]) -> Patch {
+        self.world.made(&Request { window: point(west, south), feature_min_m: self.least_m, cancel: None })
+    }
+}
+
+/// The window of one lattice point.
+fn point(west: i64, south: i64) -> Window {
+    Window { zoom: 0, west, south, cols: 1, rows: 1, centred: false }
 }
 
 /// The DEM with its mean where it has no data: far from the window, where only planes of distant craters ask.

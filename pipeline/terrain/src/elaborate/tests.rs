@@ -6,6 +6,7 @@ mod albedo;
 mod altimetry;
 mod bounds;
 mod together;
+mod windows;
 
 /// A rough DEM with its south-west post at (100, 200) m.
 fn site(rows: usize, cols: usize, cell: [f64; 2]) -> Grid {

@@ -106,17 +106,17 @@ struct Survey<'w> {
 impl World {
     /// The samples of a window: a pure function of the world, bit by bit the same whatever else is looked at.
     pub fn patch(&self, window: &Window) -> Patch {
-        self.survey(&Request { window: *window, feature_min_m: 0.0, cancel: None })
+        self.made(&Request { window: *window, feature_min_m: 0.0, cancel: None })
     }
 
     /// The samples that are asked for, made on this thread; `None` once they are no longer wanted.
     pub fn patch_for(&self, request: &Request<'_>) -> Option<Patch> {
-        let patch = self.survey(request);
+        let patch = self.made(request);
         (!is_set(request.cancel)).then_some(patch)
     }
 
     /// The samples of a request; of one that is no longer wanted any.
-    fn survey(&self, request: &Request<'_>) -> Patch {
+    pub(crate) fn made(&self, request: &Request<'_>) -> Patch {
         let window = &request.window;
         let count = window.len();
         let mut patch = Patch {

@@ -32,7 +32,7 @@ fn widest_rock_m(images: Value) -> f64 {
     let own = Elaborate::try_from(crate::registry::read::<RawElaborate>(&raw).unwrap()).unwrap();
     let background = Arc::new(Background::new(site(24, 24, [1.28, 1.28])));
     let (processes, _) = own.bounded(1.28).unwrap();
-    let world = own.world(background, (&processes, None), None, 7, &streams());
+    let world = own.world(background, (&processes, None), None, 7, &streams(), |_| true);
     let area = Window { zoom: 0, west: 0, south: 0, cols: 20_000, rows: 20_000, centred: false };
     let rocks = world.rocks.as_ref().unwrap().0.find(&area, 0.0, None, |_| 0.3);
     assert!(rocks.len() > 1000);
