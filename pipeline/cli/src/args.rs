@@ -199,7 +199,7 @@ pub enum Verb {
     Completions(Completions),
     /// Serve worlds and releases over HTTP: patches of terrain at any place and resolution, map tiles, and a map page.
     #[command(
-        after_help = "A WORLD.toml is what `terrain` takes, of kind planetary. A STUDY.toml serves all its planetary terrains; a RELEASE serves\n\
+        after_help = "A WORLD.toml is what `terrain` takes, of kind planetary or elaborate. A STUDY.toml serves all its planetary terrains; a RELEASE serves\n\
         its terrains with their maps, missions and rovers. With SASTRUGI_TOKEN set, requests must send that token.\n\n\
         Examples:\n  sastrugi serve fixtures/worlds/planet.toml\n  \
         sastrugi serve study.toml release --library tiles --library-bytes 10G --listen 127.0.0.1:9000\n  \
