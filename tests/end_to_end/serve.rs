@@ -501,6 +501,31 @@ fn val_releases_are_served() {
     assert!(tracks > 0);
 }
 
+/// A measured DEM in degrees is served in the metres in which it is studied; its cells, which are not square, stand at their places.
+#[test]
+fn val_dems_in_degrees_are_served_in_metres() {
+    let folder = area();
+    let file = sastrugi_fixtures::workspace_root().join("fixtures/dem/jacksboro.tif");
+    let study = format!(
+        "[study]\nname = \"site\"\nseed = 1\ndate = \"2026-11-25\"\nlicense = \"CC0-1.0\"\n\n[[dem]]\nid = \"jacksboro\"\n\
+         file = \"{}\"\nlicense = \"public domain\"\n",
+        file.display()
+    );
+    write(folder.path(), "study.toml", &study);
+    let call = sastrugi_in(folder.path(), &["run", "study.toml", "-o", "release", "--quiet"]);
+    assert_eq!(call.code, 0, "{}", call.stderr);
+    let metric = dem::read(&folder.path().join("release/dem/jacksboro.metric.tif")).unwrap().grid;
+    let server = Server::start(folder.path(), &["release"], &[]);
+    let described = server.get("/v1/collections/site.jacksboro").json();
+    let g = metric.geometry;
+    assert_eq!(described["cell_m"].as_f64(), Some(g.cell[0].min(g.cell[1])));
+    for (row, col) in [(0, 0), (17, 230), (g.rows - 1, g.cols - 1)] {
+        let path = format!("/v1/collections/site.jacksboro/point?x={:?}&y={:?}", g.x(col), g.y(row));
+        let point = server.get(&path).json();
+        assert_eq!(point["elevation_m"].as_f64().unwrap() as f32, metric.at(row, col) as f32, "{row} {col}");
+    }
+}
+
 /// A file that is no longer what its release sealed is not served.
 #[test]
 fn val_changed_files_are_not_served() {

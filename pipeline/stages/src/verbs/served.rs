@@ -40,7 +40,7 @@ pub struct ServedWorld {
 #[derive(Clone, Debug)]
 pub enum Surface {
     /// A world without end, with the inputs that it follows.
-    Planetary(Planetary),
+    Planetary(Box<Planetary>),
     /// A DEM with finer detail.
     Elaborate(Box<Elaborate>),
 }
@@ -185,7 +185,7 @@ fn world_of_file(path: &Path) -> Result<ServedWorld, Error> {
         planetary::KIND => {
             let inputs = inputs()?;
             let world = world(&parameters)?.with_inputs(&inputs).map_err(|e| Error::Input(e.to_string()))?;
-            (Surface::Planetary(world), inputs)
+            (Surface::Planetary(Box::new(world)), inputs)
         }
         elaborate::KIND => {
             let raw: RawElaborate = sastrugi_schemas::kind::read_parameters(&parameters)?;
@@ -229,7 +229,7 @@ fn worlds_of_study(path: &Path, text: &str) -> Result<Vec<ServedWorld>, Error> {
             }
             worlds.push(ServedWorld {
                 id: id.clone(),
-                surface: Surface::Planetary(world),
+                surface: Surface::Planetary(Box::new(world)),
                 inputs: Vec::new(),
                 parameters,
                 streams: streams.clone(),
