@@ -68,6 +68,9 @@ impl Piece {
     }
 }
 
+/// Grounds by the processes that act, as [`Selection`] names them.
+type Grounds = HashMap<Option<Vec<usize>>, Arc<dyn Windows>>;
+
 /// A world.
 pub struct World {
     served: ServedWorld,
@@ -80,7 +83,7 @@ pub struct World {
     offset_m: [f64; 2],
     /// Most doublings of the basic spacing.
     zoom_max: u32,
-    grounds: Mutex<HashMap<Option<Vec<usize>>, Arc<dyn Windows>>>,
+    grounds: Mutex<Grounds>,
 }
 
 impl World {
