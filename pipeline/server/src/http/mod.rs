@@ -91,7 +91,7 @@ fn is_packed(_: StatusCode, _: Version, _: &HeaderMap, extensions: &axum::http::
 
 fn cors(origins: &[HeaderValue]) -> CorsLayer {
     let allowed = match origins {
-        [any] if any == "*" => AllowOrigin::any(),
+        some if some.iter().any(|origin| origin == "*") => AllowOrigin::any(),
         some => AllowOrigin::list(some.iter().cloned()),
     };
     CorsLayer::new()
