@@ -5,6 +5,7 @@
 
 use crate::grid::{TILE, TileGrid, TileIndex};
 use crate::http::Problem;
+use crate::library::undivided;
 use crate::samples::Samples;
 use quick_cache::Weighter;
 use quick_cache::sync::Cache;
@@ -47,7 +48,7 @@ impl Weighter<String, Arc<Pyramid>> for Bytes {
 impl Memory {
     /// Room for that many bytes.
     pub fn new(bytes: u64) -> Arc<Self> {
-        Arc::new(Self(Cache::with_weighter(64, bytes, Bytes)))
+        Arc::new(Self(undivided(64, bytes, Bytes)))
     }
 }
 

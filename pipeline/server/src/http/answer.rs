@@ -2,6 +2,7 @@
 //! the client has them.
 
 use super::Problem;
+use crate::library::undivided;
 use axum::body::{Body, Bytes};
 use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
@@ -53,7 +54,7 @@ pub struct Answers(Cache<String, Answer, Size>);
 impl Answers {
     /// At most that many bytes are kept.
     pub fn new(bytes: u64) -> Self {
-        Self(Cache::with_weighter((bytes / (1 << 16)).max(16) as usize, bytes, Size))
+        Self(undivided((bytes / (1 << 16)).max(16) as usize, bytes, Size))
     }
 
     /// Bytes that are kept.
@@ -200,6 +201,16 @@ mod tests {
             assert_eq!(held(&headers(value), "abc"), None, "{value}");
         }
         assert_eq!(held(&HeaderMap::new(), "abc"), None);
+    }
+
+    /// An answer of more than half of the room is kept, on any number of processors.
+    #[test]
+    fn val_large_answers_are_kept() {
+        let runtime = tokio::runtime::Builder::new_current_thread().build().unwrap();
+        let answers = Answers::new(1 << 20);
+        let make = async { Ok(Some(Answer::new("text/plain", vec![0; 600_000]))) };
+        runtime.block_on(answers.answer(&HeaderMap::new(), "what", make)).unwrap();
+        assert!(answers.bytes() > 600_000, "{}", answers.bytes());
     }
 
     /// However many ask at once, an answer is made once; where who makes it leaves, the next makes it.

@@ -15,8 +15,8 @@ pub use pool::Priority;
 use crate::samples::Samples;
 use disk::Disk;
 use pool::Pool;
-use quick_cache::Weighter;
-use quick_cache::sync::Cache;
+use quick_cache::sync::{Cache, DefaultLifecycle};
+use quick_cache::{DefaultHashBuilder, OptionsBuilder, Weighter};
 use std::collections::HashMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
@@ -187,6 +187,25 @@ struct Bytes;
 impl Weighter<[u8; 32], Arc<Samples>> for Bytes {
     fn weight(&self, _: &[u8; 32], tile: &Arc<Samples>) -> u64 {
         tile.bytes()
+    }
+}
+
+/// A cache of one part, so that a value may take all of its room. Divided ones, the default, keep none that is larger than a part, of which
+/// there are more the more processors there are.
+pub fn undivided<K, V, W>(items: usize, bytes: u64, weighter: W) -> Cache<K, V, W>
+where
+    K: Eq + std::hash::Hash,
+    V: Clone,
+    W: Weighter<K, V> + Clone,
+{
+    let mut options = OptionsBuilder::new();
+    options.shards(1).estimated_items_capacity(items).weight_capacity(bytes);
+    match options.build() {
+        Ok(options) => {
+            Cache::with_options(options, weighter, DefaultHashBuilder::default(), DefaultLifecycle::default())
+        }
+        // All that it asks for is given.
+        Err(_) => Cache::with_weighter(items, bytes, weighter),
     }
 }
 
