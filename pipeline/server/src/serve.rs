@@ -93,7 +93,7 @@ pub fn serve(
         address,
         collections,
         library,
-        answers: Answers::new(ANSWERS),
+        answers: Answers::new(ANSWERS, settings.token.is_some()),
         limits: settings.limits.clone(),
         token: settings.token.clone(),
         hosts: origins.iter().filter_map(host_of).collect(),
@@ -124,7 +124,12 @@ fn origin(text: &str) -> Result<HeaderValue, Error> {
 /// The host of an origin, without its port.
 fn host_of(origin: &HeaderValue) -> Option<String> {
     let (_, host) = origin.to_str().ok()?.split_once("://")?;
-    Some(host.rsplit_once(':').map_or(host, |(name, _)| name).to_owned())
+    let name = match host.rsplit_once(':') {
+        // An address of version 6 without a port ends so.
+        Some((name, _)) if !host.ends_with(']') => name,
+        _ => host,
+    };
+    Some(name.to_owned())
 }
 
 async fn listen(listen: SocketAddr) -> Result<(TcpListener, SocketAddr), Error> {

@@ -10,8 +10,6 @@ use quick_cache::Weighter;
 use quick_cache::sync::Cache;
 use std::ops::Range;
 
-/// How long a client may use an answer unasked, s. A server that is started anew with other files serves others under the same address.
-const FRESH_S: u32 = 60;
 /// Longer answers are sent as they are: packing them would keep the runtime's threads from other clients, bytes.
 const PACKED_MAX: usize = 4 << 20;
 /// Endings of the tags of packed answers.
@@ -49,17 +47,21 @@ impl Weighter<String, Answer> for Size {
 }
 
 /// Answers that were given.
-pub struct Answers(Cache<String, Answer, Size>);
+pub struct Answers {
+    kept: Cache<String, Answer, Size>,
+    /// Whether they are for those alone who asked: no cache that others share may keep them.
+    private: bool,
+}
 
 impl Answers {
-    /// At most that many bytes are kept.
-    pub fn new(bytes: u64) -> Self {
-        Self(undivided((bytes / (1 << 16)).max(16) as usize, bytes, Size))
+    /// At most that many bytes are kept; caches that clients share keep none of `private` ones.
+    pub fn new(bytes: u64, private: bool) -> Self {
+        Self { kept: undivided((bytes / (1 << 16)).max(16) as usize, bytes, Size), private }
     }
 
     /// Bytes that are kept.
     pub fn bytes(&self) -> u64 {
-        self.0.weight()
+        self.kept.weight()
     }
 
     /// The answer to a request that depends on `what` alone: none where the client has it, the one that was given before, or a new one.
@@ -74,9 +76,9 @@ impl Answers {
     ) -> Result<Response, Problem> {
         let tag = tag(what.as_bytes());
         if let Some(own) = held(headers, &tag) {
-            return Ok(not_modified(own));
+            return Ok(self.scoped(not_modified(own)));
         }
-        let answer = match self.0.get_value_or_guard_async(&tag).await {
+        let answer = match self.kept.get_value_or_guard_async(&tag).await {
             Ok(answer) => answer,
             // Who leaves drops the guard, and the next that waits makes it.
             Err(guard) => {
@@ -86,7 +88,15 @@ impl Answers {
                 made
             }
         };
-        Ok(fresh(whole_or_part(headers, &tag, answer), &format!("\"{tag}\"")))
+        Ok(self.scoped(fresh(whole_or_part(headers, &tag, answer), &format!("\"{tag}\""))))
+    }
+
+    fn scoped(&self, mut response: Response) -> Response {
+        if self.private {
+            let freshness = HeaderValue::from_static("private, max-age=60, must-revalidate");
+            response.headers_mut().insert(header::CACHE_CONTROL, freshness);
+        }
+        response
     }
 }
 
@@ -115,13 +125,13 @@ pub fn not_modified(own: String) -> Response {
     fresh(StatusCode::NOT_MODIFIED.into_response(), &own)
 }
 
+/// A client may use an answer for a minute unasked: a server that is started anew with other files serves others under the same address.
 fn fresh(mut response: Response, tag: &str) -> Response {
     let headers = response.headers_mut();
     if let Ok(tag) = HeaderValue::from_str(tag) {
         headers.insert(header::ETAG, tag);
     }
-    let freshness = format!("max-age={FRESH_S}, must-revalidate");
-    headers.extend(HeaderValue::from_str(&freshness).ok().map(|value| (header::CACHE_CONTROL, value)));
+    headers.insert(header::CACHE_CONTROL, HeaderValue::from_static("max-age=60, must-revalidate"));
     headers.insert(header::VARY, HeaderValue::from_static("accept-encoding"));
     response
 }
@@ -203,11 +213,25 @@ mod tests {
         assert_eq!(held(&HeaderMap::new(), "abc"), None);
     }
 
+    /// Behind a token no shared cache may keep an answer.
+    #[test]
+    fn val_answers_behind_a_token_are_private() {
+        let runtime = tokio::runtime::Builder::new_current_thread().build().unwrap();
+        for (private, freshness) in
+            [(false, "max-age=60, must-revalidate"), (true, "private, max-age=60, must-revalidate")]
+        {
+            let answers = Answers::new(1 << 20, private);
+            let make = async { Ok(Some(Answer::new("text/plain", "ground"))) };
+            let response = runtime.block_on(answers.answer(&HeaderMap::new(), "what", make)).unwrap();
+            assert_eq!(response.headers()[header::CACHE_CONTROL], freshness);
+        }
+    }
+
     /// An answer of more than half of the room is kept, on any number of processors.
     #[test]
     fn val_large_answers_are_kept() {
         let runtime = tokio::runtime::Builder::new_current_thread().build().unwrap();
-        let answers = Answers::new(1 << 20);
+        let answers = Answers::new(1 << 20, false);
         let make = async { Ok(Some(Answer::new("text/plain", vec![0; 600_000]))) };
         runtime.block_on(answers.answer(&HeaderMap::new(), "what", make)).unwrap();
         assert!(answers.bytes() > 600_000, "{}", answers.bytes());
@@ -219,7 +243,8 @@ mod tests {
         use std::sync::atomic::{AtomicU32, Ordering};
         let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build().unwrap();
         runtime.block_on(async {
-            let (answers, made) = (std::sync::Arc::new(Answers::new(1 << 20)), std::sync::Arc::new(AtomicU32::new(0)));
+            let (answers, made) =
+                (std::sync::Arc::new(Answers::new(1 << 20, false)), std::sync::Arc::new(AtomicU32::new(0)));
             let ask = || {
                 let (answers, made) = (answers.clone(), made.clone());
                 tokio::spawn(async move {
