@@ -1,6 +1,7 @@
 //! A smooth surface through the posts of a DEM.
 
 use sastrugi_numeric::{Geometry, Grid};
+use std::ops::Range;
 
 /// Cubic convolution (Keys, 1981, doi:10.1109/TASSP.1981.1163711, a = -1/2): through every post, without bends, exact on parabolas.
 /// Beyond the outermost posts it goes on at their height.
@@ -23,17 +24,43 @@ impl Background {
         Self { whole, posts, first }
     }
 
+    /// Where the posts of the whole lie.
+    pub fn geometry(&self) -> Geometry {
+        self.whole
+    }
+
     /// Height at a point, m.
     pub fn at(&self, [x, y]: [f64; 2]) -> f64 {
         let (g, posts) = (&self.whole, &self.posts);
-        let (col, across) = place((x - g.origin[0]) / g.cell[0] - 0.5, g.cols);
-        let (row, up) = place((y - g.origin[1]) / g.cell[1] - 0.5, g.rows);
+        let (col, across) = place(position(g, 0, x), g.cols);
+        let (row, up) = place(position(g, 1, y), g.rows);
         let line = |j: usize| {
             let values = posts.row(posts.rows() - 1 - j);
             along(|i| values[i], posts.cols(), col - self.first[0], across)
         };
         along(line, posts.rows(), row - self.first[1], up)
     }
+}
+
+/// A place this near to a post, in posts, may be taken for it: coordinates are rounded.
+const AT_POST: f64 = 1e-6;
+
+/// Whether a place along an axis lies between the outer posts.
+pub fn lies_between(g: &Geometry, axis: usize, at: f64) -> bool {
+    let last = ([g.cols, g.rows][axis] - 1) as f64;
+    (-AT_POST..=last + AT_POST).contains(&position(g, axis, at))
+}
+
+/// Columns or rows (from the south, axis 1) of the posts that [`Background::at`] looks at between two places, m.
+pub fn around(g: &Geometry, axis: usize, [low, high]: [f64; 2]) -> Range<usize> {
+    let count = [g.cols, g.rows][axis];
+    let post = |at: f64| place(position(g, axis, at), count).0;
+    post(low).saturating_sub(1)..(post(high) + 3).min(count)
+}
+
+/// Where a place lies along an axis, posts from the first.
+fn position(g: &Geometry, axis: usize, at: f64) -> f64 {
+    (at - g.origin[axis]) / g.cell[axis] - 0.5
 }
 
 /// Post at or before a position, and the share of the way to the next.

@@ -114,9 +114,21 @@ struct Inputs<'a> {
     potential: Option<&'a Grid>,
 }
 
+/// What the samples of a window are made from.
+struct Surroundings {
+    /// Of the DEM.
+    posts: Part,
+    /// The altimetry that matters.
+    points: Points,
+    /// Of the measured albedo.
+    albedo: Option<Part>,
+}
+
 /// What all windows of an elaborated DEM have in common.
 struct Model {
     background: Arc<Background>,
+    /// The measured albedo.
+    albedo: Option<Background>,
     /// The background with the detail.
     world: World,
     notes: Vec<String>,
@@ -151,24 +163,28 @@ impl Elaborate {
     fn posts(&self, g: &Geometry, beyond_m: f64) -> Result<Part, DemError> {
         let ends = self.ends();
         let outer = [[g.x(0), g.x(g.cols - 1)], [g.y(g.rows - 1), g.y(0)]];
-        if (0..2).any(|a| !(ends[a][0] >= outer[a][0] && ends[a][1] <= outer[a][1])) {
+        if (0..2).any(|a| ends[a].iter().any(|at| !background::lies_between(g, a, *at))) {
             let four = |p: [[f64; 2]; 2]| [p[0][0], p[0][1], p[1][0], p[1][1]];
             return Err(DemError::Outside { dem: four(outer), window: four(ends) });
         }
-        Ok([0, 1].map(|a| {
-            let post = |at: f64| ((at.clamp(outer[a][0], outer[a][1]) - outer[a][0]) / g.cell[a]) as usize;
-            let count = [g.cols, g.rows][a];
-            post(ends[a][0] - beyond_m).saturating_sub(1)..(post(ends[a][1] + beyond_m) + 3).min(count)
-        }))
+        // The places of the outer samples to the last bit: `Background::at` looks at the posts around these.
+        let w = &self.window;
+        let low = self.place([w.x(0), w.y(0)]);
+        let high = self.place([w.x(w.cols - 1), w.y(w.rows - 1)]);
+        Ok([0, 1].map(|a| background::around(g, a, [low[a] - beyond_m, high[a] + beyond_m])))
+    }
+
+    /// How far from a sample the DEM must have data, posts.
+    fn margin(&self) -> usize {
+        if self.raw.processes.is_empty() { 0 } else { CRATER_POSTS }
     }
 
     /// Whether the posts of a part of a raster, and `margin` posts around it, have data.
     fn check_raster(&self, raster: &Grid, part: &Part, margin: usize) -> Result<(), DemError> {
         let [cols, rows] = part;
         let g = &raster.geometry;
-        let wide = |r: &Range<usize>, count: usize| r.start.saturating_sub(margin)..(r.end + margin).min(count);
-        for j in wide(rows, g.rows) {
-            for i in wide(cols, g.cols) {
+        for j in widened(rows, margin, g.rows) {
+            for i in widened(cols, margin, g.cols) {
                 let row = g.rows - 1 - j;
                 if !raster.at(row, i).is_finite() {
                     return Err(DemError::NoData { x: g.x(i), y: g.y(row) });
@@ -176,6 +192,21 @@ impl Elaborate {
             }
         }
         Ok(())
+    }
+
+    /// Whether the rasters can be used at all, whatever the window.
+    fn check_inputs(&self, inputs: &Inputs<'_>) -> Result<(), TerrainError> {
+        self.check_size(&inputs.dem.geometry).map_err(|e| self.dem().failed(&e))?;
+        let (Some(albedo), Some(name)) = (inputs.albedo, self.albedo()) else { return Ok(()) };
+        let g = &albedo.geometry;
+        self.check_size(g).map_err(|e| name.failed(&e))?;
+        match albedo.values.iter().position(|a| a.is_finite() && !(0.0..=1.0).contains(a)) {
+            None => Ok(()),
+            Some(k) => {
+                let (albedo, x, y) = (albedo.values[k], g.x(k % g.cols), g.y(k / g.cols));
+                Err(name.failed(&DemError::NoAlbedo { albedo, x, y }))
+            }
+        }
     }
 
     /// Whether a raster has enough posts, and farther apart than the samples.
@@ -271,21 +302,12 @@ impl Elaborate {
     }
 
     /// The measured albedo at the window's samples, with the detail of the processes.
-    fn measured_albedo(&self, albedo: &Grid, world: Bounded<'_>, patch: &mut Patch) -> Result<(), DemError> {
-        let g = albedo.geometry;
-        self.check_size(&g)?;
-        let part = self.posts(&g, 0.0)?;
-        self.check_raster(albedo, &part, 0)?;
-        if let Some(k) = albedo.values.iter().position(|a| a.is_finite() && !(0.0..=1.0).contains(a)) {
-            return Err(DemError::NoAlbedo { albedo: albedo.values[k], x: g.x(k % g.cols), y: g.y(k / g.cols) });
-        }
-        let measured = Background::new(without_holes(albedo));
-        let detail = self.detail(g, &part, |point| world.sample(point).albedo[0]);
+    fn measured_albedo(&self, measured: &Background, part: &Part, world: Bounded<'_>, patch: &mut Patch) {
+        let detail = self.detail(measured.geometry(), part, |point| world.sample(point).albedo[0]);
         self.change(&mut patch.albedo, |point, own| {
             let place = self.place(point);
             (measured.at(place) + (own - detail.at(place))).clamp(0.0, 1.0)
         });
-        Ok(())
     }
 
     /// What all windows have in common; of the processes act those at some places of the list.
@@ -298,7 +320,6 @@ impl Elaborate {
         let dem = inputs.dem;
         let of_dem = |e: DemError| self.dem().failed(&e);
         let g = &dem.geometry;
-        self.check_size(g).map_err(of_dem)?;
         let (processes, bound_note) = self.bounded(g.cell[0].min(g.cell[1])).map_err(of_dem)?;
         let potential = self.potential(inputs)?;
         let texture = self.texture(dem).map_err(of_dem)?;
@@ -307,56 +328,73 @@ impl Elaborate {
         let world = self.world(background.clone(), (&processes, potential), texture, anchor, streams, acts);
         let mut notes = texture.map_or_else(Vec::new, |t| self.texture_notes(&t, g));
         notes.extend(bound_note);
-        Ok(Model { background, world, notes })
+        let albedo = inputs.albedo.map(|albedo| Background::new(without_holes(albedo)));
+        Ok(Model { background, albedo, world, notes })
     }
 
-    /// The posts that the window is made from, and the altimetry that matters to it.
-    fn surroundings(&self, inputs: &Inputs<'_>) -> Result<(Part, Points), TerrainError> {
+    /// What the window is made from.
+    fn surroundings(&self, inputs: &Inputs<'_>) -> Result<Surroundings, TerrainError> {
         let (dem, of_dem) = (inputs.dem, |e: DemError| self.dem().failed(&e));
-        let g = &dem.geometry;
         let of_points = |e: AltimetryError| {
             let listed = || NamedInput::points("altimetry_points_m", "altimetry_points_m");
             self.altimetry().unwrap_or_else(listed).failed(&DemError::Altimetry(e))
         };
         let points = self.points(dem, &inputs.points).map_err(of_points)?;
+        let beyond_m = if points.is_empty() { 0.0 } else { self.altimetry_m(&dem.geometry) };
+        let posts = self.posts(&dem.geometry, beyond_m).map_err(of_dem)?;
+        let albedo = match (inputs.albedo, self.albedo()) {
+            (Some(albedo), Some(name)) => Some(self.posts(&albedo.geometry, 0.0).map_err(|e| name.failed(&e))?),
+            _ => None,
+        };
+        Ok(Surroundings { posts, points, albedo })
+    }
+
+    /// How far around a sample the ground matters to the altimetry that moves it, m.
+    fn altimetry_m(&self, g: &Geometry) -> f64 {
         // The lattice points around a point may lie one spacing beyond its reach.
-        let beyond_m = if points.is_empty() { 0.0 } else { g.cell[0].max(g.cell[1]) + 2.0 * self.spacing_m };
-        let posts = self.posts(g, beyond_m).map_err(of_dem)?;
-        let margin = if self.raw.processes.is_empty() { 0 } else { CRATER_POSTS };
-        self.check_raster(dem, &posts, margin).map_err(of_dem)?;
-        Ok((posts, points))
+        g.cell[0].max(g.cell[1]) + 2.0 * self.spacing_m
+    }
+
+    /// Whether there are data all around the window.
+    fn check_data(&self, inputs: &Inputs<'_>, around: &Surroundings) -> Result<(), TerrainError> {
+        self.check_raster(inputs.dem, &around.posts, self.margin()).map_err(|e| self.dem().failed(&e))?;
+        match (inputs.albedo, self.albedo(), &around.albedo) {
+            (Some(albedo), Some(name), Some(part)) => self.check_raster(albedo, part, 0).map_err(|e| name.failed(&e)),
+            _ => Ok(()),
+        }
     }
 
     /// Makes samples of the model into those of the surface, which goes through the posts and the altimetry; with a measured albedo its own.
     fn settle(
         &self,
-        inputs: &Inputs<'_>,
-        (posts, points): (Part, Points),
+        dem: Geometry,
+        around: &Surroundings,
         model: &Model,
         least_m: f64,
         patch: &mut Patch,
-    ) -> Result<Option<Correction>, TerrainError> {
+    ) -> Option<Correction> {
         let world = Bounded { world: &model.world, least_m };
-        let residual = self.detail(inputs.dem.geometry, &posts, |[i, j]| {
+        let residual = self.detail(dem, &around.posts, |[i, j]| {
             world.sample([i, j]).heights[0] - model.background.at(self.place([i as f64, j as f64]))
         });
         self.change(&mut patch.heights, |point, z| z - residual.at(self.place(point)));
-        let correction = (!points.is_empty()).then(|| self.correction(&points, world, &residual));
+        let correction = (!around.points.is_empty()).then(|| self.correction(&around.points, world, &residual));
         if let Some(correction) = &correction {
             self.change(&mut patch.heights, |point, z| z + correction.at(point));
         }
-        if let (Some(albedo), Some(name)) = (inputs.albedo, self.albedo()) {
-            self.measured_albedo(albedo, world, patch).map_err(|e| name.failed(&e))?;
+        if let (Some(albedo), Some(part)) = (&model.albedo, &around.albedo) {
+            self.measured_albedo(albedo, part, world, patch);
         }
-        Ok(correction)
+        correction
     }
 
     fn refine(&self, streams: &Streams, inputs: &Inputs<'_>) -> Result<Terrain, TerrainError> {
-        self.check_size(&inputs.dem.geometry).map_err(|e| self.dem().failed(&e))?;
-        let surroundings = self.surroundings(inputs)?;
+        self.check_inputs(inputs)?;
+        let around = self.surroundings(inputs)?;
+        self.check_data(inputs, &around)?;
         let model = self.model(streams, inputs, |_| true)?;
         let mut patch = model.world.tiled_patch(&self.window);
-        let correction = self.settle(inputs, surroundings, &model, 0.0, &mut patch)?;
+        let correction = self.settle(inputs.dem.geometry, &around, &model, 0.0, &mut patch);
         let mut maps = planetary::maps(&model.world, self.geometry(), &patch);
         if inputs.albedo.is_some() && model.world.albedo.is_none() {
             maps.push(Map { name: "albedo", values: planetary::to_grid(self.geometry(), &patch.albedo) });
@@ -438,6 +476,11 @@ impl Bounded<'_> {
     fn sample(self, [west, south]: [i64; 2]) -> Patch {
         self.world.made(&Request { window: point(west, south), feature_min_m: self.least_m, cancel: None })
     }
+}
+
+/// Some posts, and `margin` more on either side where there are.
+fn widened(posts: &Range<usize>, margin: usize, count: usize) -> Range<usize> {
+    posts.start.saturating_sub(margin)..(posts.end + margin).min(count)
 }
 
 /// The window of one lattice point.

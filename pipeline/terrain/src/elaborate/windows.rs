@@ -1,22 +1,67 @@
 //! Windows of an elaborated DEM on the lattice of its parameters: all of one surface, at any zoom up to half the posts.
 
-use super::{Elaborate, Model, RawElaborate, point};
+use super::background::{around, lies_between};
+use super::{Elaborate, Model, RawElaborate, point, widened};
 use crate::generator::{Input, TerrainError};
 use crate::planetary::{Patch, Request, SAND, Window};
 use crate::windows::Windows;
-use sastrugi_numeric::{Geometry, Streams};
+use sastrugi_numeric::{Geometry, Grid, Streams};
 use std::ops::Range;
+use std::sync::Arc;
 use std::sync::atomic::Ordering;
-
-/// A window near posts without data is halved down to this many samples, so that only its part without ground is left out.
-const SIDE_MIN: usize = 16;
 
 /// A DEM with its detail.
 pub struct Elaborated {
     form: Elaborate,
-    inputs: Vec<Input>,
+    inputs: Arc<[Input]>,
     model: Model,
     dem: Geometry,
+    /// Of the DEM and of the measured albedo.
+    cover: Vec<Cover>,
+}
+
+/// Where the posts of a raster carry ground: a sample has ground where all posts that it depends on have data. That depends on the place of the
+/// sample alone, so that all windows agree.
+struct Cover {
+    geometry: Geometry,
+    /// How far around a sample posts matter to it, m.
+    beyond_m: f64,
+    /// How many posts more around those.
+    margin: usize,
+    /// Posts without data south and west of a corner of the posts: rows from the south of one more than there are columns.
+    missing: Vec<u32>,
+}
+
+impl Cover {
+    fn of(raster: &Grid, beyond_m: f64, margin: usize) -> Self {
+        let geometry = raster.geometry;
+        let (rows, cols) = (geometry.rows, geometry.cols);
+        let mut missing = vec![0; (rows + 1) * (cols + 1)];
+        for row in 0..rows {
+            let mut of_row = 0;
+            for col in 0..cols {
+                of_row += u32::from(!raster.at(rows - 1 - row, col).is_finite());
+                missing[(row + 1) * (cols + 1) + col + 1] = missing[row * (cols + 1) + col + 1] + of_row;
+            }
+        }
+        Self { geometry, beyond_m, margin, missing }
+    }
+
+    /// The columns or rows (from the south) of posts that a place along an axis depends on; `None` beyond the outer posts.
+    fn posts(&self, axis: usize, at_m: f64) -> Option<Range<usize>> {
+        let g = &self.geometry;
+        lies_between(g, axis, at_m).then(|| {
+            let posts = around(g, axis, [at_m - self.beyond_m, at_m + self.beyond_m]);
+            widened(&posts, self.margin, [g.cols, g.rows][axis])
+        })
+    }
+
+    /// Whether all posts of a part have data.
+    fn is_whole(&self, cols: &Range<usize>, rows: &Range<usize>) -> bool {
+        let south_west = |row: usize, col: usize| self.missing[row * (self.geometry.cols + 1) + col];
+        south_west(rows.end, cols.end) + south_west(rows.start, cols.start)
+            == south_west(rows.start, cols.end) + south_west(rows.end, cols.start)
+    }
 }
 
 impl Elaborate {
@@ -27,13 +72,17 @@ impl Elaborate {
     pub fn elaborated(
         &self,
         streams: &Streams,
-        inputs: &[Input],
+        inputs: &Arc<[Input]>,
         acts: impl Fn(usize) -> bool,
     ) -> Result<Elaborated, TerrainError> {
         let sorted = self.sorted(inputs)?;
+        self.check_inputs(&sorted)?;
         let model = self.model(streams, &sorted, acts)?;
         let dem = sorted.dem.geometry;
-        Ok(Elaborated { form: self.clone(), inputs: inputs.to_vec(), model, dem })
+        let beyond_m = if sorted.points.is_empty() { 0.0 } else { self.altimetry_m(&dem) };
+        let albedo = sorted.albedo.map(|albedo| Cover::of(albedo, 0.0, 0));
+        let cover = std::iter::once(Cover::of(sorted.dem, beyond_m, self.margin())).chain(albedo).collect();
+        Ok(Elaborated { form: self.clone(), inputs: Arc::clone(inputs), model, dem, cover })
     }
 
     /// Basic spacing, m.
@@ -75,58 +124,53 @@ impl Elaborated {
         self.form.place(point)
     }
 
-    /// Columns or rows of a window that lie between the outer posts.
-    fn inside(&self, axis: usize, count: usize, at: impl Fn(usize) -> f64) -> Range<usize> {
-        let g = &self.dem;
-        let [low, high] = [[g.x(0), g.x(g.cols - 1)], [g.y(g.rows - 1), g.y(0)]][axis];
-        let place = |n: usize| at(n) * self.form.spacing_m + self.form.offset_m[axis];
-        let first = (0..count).position(|n| place(n) >= low).unwrap_or(count);
-        let last = (0..count).rposition(|n| place(n) <= high).map_or(0, |n| n + 1);
-        first..last.max(first)
-    }
-
-    /// Makes the samples in some columns and rows of a window.
-    fn fill(&self, request: &Request<'_>, cols: Range<usize>, rows: Range<usize>, into: &mut Patch) {
-        if cols.is_empty() || rows.is_empty() || request.cancel.is_some_and(|flag| flag.load(Ordering::Relaxed)) {
-            return;
-        }
-        let whole = request.window;
-        let (west, south) = (whole.west + cols.start as i64, whole.south + rows.start as i64);
-        let window = Window { west, south, cols: cols.len(), rows: rows.len(), ..whole };
-        match self.made(&Request { window, ..*request }) {
-            Ok(made) => into.lay(&made, [cols.start, rows.start]),
-            Err(_) if cols.len().max(rows.len()) > SIDE_MIN => {
-                let halves = |r: Range<usize>| {
-                    let middle = r.start + r.len().div_ceil(2);
-                    [r.start..middle, middle..r.end]
-                };
-                for rows in halves(rows) {
-                    halves(cols.clone()).into_iter().for_each(|cols| self.fill(request, cols, rows.clone(), into));
+    /// Which samples of a window have ground, row by row from the south.
+    fn has_ground(&self, window: &Window) -> Vec<bool> {
+        let mut has = vec![true; window.len()];
+        for cover in &self.cover {
+            let place = |n: usize| self.place([window.x(n), window.y(n)]);
+            let cols: Vec<_> = (0..window.cols).map(|n| cover.posts(0, place(n)[0])).collect();
+            for (n, line) in has.chunks_exact_mut(window.cols).enumerate() {
+                let rows = cover.posts(1, place(n)[1]);
+                for (has, cols) in line.iter_mut().zip(&cols) {
+                    *has &= rows.as_ref().zip(cols.as_ref()).is_some_and(|(rows, cols)| cover.is_whole(cols, rows));
                 }
             }
-            // Posts without data: there is no ground.
-            // Posts without data: there is no ground.
-            Err(_) => {}
         }
+        has
     }
 
+    /// The samples of a window all of which lie between the outer posts; those without ground are of no use.
     fn made(&self, request: &Request<'_>) -> Result<Patch, TerrainError> {
         let here = self.form.in_window(request.window);
-        let inputs = here.sorted(&self.inputs)?;
-        let surroundings = here.surroundings(&inputs)?;
+        let around = here.surroundings(&here.sorted(&self.inputs)?)?;
         let mut patch = self.model.world.made(request);
-        here.settle(&inputs, surroundings, &self.model, request.feature_min_m, &mut patch)?;
+        here.settle(self.dem, &around, &self.model, request.feature_min_m, &mut patch);
         Ok(patch)
     }
 }
 
+/// The least window of those columns and rows that holds all of some samples.
+fn least_around(window: &Window, wanted: &[bool]) -> Option<[Range<usize>; 2]> {
+    let row = |row: &usize| wanted[row * window.cols..(row + 1) * window.cols].contains(&true);
+    let col = |col: &usize| wanted[*col..].iter().step_by(window.cols).any(|wanted| *wanted);
+    let (rows, cols) = (0..window.rows, 0..window.cols);
+    let rows = rows.clone().find(row)?..rows.rev().find(row)? + 1;
+    Some([cols.clone().find(col)?..cols.rev().find(col)? + 1, rows])
+}
+
 impl Windows for Elaborated {
     fn patch_for(&self, request: &Request<'_>) -> Option<Patch> {
-        let window = request.window;
-        let mut patch = Patch::void(window);
-        let cols = self.inside(0, window.cols, |n| window.x(n));
-        let rows = self.inside(1, window.rows, |n| window.y(n));
-        self.fill(request, cols, rows, &mut patch);
+        let whole = request.window;
+        let mut patch = Patch::void(whole);
+        let has_ground = self.has_ground(&whole);
+        if let Some([cols, rows]) = least_around(&whole, &has_ground) {
+            let (west, south) = (whole.west + cols.start as i64, whole.south + rows.start as i64);
+            let window = Window { west, south, cols: cols.len(), rows: rows.len(), ..whole };
+            let made = self.made(&Request { window, ..*request }).ok()?;
+            patch.lay(&made, [cols.start, rows.start]);
+            patch.clear(|k| !has_ground[k]);
+        }
         (!request.cancel.is_some_and(|flag| flag.load(Ordering::Relaxed))).then_some(patch)
     }
 
@@ -161,6 +205,14 @@ impl Patch {
             albedo: vec![f64::NAN; count],
             class: vec![SAND; count],
             rock_potential: vec![f64::NAN; count],
+        }
+    }
+
+    /// Takes the ground from some samples.
+    fn clear(&mut self, which: impl Fn(usize) -> bool) {
+        for k in (0..self.heights.len()).filter(|k| which(*k)) {
+            (self.heights[k], self.albedo[k], self.rock_potential[k]) = (f64::NAN, f64::NAN, f64::NAN);
+            self.class[k] = SAND;
         }
     }
 

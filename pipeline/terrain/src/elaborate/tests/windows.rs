@@ -1,14 +1,13 @@
 //! Windows of one elaborated DEM, as a server asks for them.
 
 use super::*;
-use crate::planetary::SAND;
 use crate::windows::Windows;
 
 fn surface(params: Value, inputs: &[Input]) -> Elaborated {
     let mut all = json!({"dem": "site", "cell_m": 0.16, "basic_spacing_m": 0.01, "origin_m": [105.0, 205.0], "size_px": [16, 16]});
     all.as_object_mut().unwrap().extend(params.as_object().unwrap().clone());
     let form = Elaborate::try_from(crate::registry::read::<RawElaborate>(&all).unwrap()).unwrap();
-    form.elaborated(&streams(), inputs, |_| true).unwrap()
+    form.elaborated(&streams(), &Arc::from(inputs), |_| true).unwrap()
 }
 
 fn request(zoom: u32, first: [i64; 2], [cols, rows]: [usize; 2], least_m: f64) -> Request<'static> {
@@ -62,39 +61,72 @@ fn val_bounded_windows_keep_the_posts() {
     }
 }
 
-/// Beyond the outer posts, and beside posts without data, there is no ground; elsewhere the ground is as without the hole.
+/// Beyond the outer posts, and beside posts without data, there is no ground: where exactly depends on the sample alone. Elsewhere the ground is as
+/// without the hole.
 #[test]
 fn val_holes_and_edges_have_no_ground() {
     let dem = site(60, 60, [1.28, 1.28]);
-    let given = json!({"hurst": 0.7, "roughness_m": 0.05});
-    let whole = surface(given.clone(), &[dem.clone().into()]);
     let mut holed = dem.clone();
-    holed.values[30 * 60 + 30] = f64::NAN;
-    let all = surface(given, &[holed.into()]);
-    let asked = request(5, [300, 620], [300, 300], 0.0);
-    let (patch, right) = (all.patch_for(&asked).unwrap(), whole.patch_for(&asked).unwrap());
-    let mut counts = [0; 3];
-    for k in 0..patch.heights.len() {
-        let place = all.place([asked.window.x(k % 300), asked.window.y(k / 300)]);
-        let g = &dem.geometry;
-        let inside = place[0] >= g.x(0) && place[0] <= g.x(59) && place[1] >= g.y(59) && place[1] <= g.y(0);
-        let from_hole = [place[0] - g.x(30), place[1] - g.y(30)].map(|d| d.abs() / 1.28);
-        let kind = match (patch.heights[k].is_nan(), inside) {
-            (true, false) => 0,
-            (true, true) => {
-                // Two posts on either side are needed, and a part of 16 samples is left out as one: 4 posts.
-                assert!(from_hole.iter().all(|d| *d < 2.0 + 1.0 + 16.0 * 0.32 / 1.28), "{place:?}");
-                1
-            }
-            (false, true) => {
-                assert!((patch.heights[k] - right.heights[k]).abs() < 1e-9, "{place:?}");
-                assert!(from_hole.iter().any(|d| *d > 1.0));
-                2
-            }
-            (false, false) => panic!("ground beyond the posts at {place:?}"),
-        };
-        counts[kind] += 1;
+    for k in [30 * 60 + 30, 30 * 60 + 31, 12 * 60 + 50] {
+        holed.values[k] = f64::NAN;
     }
-    assert!(counts.iter().all(|n| *n > 100), "{counts:?}");
-    assert!(patch.class.iter().all(|c| *c == SAND));
+    let points = json!([[118.3, 219.1, 9.0]]);
+    let given = json!({"hurst": 0.7, "roughness_m": 0.05});
+    let more = json!({"hurst": 0.7, "roughness_m": 0.05, "processes": processes(), "altimetry_points_m": points});
+    // Posts that a sample depends on: two on either side; with processes and altimetry 8 and one more.
+    for (given, reach) in [(given, 2.0), (more, 2.0 + 8.0 + 1.5)] {
+        let (whole, all) = (surface(given.clone(), &[dem.clone().into()]), surface(given, &[holed.clone().into()]));
+        let asked = request(5, [300, 620], [300, 300], 1.0);
+        let (patch, right) = (all.patch_for(&asked).unwrap(), whole.patch_for(&asked).unwrap());
+        let g = &dem.geometry;
+        let mut counts = [0; 3];
+        for k in 0..patch.heights.len() {
+            let place = all.place([asked.window.x(k % 300), asked.window.y(k / 300)]);
+            let inside = place[0] >= g.x(0) && place[0] <= g.x(59) && place[1] >= g.y(59) && place[1] <= g.y(0);
+            let from = |row: usize, col: usize| {
+                [place[0] - g.x(col), place[1] - g.y(row)].iter().fold(0.0, |most: f64, d| most.max(d.abs() / 1.28))
+            };
+            let from_hole = from(30, 30).min(from(30, 31)).min(from(12, 50));
+            let kind = match (patch.heights[k].is_nan(), inside) {
+                (true, false) => 0,
+                (true, true) => {
+                    assert!(from_hole < reach + 0.01, "{place:?}");
+                    1
+                }
+                (false, true) => {
+                    assert!((patch.heights[k] - right.heights[k]).abs() < 1e-9, "{place:?}");
+                    assert!(from_hole > reach - 1.01, "{place:?}");
+                    2
+                }
+                (false, false) => panic!("ground beyond the posts at {place:?}"),
+            };
+            counts[kind] += 1;
+        }
+        assert!(counts.iter().all(|n| *n > 100), "{counts:?}");
+        // Points and small windows along the edges of the holes.
+        let ([west, south], side) = ([asked.window.west, asked.window.south], 300);
+        for k in (0..side * side).step_by(61) {
+            let (col, row) = (k % side, k / side);
+            let size = [1 + k % 7, 1 + k % 5].map(|n| n.min(side - col.max(row)));
+            let part = all.patch_for(&request(5, [west + col as i64, south + row as i64], size, 1.0)).unwrap();
+            for (n, z) in part.heights.iter().enumerate() {
+                let own = patch.heights[(row + n / size[0]) * side + col + n % size[0]];
+                assert!(z.to_bits() == own.to_bits() || (z.is_nan() && own.is_nan()), "{row} {col} {n}: {z} {own}");
+            }
+        }
+    }
+}
+
+/// A sample on the outer post itself has ground, alone as in a window.
+#[test]
+fn val_the_outer_posts_have_ground() {
+    let dem = site(40, 40, [1.28, 1.28]);
+    let all = surface(json!({"hurst": 0.7, "roughness_m": 0.05}), &[dem.clone().into()]);
+    let g = &dem.geometry;
+    let (post, zero) = ([g.x(39), g.y(0)], all.place([0.0; 2]));
+    let corner = [0, 1].map(|a| ((post[a] - zero[a]) / 0.01).round() as i64);
+    let alone = all.patch_for(&request(0, corner, [1, 1], 0.0)).unwrap().heights[0];
+    assert!((alone - dem.at(0, 39)).abs() < 0.01, "{alone}");
+    let beside = all.patch_for(&request(0, [corner[0] - 40, corner[1] - 40], [41, 41], 0.0)).unwrap();
+    assert_eq!(beside.heights[41 * 41 - 1].to_bits(), alone.to_bits());
 }
