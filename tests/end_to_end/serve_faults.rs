@@ -497,19 +497,21 @@ fn val_floods_are_refused() {
 fn val_who_cannot_be_served_now_is_told_when() {
     let folder = area();
     write(folder.path(), "world.toml", SLOW);
-    let large = &|k: usize| {
-        format!("{PATCH}?origin={},0&size=2048,2048&resolution_m={STEP_M}&format=raw", k as f64 * 2048.0 * STEP_M)
+    // Four tiles each, of which no other has one.
+    let across = &|k: usize| {
+        let [x, y] = [512 * k + 128, 128].map(|n| n as f64 * STEP_M);
+        format!("{PATCH}?origin={x:?},{y:?}&size=256,256&resolution_m={STEP_M}&format=raw")
     };
     let tile = &|k: usize| {
         format!("{PATCH}?origin={},0&size=256,256&resolution_m={STEP_M}&format=raw", k as f64 * 256.0 * STEP_M)
     };
     let small = format!("{PATCH}?origin=0,-20&size=16,16&resolution_m={STEP_M}&format=raw");
     let truth = Server::start(folder.path(), &["world.toml"], &[]).get(&small);
-    // 64 tiles each, of which 16 wait at once; one worker has a queue of 256.
+    // One worker has a queue of 256.
     let server = Server::start(folder.path(), &["world.toml", "--threads", "1"], &[]);
-    let mut waiting: Vec<Client> = (0..24).map(|_| server.client().unwrap()).collect();
+    let mut waiting: Vec<Client> = (0..100).map(|_| server.client().unwrap()).collect();
     for (k, client) in waiting.iter_mut().enumerate() {
-        write!(client.stream(), "GET {} HTTP/1.1\r\nHost: localhost\r\n\r\n", large(k)).unwrap();
+        write!(client.stream(), "GET {} HTTP/1.1\r\nHost: localhost\r\n\r\n", across(k)).unwrap();
     }
     let turned_away =
         waiting.iter_mut().rev().map(|client| client.answer_into(&mut Vec::new()).unwrap()).find(|a| a.0 == 503);

@@ -1,23 +1,9 @@
 //! Schemathesis generates requests from the description of the terrain server's API and judges the answers by it.
 
-use sastrugi_tests::server::Server;
+use sastrugi_tests::server::{Server, WORLD};
 use sastrugi_tests::{area, called, write};
 use std::process::Command;
 
-const WORLD: &str = r#"
-kind = "planetary"
-seed = 11
-size_px = [300, 200]
-cell_m = 0.02
-basic_spacing_m = 0.005
-origin_m = [-1.0, 2.0]
-processes = [
-    { kind = "texture" },
-    { kind = "primary_craters", diameter_max_m = 200.0 },
-    { kind = "rocks", coverage = 0.118 },
-    { kind = "albedo" },
-]
-"#;
 /// Generated requests of each operation and phase.
 const EXAMPLES: &str = "200";
 

@@ -7,6 +7,22 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
+/// A small world with most of what worlds have.
+pub const WORLD: &str = r#"
+kind = "planetary"
+seed = 11
+size_px = [300, 200]
+cell_m = 0.02
+basic_spacing_m = 0.005
+origin_m = [-1.0, 2.0]
+processes = [
+    { kind = "texture" },
+    { kind = "primary_craters", diameter_max_m = 200.0 },
+    { kind = "rocks", coverage = 0.118 },
+    { kind = "albedo" },
+]
+"#;
+
 /// A running server; killed when dropped.
 pub struct Server {
     process: Child,

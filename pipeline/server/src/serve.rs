@@ -5,6 +5,7 @@ use crate::http::answer::Answers;
 use crate::http::guard::Peer;
 use crate::http::jobs::Jobs;
 use crate::http::metrics::Metrics;
+use crate::http::service::ROOM_UNITS;
 use crate::http::{Limits, Service, router};
 use crate::library::{Library, LibraryError, Settings as LibrarySettings};
 use axum::http::HeaderValue;
@@ -101,6 +102,7 @@ pub fn serve(
         metrics: Metrics::default(),
         under_way: Mutex::default(),
         sending: AtomicU64::new(0),
+        room: Arc::new(Semaphore::new(ROOM_UNITS)),
         processors: Arc::new(Semaphore::new(settings.library.workers.max(1))),
     });
     ready(address, &service.collections);

@@ -53,10 +53,10 @@ impl Memory {
 }
 
 /// The levels of a raster, from the file's own to one of few samples.
-type Pyramid = Vec<Level>;
+pub type Pyramid = Vec<Level>;
 
 /// The samples of one level: those of the file, or means of 2 x 2 of the level below.
-struct Level {
+pub struct Level {
     geometry: Geometry,
     samples: Samples,
 }
@@ -85,13 +85,26 @@ impl Raster {
         self.files.maps.contains_key(map)
     }
 
-    /// Its levels. Reads the files where memory does not have them: not for the threads of the runtime.
-    fn levels(&self) -> Result<Arc<Pyramid>, Problem> {
-        let read = || self.read().map(Arc::new);
-        self.memory.0.get_or_insert_with(&self.digest, read).map_err(Problem::internal)
+    /// Its levels: from memory, or those that `read` gives. One request reads however many wait.
+    ///
+    /// # Errors
+    /// Those of `read`.
+    pub async fn levels(
+        &self,
+        read: impl Future<Output = Result<Arc<Pyramid>, Problem>>,
+    ) -> Result<Arc<Pyramid>, Problem> {
+        self.memory.0.get_or_insert_async(&self.digest, read).await
     }
 
-    fn read(&self) -> Result<Pyramid, String> {
+    /// Reads its levels from its files.
+    ///
+    /// # Errors
+    /// Files that cannot be read, or are not those that were sealed.
+    pub fn read(&self) -> Result<Arc<Pyramid>, Problem> {
+        self.pyramid().map(Arc::new).map_err(Problem::internal)
+    }
+
+    fn pyramid(&self) -> Result<Pyramid, String> {
         let heights = sealed(&self.files.heights)?;
         let map = |name: &str| -> Result<Option<Vec<f32>>, String> {
             let Some(file) = self.files.maps.get(name) else { return Ok(None) };
@@ -120,25 +133,18 @@ impl Raster {
         Ok(levels)
     }
 
-    /// Samples at the places `(x0 + col step, y0 - row step)`, bilinear between the cells of the file.
-    ///
-    /// # Errors
-    /// Files that cannot be read, or are not those that were sealed.
-    pub fn samples(&self, [x0, y0]: [f64; 2], step_m: f64, shape: [usize; 2]) -> Result<Samples, Problem> {
-        Ok(self.levels()?[0].at(&self.geometry, [x0, y0], step_m, shape))
+    /// Samples at the places `(x0 + col step, y0 - row step)`, bilinear between the cells of the file, its first level.
+    pub fn samples(&self, levels: &Pyramid, [x0, y0]: [f64; 2], step_m: f64, shape: [usize; 2]) -> Samples {
+        levels[0].at(&self.geometry, [x0, y0], step_m, shape)
     }
 
     /// The samples of a tile and one cell more on every side, from means of cells about as wide.
-    ///
-    /// # Errors
-    /// Files that cannot be read, or are not those that were sealed.
-    pub fn tile(&self, tile: TileIndex) -> Result<Samples, Problem> {
-        let levels = self.levels()?;
+    pub fn tile(&self, levels: &Pyramid, tile: TileIndex) -> Samples {
         let step_m = self.grid.resolution_m(tile.level);
         let [west, north] = self.grid.corner_m(tile);
         let level = (self.grid.levels - 1 - tile.level) as usize;
         let level = &levels[level.min(levels.len() - 1)];
-        Ok(level.at(&self.geometry, [west - 0.5 * step_m, north + 0.5 * step_m], step_m, [TILE + 2; 2]))
+        level.at(&self.geometry, [west - 0.5 * step_m, north + 0.5 * step_m], step_m, [TILE + 2; 2])
     }
 }
 

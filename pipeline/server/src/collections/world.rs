@@ -8,14 +8,14 @@ use crate::grid::{TILE, TileGrid, TileIndex};
 use crate::http::Problem;
 use crate::library::{Library, Priority, TileKey, Unavailable};
 use crate::samples::Samples;
+use quick_cache::sync::Cache;
 use sastrugi_numeric::Geometry;
 use sastrugi_stages::Error;
 use sastrugi_stages::verbs::served::ServedWorld;
 use sastrugi_terrain::planetary::{self, Patch, Request, Window};
 use sastrugi_terrain::{Input, Windows};
 use serde_json::{Value, json};
-use std::collections::HashMap;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 use tokio::task::JoinSet;
 
 /// Levels of the map: 256 pixels over the whole square to the finest.
@@ -68,9 +68,6 @@ impl Piece {
     }
 }
 
-/// Grounds by the processes that act, as [`Selection`] names them.
-type Grounds = HashMap<Option<Vec<usize>>, Arc<dyn Windows>>;
-
 /// A world.
 pub struct World {
     served: ServedWorld,
@@ -83,7 +80,10 @@ pub struct World {
     offset_m: [f64; 2],
     /// Most doublings of the basic spacing.
     zoom_max: u32,
-    grounds: Mutex<Grounds>,
+    /// The ground that all processes make.
+    whole: Arc<dyn Windows>,
+    /// Grounds that some of the processes make, by their places in the list.
+    parts: Cache<Vec<usize>, Arc<dyn Windows>>,
 }
 
 impl World {
@@ -107,39 +107,39 @@ impl World {
         let inputs: Vec<String> = served.inputs.iter().map(content).collect();
         let what = format!("{} {} {parameters} {offset_m:?} {inputs:?}", crate::revision(), served.streams.label());
         let digest = super::digest(&what);
-        let range_m = [0.0; 2];
-        let mut world = Self { served, grid, digest, range_m, offset_m, zoom_max, grounds: Mutex::default() };
-        world.range_m = world.look()?;
+        let (whole, range_m) = (served.ground(|_| true)?, [0.0; 2]);
+        let parts = Cache::new(GROUNDS);
+        let mut world = Self { served, grid, digest, range_m, offset_m, zoom_max, whole, parts };
+        world.range_m = world.look();
         Ok(world)
     }
 
     /// Heights that nine tenths of the map lie between, by some of its samples.
-    fn look(&self) -> Result<[f64; 2], Error> {
+    fn look(&self) -> [f64; 2] {
         let [west, south, east, north] = self.grid.bounds_m();
         let zoom = self.zoom_below((east - west).max(north - south) / LOOK as f64);
         let step = self.step_m(zoom);
         let [west, south] = self.to_lattice([west, south]).map(|m| (m / step).round() as i64);
         let window = Window { zoom, west, south, cols: LOOK, rows: LOOK, centred: false };
         let request = Request { window, feature_min_m: FEATURE_PIXELS * step, cancel: None };
-        let patch = self.ground(&None)?.patch_for(&request);
+        let patch = self.whole.patch_for(&request);
         let mut heights = patch.map_or_else(Vec::new, |patch| patch.heights);
         heights.retain(|z| z.is_finite());
         heights.sort_by(f64::total_cmp);
         let part = |share: f64| heights.get((share * heights.len() as f64) as usize).copied().unwrap_or_default();
-        Ok([part(0.05), part(0.95)])
+        [part(0.05), part(0.95)]
     }
 
-    fn ground(&self, phenomena: &Option<Vec<usize>>) -> Result<Arc<dyn Windows>, Error> {
-        let mut grounds = self.grounds.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(ground) = grounds.get(phenomena) {
-            return Ok(Arc::clone(ground));
-        }
-        if grounds.len() >= GROUNDS {
-            grounds.clear();
-        }
-        let made = self.served.ground(|place| phenomena.as_ref().is_none_or(|list| list.contains(&place)))?;
-        grounds.insert(phenomena.clone(), Arc::clone(&made));
-        Ok(made)
+    /// The ground that some of its processes make. One is made once however many ask for it, and not on the threads of the runtime: an input may be
+    /// large.
+    async fn ground(self: &Arc<Self>, phenomena: &Option<Vec<usize>>) -> Result<Arc<dyn Windows>, Problem> {
+        let Some(places) = phenomena else { return Ok(Arc::clone(&self.whole)) };
+        let make = async {
+            let (world, acting) = (Arc::clone(self), places.clone());
+            let made = tokio::task::spawn_blocking(move || world.served.ground(|place| acting.contains(&place)));
+            made.await.map_err(|e| Problem::internal(e.to_string()))?.map_err(|e| Problem::internal(e.to_string()))
+        };
+        self.parts.get_or_insert_async(places, make).await
     }
 
     /// A place as distances from lattice point 0, m.
@@ -185,7 +185,7 @@ impl World {
 
     /// Whether it has an albedo, and rocks.
     pub fn has(&self) -> [bool; 2] {
-        self.ground(&None).map_or([false; 2], |ground| [ground.has_albedo(), ground.has_rocks()])
+        [self.whole.has_albedo(), self.whole.has_rocks()]
     }
 
     /// Its processes.
@@ -341,7 +341,7 @@ impl World {
     /// # Errors
     /// A library that has no room for the request.
     pub async fn map_tile(
-        &self,
+        self: &Arc<Self>,
         maker: &Maker,
         tile: TileIndex,
         phenomena: Option<&[usize]>,
@@ -361,13 +361,18 @@ impl World {
     }
 
     /// The samples of one window, as the library keeps them.
-    async fn window(&self, maker: &Maker, window: Window, selection: &Selection) -> Result<Arc<Samples>, Problem> {
+    async fn window(
+        self: &Arc<Self>,
+        maker: &Maker,
+        window: Window,
+        selection: &Selection,
+    ) -> Result<Arc<Samples>, Problem> {
         let Window { zoom, west, south, cols, rows, centred } = window;
         let key = TileKey::new(format!(
             "{} {:?} {:?} {zoom} {west} {south} {cols} {rows} {centred}",
             self.digest, selection.phenomena, selection.feature_min_m
         ));
-        let ground = self.made_of(&selection.phenomena)?;
+        let ground = self.ground(&selection.phenomena).await?;
         self.check_seconds(&*ground, &window, selection.feature_min_m, [1.0, TILE_SECONDS])?;
         let feature_min_m = selection.feature_min_m;
         let make = move |cancel: &std::sync::atomic::AtomicBool| {
@@ -380,17 +385,18 @@ impl World {
         })
     }
 
-    /// The ground of some of its processes.
-    fn made_of(&self, phenomena: &Option<Vec<usize>>) -> Result<Arc<dyn Windows>, Problem> {
-        self.ground(phenomena).map_err(|e| Problem::internal(e.to_string()))
-    }
-
     /// Refuses tiles of the lattice that are expected to take too long: all of them together, or one.
     ///
     /// # Errors
     /// A sentence with a `feature_min_m` that would do.
-    pub fn check_work(&self, zoom: u32, tiles: u64, selection: &Selection, seconds_max: f64) -> Result<(), Problem> {
-        let ground = self.made_of(&selection.phenomena)?;
+    pub async fn check_work(
+        self: &Arc<Self>,
+        zoom: u32,
+        tiles: u64,
+        selection: &Selection,
+        seconds_max: f64,
+    ) -> Result<(), Problem> {
+        let ground = self.ground(&selection.phenomena).await?;
         let window = Window { zoom, west: 0, south: 0, cols: TILE, rows: TILE, centred: false };
         self.check_seconds(&*ground, &window, selection.feature_min_m, [1.0, TILE_SECONDS])?;
         self.check_seconds(&*ground, &window, selection.feature_min_m, [tiles as f64, seconds_max])
@@ -433,7 +439,7 @@ impl World {
     /// # Errors
     /// A library that has no room for the request.
     pub async fn lattice_tile(
-        &self,
+        self: &Arc<Self>,
         maker: &Maker,
         zoom: u32,
         [col, row]: [i64; 2],
@@ -514,7 +520,7 @@ impl World {
             return self.window(maker, window, selection).await.map(|samples| Samples::clone(&samples));
         }
         let places = Self::tiles_of(first, shape);
-        self.check_work(zoom, places.len() as u64, selection, maker.seconds_max)?;
+        self.check_work(zoom, places.len() as u64, selection, maker.seconds_max).await?;
         let mut places = places.into_iter();
         let (mut tiles, mut made) = (JoinSet::new(), None::<Samples>);
         loop {

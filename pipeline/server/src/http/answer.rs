@@ -12,6 +12,8 @@ use std::ops::Range;
 
 /// Longer answers are sent as they are: packing them would keep the runtime's threads from other clients, bytes.
 const PACKED_MAX: usize = 4 << 20;
+/// Longer parts of an answer are not copied, bytes; they count among those on their way to clients.
+const COPIED_MAX: usize = 256 << 10;
 /// Endings of the tags of packed answers.
 const ENCODINGS: [&str; 2] = ["gzip", "zstd"];
 
@@ -82,13 +84,19 @@ impl Answers {
             Ok(answer) => answer,
             // Who leaves drops the guard, and the next that waits makes it.
             Err(guard) => {
-                let Some(made) = make.await? else { return Ok(StatusCode::NO_CONTENT.into_response()) };
+                let Some(made) = make.await? else {
+                    return Ok(self.scoped(fresh(StatusCode::NO_CONTENT.into_response(), &format!("\"{tag}\""))));
+                };
                 // One that is too large to be kept comes back.
                 let _ = guard.insert(made.clone());
                 made
             }
         };
-        Ok(self.scoped(fresh(whole_or_part(headers, &tag, answer), &format!("\"{tag}\""))))
+        let tag = format!("\"{tag}\"");
+        if has_any(headers) {
+            return Ok(self.scoped(not_modified(tag)));
+        }
+        Ok(self.scoped(fresh(whole_or_part(headers, &tag, answer), &tag)))
     }
 
     fn scoped(&self, mut response: Response) -> Response {
@@ -110,6 +118,11 @@ pub fn held(headers: &HeaderMap, tag: &str) -> Option<String> {
     let listed = headers.get_all(header::IF_NONE_MATCH).iter().filter_map(|value| value.to_str().ok());
     let mut own = listed.flat_map(|list| list.split(',')).map(|one| one.trim().trim_start_matches("W/"));
     own.find(|own| is_tag(own, tag)).map(str::to_owned)
+}
+
+/// Whether the client wants the answer only where there is none, `If-None-Match: *`.
+fn has_any(headers: &HeaderMap) -> bool {
+    headers.get(header::IF_NONE_MATCH).is_some_and(|value| value.as_bytes() == b"*")
 }
 
 fn is_tag(quoted: &str, tag: &str) -> bool {
@@ -139,15 +152,19 @@ fn fresh(mut response: Response, tag: &str) -> Response {
 /// All of the bytes, or the range that the client asks for.
 fn whole_or_part(headers: &HeaderMap, tag: &str, answer: Answer) -> Response {
     let length = answer.body.len();
-    let quoted = format!("\"{tag}\"");
     // Ranges are those of the bytes as they are: the tag of a packed answer names others.
-    let same = headers.get(header::IF_RANGE).is_none_or(|value| value.as_bytes() == quoted.as_bytes());
+    let same = headers.get(header::IF_RANGE).is_none_or(|value| value.as_bytes() == tag.as_bytes());
     let asked = headers.get(header::RANGE).and_then(|value| value.to_str().ok()).filter(|_| same);
     let mut response = match asked.and_then(|text| range(text, length)) {
         None => Body::from(answer.body).into_response(),
         Some(Some(part)) => {
             let place = format!("bytes {}-{}/{length}", part.start, part.end - 1);
-            (StatusCode::PARTIAL_CONTENT, [(header::CONTENT_RANGE, place)], answer.body.slice(part)).into_response()
+            let part = match part.len() {
+                // Alone: a slice would keep the whole answer in memory.
+                0..=COPIED_MAX => Bytes::copy_from_slice(&answer.body[part]),
+                _ => answer.body.slice(part),
+            };
+            (StatusCode::PARTIAL_CONTENT, [(header::CONTENT_RANGE, place)], part).into_response()
         }
         Some(None) => return Problem::range(length).into_response(),
     };

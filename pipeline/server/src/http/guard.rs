@@ -28,6 +28,11 @@ const POLICY: &str =
 
 /// Bytes of a body that are handed over at once.
 const PIECE: usize = 256 << 10;
+/// The last bytes of a body are handed over as copies of at most so many: what a connection still holds when its answer is done with must not keep
+/// all of the answer in memory. It holds no more than [`TAIL`] then.
+const LAST: usize = 16 << 10;
+/// See [`LAST`].
+const TAIL: usize = 64 << 10;
 /// Longest time that a client may take for its answer.
 const SENDING: Duration = Duration::from_secs(600);
 
@@ -133,8 +138,7 @@ impl HttpBody for Held {
                 other => return Poll::Ready(other),
             }
         }
-        let piece = self.rest.len().min(PIECE);
-        Poll::Ready(Some(Ok(Frame::data(self.rest.split_to(piece)))))
+        Poll::Ready(Some(Ok(Frame::data(piece_of(&mut self.rest)))))
     }
 
     fn is_end_stream(&self) -> bool {
@@ -149,6 +153,17 @@ impl HttpBody for Held {
             all.set_upper(upper + rest);
         }
         all
+    }
+}
+
+/// The next piece of what is left.
+fn piece_of(rest: &mut Bytes) -> Bytes {
+    match rest.len().saturating_sub(TAIL) {
+        0 => {
+            let last = rest.split_to(rest.len().min(LAST));
+            Bytes::copy_from_slice(&last)
+        }
+        before => rest.split_to(before.min(PIECE)),
     }
 }
 
@@ -249,4 +264,25 @@ pub async fn tag_encodings(request: Request, next: Next) -> Response {
         headers.insert(header::ETAG, value);
     }
     response
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The last pieces do not keep the whole in memory.
+    #[test]
+    fn val_last_pieces_are_copies() {
+        let whole: Bytes = (0..700_000_u32).map(|n| n as u8).collect::<Vec<_>>().into();
+        let inside = |piece: &Bytes| whole.as_ptr_range().contains(&piece.as_ptr());
+        let (mut rest, mut pieces) = (whole.clone(), Vec::new());
+        while !rest.is_empty() {
+            pieces.push(piece_of(&mut rest));
+        }
+        assert_eq!(pieces.concat(), whole);
+        let (shared, copied): (Vec<&Bytes>, Vec<&Bytes>) = pieces.iter().partition(|piece| inside(piece));
+        assert!(shared.iter().all(|piece| piece.len() <= PIECE) && copied.iter().all(|piece| piece.len() <= LAST));
+        assert_eq!(copied.iter().map(|piece| piece.len()).sum::<usize>(), TAIL);
+        assert!(pieces[pieces.len() - copied.len()..].iter().all(|piece| !inside(piece)));
+    }
 }

@@ -141,7 +141,7 @@ struct Area {
 }
 
 impl Area {
-    fn of(service: &Service, order: &Order) -> Result<Self, Problem> {
+    async fn of(service: &Service, order: &Order) -> Result<Self, Problem> {
         let collection = service.collection(&order.collection)?;
         let Ground::World(world) = &collection.ground else {
             return Err(Problem::bad_request("a raster is read, not generated: there is nothing to prepare"));
@@ -178,7 +178,7 @@ impl Area {
         }
         let phenomena = world.choose(order.phenomena.clone())?;
         let selection = Selection { phenomena, feature_min_m: order.feature_min_m };
-        world.check_work(zoom, tiles, &selection, f64::INFINITY)?;
+        world.check_work(zoom, tiles, &selection, f64::INFINITY).await?;
         let ends = |axis: usize| [first[axis], first[axis].saturating_add(count[axis] as i64)];
         [0, 1].into_iter().flat_map(ends).try_for_each(|tile| world.check_reach(zoom, tile as f64 * TILE as f64))?;
         Ok(Self { world: Arc::clone(world), zoom, first, count, selection })
@@ -196,7 +196,7 @@ pub async fn order(
     _: Plain,
     Body(order): Body<Order>,
 ) -> Result<Response, Problem> {
-    let area = Area::of(&service, &order)?;
+    let area = Area::of(&service, &order).await?;
     let job = service.jobs.add(order, area.count[0] * area.count[1])?;
     let described = job.describe();
     let place = format!("/v1/jobs/{}", job.id);

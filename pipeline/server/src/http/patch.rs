@@ -300,12 +300,18 @@ pub async fn patch(
     let window = Window::of(&query, &collection, most.max(1))?;
     let what = format!("patch {} {window:?} {treatment:?} {selection:?}", collection.digest());
     let make = async {
+        let room = service.room(window.shape[0] * window.shape[1]).await?;
         let samples = ground(&service, &collection, &window, &selection).await?;
         let crs = match &collection.ground {
             Ground::World(_) => Crs::default(),
             Ground::Raster(raster) => raster.crs.clone(),
         };
-        service.blocking(move || treatment.apply(samples, &window, &crs)).await.map(Some)
+        let made = service.blocking(move || {
+            let made = treatment.apply(samples, &window, &crs);
+            drop(room);
+            made
+        });
+        made.await.map(Some)
     };
     service.answers.answer(&headers, &what, make).await
 }

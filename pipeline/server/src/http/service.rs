@@ -4,8 +4,9 @@ use super::answer::Answers;
 use super::jobs::Jobs;
 use super::metrics::Metrics;
 use super::{Problem, Query};
+use crate::collections::raster::Pyramid;
 use crate::collections::world::{Maker, Piece, Selection};
-use crate::collections::{Collection, Collections, Ground};
+use crate::collections::{Collection, Collections, Ground, Raster};
 use crate::library::{Library, Priority};
 use crate::samples::Samples;
 use std::collections::HashMap;
@@ -13,10 +14,18 @@ use std::net::{IpAddr, SocketAddr};
 use std::sync::atomic::AtomicU64;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
-use tokio::sync::Semaphore;
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
 /// Most bytes of the body of a request.
 pub const BODY_BYTES: usize = 1 << 16;
+
+/// Most bytes that a sample of a patch takes while the patch is put together: four fields of it and, where it lies between lattice points, of the
+/// four around it, and three copies for turns and files.
+const SAMPLE_BYTES: usize = 128;
+/// Room for patches is counted in so many bytes, and there are so many of them: two of the largest patches, or all windows of a map.
+const ROOM_UNIT: usize = 1 << 20;
+/// See [`ROOM_UNIT`].
+pub const ROOM_UNITS: usize = 1 << 10;
 
 /// What a request may ask for, and how much may be under way.
 #[derive(Clone, Debug)]
@@ -78,6 +87,8 @@ pub struct Service {
     pub under_way: Mutex<HashMap<IpAddr, usize>>,
     /// Bytes of answers on their way to clients.
     pub sending: AtomicU64,
+    /// Room for patches that are being put together, [`ROOM_UNITS`].
+    pub room: Arc<Semaphore>,
     /// Processors for work that is not that of the library.
     pub processors: Arc<Semaphore>,
 }
@@ -115,11 +126,31 @@ impl Service {
         match &collection.ground {
             Ground::World(world) => world.samples(&self.maker(), origin_m, step_m, shape, selection, piece).await,
             Ground::Raster(raster) => {
-                let raster = Arc::clone(raster);
+                let (raster, levels) = (Arc::clone(raster), self.levels(raster).await?);
                 let north = origin_m[1] + (shape[0] - 1) as f64 * step_m;
-                self.blocking(move || raster.samples([origin_m[0], north], step_m, shape)).await
+                self.blocking(move || Ok(raster.samples(&levels, [origin_m[0], north], step_m, shape))).await
             }
         }
+    }
+
+    /// The levels of a raster. Requests that wait for another that reads them keep no processor.
+    ///
+    /// # Errors
+    /// Files that cannot be read, or are not those that were sealed.
+    pub async fn levels(&self, raster: &Arc<Raster>) -> Result<Arc<Pyramid>, Problem> {
+        let reader = Arc::clone(raster);
+        raster.levels(self.blocking(move || reader.read())).await
+    }
+
+    /// Room for the samples of a patch while it is put together; the others wait for theirs in line. A patch that would need more than there is
+    /// waits for all of it.
+    ///
+    /// # Errors
+    /// None while the server runs.
+    pub async fn room(&self, samples: usize) -> Result<OwnedSemaphorePermit, Problem> {
+        let units = (samples * SAMPLE_BYTES).div_ceil(ROOM_UNIT).min(ROOM_UNITS);
+        let room = Arc::clone(&self.room).acquire_many_owned(units as u32).await;
+        room.map_err(|e| Problem::internal(e.to_string()))
     }
 
     /// Work that takes a processor for a while, or reads files: not on the threads of the runtime, and no more of it at once than there are

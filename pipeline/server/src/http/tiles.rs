@@ -85,8 +85,8 @@ async fn send(
         let samples = match &collection.ground {
             Ground::World(world) => world.map_tile(&service.maker(), tile, phenomena.as_deref()).await?,
             Ground::Raster(raster) => {
-                let raster = Arc::clone(raster);
-                service.blocking(move || raster.tile(tile).map(Arc::new)).await?
+                let (raster, levels) = (Arc::clone(raster), service.levels(raster).await?);
+                service.blocking(move || Ok(Arc::new(raster.tile(&levels, tile)))).await?
             }
         };
         if samples.is_void() {

@@ -1,8 +1,8 @@
 //! Tiles that were made once, in memory and on disk; each is made once however many ask for it.
 //!
 //! A request is answered from memory, from a record on disk (`disk`), or by generating the tile on a worker thread (`pool`). Records are read
-//! by threads of their own, so that they do not queue behind tiles that take long. All that ask for one tile while it is on its way share one flight. The flight belongs to none of them: whoever leaves, the others are served, and when the last has
-//! left the making is told to stop.
+//! by threads of their own, so that they do not queue behind tiles that take long. All that ask for one tile while it is on its way share one
+//! flight. The flight belongs to none of them: whoever leaves, the others are served, and when the last has left the making is told to stop.
 
 mod disk;
 mod pool;
@@ -21,7 +21,7 @@ use std::collections::HashMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use tokio::sync::watch;
 
 /// Fewer samples than these are not worth a record.
@@ -284,72 +284,41 @@ impl Library {
             flight.waiters += 1;
             if priority == Priority::Answer {
                 self.workers.promote(&flight.cancel);
+                self.readers.promote(&flight.cancel);
             }
             let waiter = Waiter { library: Arc::clone(self), digest, number: flight.number };
             return Ok(Boarded::Waiting(waiter, flight.landed.clone()));
         }
-        let pool = if self.disk.as_ref().is_some_and(|disk| disk.has(&key)) { &self.readers } else { &self.workers };
         let number = self.flown.fetch_add(1, Ordering::Relaxed);
         let cancel = Arc::new(AtomicBool::new(false));
         let (land, landed) = watch::channel(None);
-        let (library, flag) = (Arc::downgrade(self), Arc::clone(&cancel));
-        let fly = move || {
-            if let Some(library) = library.upgrade() {
-                library.fly(&key, number, &flag, make, &land);
-            }
+        let is_kept = self.disk.as_ref().is_some_and(|disk| disk.has(&key));
+        let trip = Trip { library: Arc::downgrade(self), key, number, cancel: Arc::clone(&cancel), land };
+        let queued = if is_kept {
+            self.readers.push(priority, Arc::clone(&cancel), Box::new(move || trip.read(priority, make)))
+        } else {
+            self.workers.push(priority, Arc::clone(&cancel), Box::new(move || trip.make(make)))
         };
-        pool.push(priority, Arc::clone(&cancel), Box::new(fly)).map_err(|_| Unavailable::Busy)?;
+        queued.map_err(|_| Unavailable::Busy)?;
         flights.insert(digest, Flight { number, waiters: 1, cancel, landed: landed.clone() });
         Ok(Boarded::Waiting(Waiter { library: Arc::clone(self), digest, number }, landed))
     }
 
-    /// Brings a tile to those that wait for it, on a worker.
-    fn fly(
-        &self,
-        key: &TileKey,
-        number: u64,
-        cancel: &AtomicBool,
-        make: impl FnOnce(&AtomicBool) -> Option<Samples>,
-        land: &watch::Sender<Option<Made>>,
-    ) {
-        let read = self.disk.as_ref().and_then(|disk| disk.read(key));
-        let from_disk = read.is_some();
-        let made = match read {
-            Some(tile) => {
-                count(&self.counts.disk_hits);
-                Ok(Some(tile))
-            }
-            None => catch_unwind(AssertUnwindSafe(|| make(cancel))),
-        };
-        let made = match made {
-            // What a stopped making gives is not a tile, whatever it is.
-            Ok(_) if !from_disk && cancel.load(Ordering::Relaxed) => {
-                count(&self.counts.cancelled);
-                Err(Unavailable::Failed("nobody waited for it".to_owned()))
-            }
-            Ok(Some(tile)) => Ok(Arc::new(tile)),
-            _ => {
-                count(&self.counts.failed);
-                Err(Unavailable::Failed("its generator failed".to_owned()))
-            }
-        };
+    /// Ends a flight: its tile goes to memory and to those that wait.
+    fn land(&self, waiting: &watch::Sender<Option<Made>>, digest: [u8; 32], made: Made) {
         if let Ok(tile) = &made {
             // Known in memory before the flight is over: who comes in between finds it.
-            self.memory.insert(key.digest, Arc::clone(tile));
+            self.memory.insert(digest, Arc::clone(tile));
         }
-        let tile = made.as_ref().ok().cloned();
         // Nobody may be left to hear it.
-        let _ = land.send(Some(made));
-        if let (Some(tile), false) = (tile, from_disk) {
-            count(&self.counts.made);
-            if let Some(disk) = self.disk.as_ref().filter(|_| tile.heights.len() >= RECORD_MIN) {
-                disk.write(key, &tile);
-            }
-        }
-        // Only now, so that whoever came while the record was written was served too.
+        let _ = waiting.send(Some(made));
+    }
+
+    /// Forgets a flight that has ended.
+    fn forget(&self, digest: [u8; 32], number: u64) {
         let mut flights = self.flights();
-        if flights.get(&key.digest).is_some_and(|flight| flight.number == number) {
-            flights.remove(&key.digest);
+        if flights.get(&digest).is_some_and(|flight| flight.number == number) {
+            flights.remove(&digest);
         }
     }
 
@@ -380,6 +349,60 @@ impl Library {
     /// Tells all makings to stop.
     pub fn stop(&self) {
         self.flights().values().for_each(|flight| flight.cancel.store(true, Ordering::Relaxed));
+    }
+}
+
+/// The way of a tile to those that wait for it.
+struct Trip {
+    library: Weak<Library>,
+    key: TileKey,
+    number: u64,
+    cancel: Arc<AtomicBool>,
+    land: watch::Sender<Option<Made>>,
+}
+
+impl Trip {
+    /// Brings the tile of a record, on a reader. Where the record is damaged, a worker makes the tile.
+    fn read(self, priority: Priority, make: impl FnOnce(&AtomicBool) -> Option<Samples> + Send + 'static) {
+        let Some(library) = self.library.upgrade() else { return };
+        if let Some(tile) = library.disk.as_ref().and_then(|disk| disk.read(&self.key)) {
+            count(&library.counts.disk_hits);
+            library.land(&self.land, self.key.digest, Ok(Arc::new(tile)));
+            return library.forget(self.key.digest, self.number);
+        }
+        let (cancel, land) = (Arc::clone(&self.cancel), self.land.clone());
+        let (key, number) = (self.key.digest, self.number);
+        if library.workers.push(priority, cancel, Box::new(move || self.make(make))).is_err() {
+            let _ = land.send(Some(Err(Unavailable::Busy)));
+            library.forget(key, number);
+        }
+    }
+
+    /// Makes the tile, on a worker.
+    fn make(self, make: impl FnOnce(&AtomicBool) -> Option<Samples>) {
+        let Some(library) = self.library.upgrade() else { return };
+        let made = match catch_unwind(AssertUnwindSafe(|| make(&self.cancel))) {
+            // What a stopped making gives is not a tile, whatever it is.
+            Ok(_) if self.cancel.load(Ordering::Relaxed) => {
+                count(&library.counts.cancelled);
+                Err(Unavailable::Failed("nobody waited for it".to_owned()))
+            }
+            Ok(Some(tile)) => Ok(Arc::new(tile)),
+            _ => {
+                count(&library.counts.failed);
+                Err(Unavailable::Failed("its generator failed".to_owned()))
+            }
+        };
+        let tile = made.as_ref().ok().cloned();
+        library.land(&self.land, self.key.digest, made);
+        if let Some(tile) = tile {
+            count(&library.counts.made);
+            if let Some(disk) = library.disk.as_ref().filter(|_| tile.heights.len() >= RECORD_MIN) {
+                disk.write(&self.key, &tile);
+            }
+        }
+        // Only now, so that whoever came while the record was written was served too.
+        library.forget(self.key.digest, self.number);
     }
 }
 

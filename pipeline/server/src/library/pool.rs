@@ -19,15 +19,38 @@ pub struct Full;
 
 type Work = Box<dyn FnOnce() + Send>;
 
+/// Work that a thread takes up.
+struct Taken {
+    work: Work,
+    priority: Priority,
+}
+
 struct Waiting {
     cancel: Arc<AtomicBool>,
     work: Work,
+}
+
+#[derive(Clone, Copy, Default)]
+struct Running {
+    answers: usize,
+    ahead: usize,
+}
+
+impl Running {
+    fn of(&mut self, priority: Priority) -> &mut usize {
+        match priority {
+            Priority::Answer => &mut self.answers,
+            Priority::Background => &mut self.ahead,
+        }
+    }
 }
 
 #[derive(Default)]
 struct Queue {
     answers: VecDeque<Waiting>,
     background: VecDeque<Waiting>,
+    /// How many threads are at work for somebody who waits, and how many ahead.
+    running: Running,
     closed: bool,
 }
 
@@ -35,7 +58,7 @@ struct Shared {
     queue: Mutex<Queue>,
     changed: Condvar,
     dropped: AtomicU64,
-    running: AtomicU64,
+    workers: usize,
 }
 
 /// A fixed number of threads and a bounded queue.
@@ -50,45 +73,57 @@ impl Shared {
     }
 
     /// The next work, once there is some; `None` when the pool is closed.
-    fn next(&self) -> Option<Work> {
+    fn next(&self) -> Option<Taken> {
         let mut queue = self.queue();
         loop {
             if queue.closed {
                 return None;
             }
-            let next = queue.answers.pop_front();
-            match next.or_else(|| queue.background.pop_front()) {
-                Some(waiting) if waiting.cancel.load(Ordering::Relaxed) => {
+            match queue.take(self.workers) {
+                Some((waiting, _)) if waiting.cancel.load(Ordering::Relaxed) => {
                     self.dropped.fetch_add(1, Ordering::Relaxed);
                 }
-                Some(waiting) => {
-                    self.running.fetch_add(1, Ordering::Relaxed);
-                    return Some(waiting.work);
+                Some((Waiting { work, .. }, priority)) => {
+                    *queue.running.of(priority) += 1;
+                    return Some(Taken { work, priority });
                 }
                 None => queue = self.changed.wait(queue).unwrap_or_else(PoisonError::into_inner),
             }
         }
     }
+
+    /// Takes up work until the pool is closed.
+    fn work(&self) {
+        while let Some(Taken { work, priority }) = self.next() {
+            work();
+            *self.queue().running.of(priority) -= 1;
+        }
+    }
+}
+
+impl Queue {
+    /// Takes the next work out of line. Tiles made ahead may take long: they leave a thread beside the `workers` to those that wait.
+    fn take(&mut self, workers: usize) -> Option<(Waiting, Priority)> {
+        let Running { answers, ahead } = self.running;
+        let answer = (answers < workers).then(|| self.answers.pop_front()).flatten();
+        if let Some(waiting) = answer {
+            return Some((waiting, Priority::Answer));
+        }
+        let waiting = (answers + ahead < workers).then(|| self.background.pop_front()).flatten();
+        waiting.map(|waiting| (waiting, Priority::Background))
+    }
 }
 
 impl Pool {
-    /// `workers` threads, called `name`; at most `limit` works wait in each of two queues.
+    /// `workers` threads, called `name`, and one more for an answer that finds all of them at work ahead. At most `limit` works wait in each of two
+    /// queues.
     pub fn new(name: &str, workers: usize, limit: usize) -> Self {
-        let shared = Arc::new(Shared {
-            queue: Mutex::default(),
-            changed: Condvar::new(),
-            dropped: AtomicU64::new(0),
-            running: AtomicU64::new(0),
-        });
-        for number in 0..workers.max(1) {
+        let workers = workers.max(1);
+        let shared =
+            Arc::new(Shared { queue: Mutex::default(), changed: Condvar::new(), dropped: AtomicU64::new(0), workers });
+        for number in 0..=workers {
             let shared = Arc::clone(&shared);
-            let run = move || {
-                while let Some(work) = shared.next() {
-                    work();
-                    shared.running.fetch_sub(1, Ordering::Relaxed);
-                }
-            };
-            let started = std::thread::Builder::new().name(format!("{name}-{number}")).spawn(run);
+            let started = std::thread::Builder::new().name(format!("{name}-{number}")).spawn(move || shared.work());
             if let Err(error) = started {
                 tracing::warn!(%error, "a worker could not be started");
             }
@@ -137,7 +172,8 @@ impl Pool {
 
     /// How many workers are at it.
     pub fn running(&self) -> u64 {
-        self.shared.running.load(Ordering::Relaxed)
+        let Running { answers, ahead } = self.shared.queue().running;
+        (answers + ahead) as u64
     }
 
     /// How many were dropped unseen.

@@ -421,3 +421,54 @@ fn val_records_do_not_wait_for_workers() {
         go.send(()).unwrap();
     });
 }
+
+/// Tiles made ahead leave a thread to those that wait, and no more.
+#[test]
+fn val_work_ahead_leaves_a_thread_to_answers() {
+    runtime().block_on(async {
+        let library = open(settings(None));
+        let mut held = Vec::new();
+        for number in 0..3 {
+            let (go, wait) = mpsc::channel::<()>();
+            let library = Arc::clone(&library);
+            let make = move |_: &AtomicBool| wait.recv().ok().map(|()| tile_of(number, 8));
+            let ahead = async move { library.tile(key_of(number), Priority::Background, make).await };
+            held.push((tokio::spawn(ahead), go));
+        }
+        until(|| library.statistics().running == 2 && library.statistics().queued == 1).await;
+        assert_eq!(*ask(&library, 7).await, tile_of(7, 8));
+        until(|| library.statistics().running == 2 && library.statistics().queued == 1).await;
+        for (request, go) in held {
+            go.send(()).unwrap();
+            request.await.unwrap().unwrap();
+        }
+    });
+}
+
+/// A damaged record is made again by a worker: readers are not kept by it.
+#[test]
+fn val_damaged_records_are_made_by_workers() {
+    let folder = tempfile::tempdir().unwrap();
+    runtime().block_on(async {
+        let library = open(settings(Some(folder.path())));
+        for number in 1..=5 {
+            ask(&library, number).await;
+        }
+        idle(&library).await;
+        let disk = library.disk.as_ref().unwrap();
+        (1..=4).for_each(|number| fs::write(disk.path(&key_of(number)), "damaged").unwrap());
+        let (library, go) = busy(Some(folder.path())).await;
+        let damaged: Vec<_> = (1..=4)
+            .map(|number| {
+                let library = Arc::clone(&library);
+                tokio::spawn(async move { ask(&library, number).await })
+            })
+            .collect();
+        until(|| library.statistics().damaged == 4).await;
+        assert_eq!(*library.tile(key_of(5), Priority::Answer, |_| panic!("made again")).await.unwrap(), tile_of(5, 8));
+        go.send(()).unwrap();
+        for (number, request) in (1..).zip(damaged) {
+            assert_eq!(*request.await.unwrap(), tile_of(number, 8));
+        }
+    });
+}

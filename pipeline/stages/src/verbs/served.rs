@@ -27,7 +27,7 @@ pub struct ServedWorld {
     /// What it is made from.
     pub surface: Surface,
     /// The inputs that it follows.
-    pub inputs: Vec<Input>,
+    pub inputs: Arc<[Input]>,
     /// Its full parameters.
     pub parameters: Value,
     /// Its random streams.
@@ -199,7 +199,8 @@ fn world_of_file(path: &Path) -> Result<ServedWorld, Error> {
         }
     };
     let id = id_of(&path.file_stem().unwrap_or_default().to_string_lossy());
-    Ok(ServedWorld { id, surface, inputs, parameters, streams: prepared.streams(), license: None })
+    let (inputs, streams) = (inputs.into(), prepared.streams());
+    Ok(ServedWorld { id, surface, inputs, parameters, streams, license: None })
 }
 
 /// An id for addresses and studies from the name of a file: lower case, `-` for what else than letters, digits, `-` and `_` stands there.
@@ -230,7 +231,7 @@ fn worlds_of_study(path: &Path, text: &str) -> Result<Vec<ServedWorld>, Error> {
             worlds.push(ServedWorld {
                 id: id.clone(),
                 surface: Surface::Planetary(Box::new(world)),
-                inputs: Vec::new(),
+                inputs: Arc::default(),
                 parameters,
                 streams: streams.clone(),
                 license: license.clone(),
