@@ -11,7 +11,9 @@ import { h, bytes, save, plain, length } from './dom.js';
 import { fieldName, formatName } from './names.js';
 import { line as ink, RUST } from './ink.js';
 
-const BYTES = { tif: 4, npy: 4, raw: 4, png: 2 };
+/** Bytes of a sample; of packed formats at most. */
+const BYTES = { tif: 4, npy: 8, raw: 4, png: 2 };
+const PACKED = ['tif', 'png'];
 
 export function boxPanel() {
   let draw = null, feature = null;
@@ -49,8 +51,7 @@ export function boxPanel() {
     refused.hidden = true;
     if (!good()) { size.textContent = 'Draw a box on the map (two clicks) or enter its edges.'; return; }
     const [columns, rows] = samples();
-    const image = field.value === 'image' || format.value === 'png';
-    size.textContent = `${columns} × ${rows} samples, ${length(columns * resolution.value)} × ${length(rows * resolution.value)}, ${image ? 'at most ' : ''}${bytes(columns * rows * BYTES[format.value])}`;
+    size.textContent = `${columns} × ${rows} samples, ${length(columns * resolution.value)} × ${length(rows * resolution.value)}, ${PACKED.includes(format.value) ? 'at most ' : ''}${bytes(columns * rows * BYTES[format.value])}`;
   }
   const told = (error) => { refused.textContent = error.message; refused.hidden = false; };
   async function download() {

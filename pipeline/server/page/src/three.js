@@ -115,10 +115,10 @@ const direction = (azimuth, elevation) => {
   return [Math.sin(a) * Math.cos(e), Math.cos(a) * Math.cos(e), Math.sin(e)];
 };
 
-/** Lines of tracks inside the window, in pieces where they leave it. */
+/** Lines of tracks inside the window, in pieces where they leave it; its corner is the place of a sample. */
 function paths(tracks, { mean, unit }, { corner, columns, rows, cell }) {
-  const middle = [corner[0] + columns * cell / 2, corner[1] + rows * cell / 2];
   const half = [(columns - 1) * cell / 2, (rows - 1) * cell / 2];
+  const middle = [corner[0] + half[0], corner[1] + half[1]];
   const pieces = [];
   for (const track of tracks) {
     let piece = [];

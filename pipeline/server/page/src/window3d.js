@@ -38,7 +38,7 @@ export async function open3d(element, done) {
     const [heights, albedo] = await Promise.all([response, bright].map(async (one) => one && new Float32Array(await one.arrayBuffer())));
     const columns = Number(response.headers.get('Grid-Columns') ?? size[0]);
     const rows = Number(response.headers.get('Grid-Rows') ?? size[1]);
-    const cell = Number(response.headers.get('Grid-Cell-M') ?? step);
+    const cell = Number(response.headers.get('Grid-Resolution-M') ?? step);
     const corner = (response.headers.get('Grid-Origin-M') ?? origin.join(',')).split(',').map(Number);
     element.hidden = false;
     view = show(element, { heights, albedo, columns, rows, cell, corner, layer: state.layer, azimuth: state.azimuth, elevation: state.elevation, tracks: [...tracksShown.values()], title: state.collection.title,

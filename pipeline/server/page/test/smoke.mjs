@@ -80,6 +80,21 @@ const colour = (x, y, half) => page.evaluate((cx, cy, size) => {
   return mean;
 }, x, y, half);
 
+/** Mean differences of neighbouring columns of pixels around a place: the largest in the middle, and the largest elsewhere. */
+const steps = (x, y) => page.evaluate((cx, cy) => {
+  const { map } = window.sastrugi;
+  const [px, py] = map.getPixelFromCoordinate([cx, cy]).map((at) => Math.round(at * devicePixelRatio));
+  const [wide, high] = [48, 120];
+  const { data } = map.getViewport().querySelector('canvas').getContext('2d').getImageData(px - wide / 2, py - high / 2, wide, high);
+  const step = (column) => {
+    let sum = 0;
+    for (let row = 0; row < high; row++) for (let k = 0; k < 3; k++) sum += Math.abs(data[4 * (row * wide + column + 1) + k] - data[4 * (row * wide + column) + k]);
+    return sum / (3 * high);
+  };
+  const all = [...Array(wide - 1).keys()].map((column) => [Math.abs(column + 1 - wide / 2) <= 1, step(column)]);
+  return [true, false].map((middle) => Math.max(...all.filter(([is]) => is === middle).map(([, value]) => value)));
+}, x, y);
+
 await page.setViewport({ width, height });
 await visit();
 const collection = await page.evaluate(() => window.sastrugi.state.collection);
@@ -125,13 +140,16 @@ await check('levels agree across a tile seam', async () => {
     await visit(at(resolution, '', seam));
     means.push(await colour(seam[0], seam[1], 60 * step));
   }
+  await visit(at(step, '', seam));
+  const [across, elsewhere] = await steps(seam[0], seam[1]);
+  must(across <= 1.5 * elsewhere + 1, `colours differ by ${across.toFixed(1)} across the seam, by ${elsewhere.toFixed(1)} at most beside it`);
   const jump = Math.max(...means.slice(1).flatMap((mean, k) => mean.map((value, c) => Math.abs(value - means[k][c]))));
   must(jump < 12, `the mean colour jumps by ${jump.toFixed(1)} of 255`);
-  return `mean colours within ${jump.toFixed(1)} of 255`;
+  return `mean colours within ${jump.toFixed(1)} of 255; ${across.toFixed(1)} across the seam, ${elsewhere.toFixed(1)} beside it`;
 });
 
 await page.setViewport({ width, height });
-await check('the elevation readout equals /point', async () => {
+await check('the elevation readout equals /point and the patch around it', async () => {
   await visit(at(finest));
   await page.mouse.move(700, 420);
   await page.mouse.move(701, 421);
@@ -142,6 +160,14 @@ await check('the elevation readout equals /point', async () => {
   });
   const point = await (await fetch(`${url}/v1/collections/${encodeURIComponent(collection.id)}/point?x=${place[0]}&y=${place[1]}`)).json();
   must(point.elevation_m === exact, `the page has ${exact} m, the server ${point.elevation_m} m`);
+  // Between the four samples of a patch around it.
+  const spacing = collection.spacing_m;
+  const [column, row] = place.map((value) => Math.floor(value / spacing));
+  const corner = await fetch(`${url}/v1/collections/${encodeURIComponent(collection.id)}/patch?origin=${column * spacing},${row * spacing}&size=2,2&resolution_m=${spacing}&format=raw`);
+  const [northWest, northEast, southWest, southEast] = new Float32Array(await corner.arrayBuffer());
+  const [u, v] = [place[0] / spacing - column, place[1] / spacing - row];
+  const between = (southWest * (1 - u) + southEast * u) * (1 - v) + (northWest * (1 - u) + northEast * u) * v;
+  must(Math.abs(between - exact) < 1e-4, `the page has ${exact} m, the patch around ${between} m`);
   must(Math.abs(Number(shown.replace('\u2212', '-').replace(' m', '')) - exact) <= 0.0051 + finest, `the page shows ${shown}, the server ${exact} m`);
   return shown;
 });
@@ -200,7 +226,29 @@ await check('a download says its size beforehand', async () => {
   await page.mouse.click(760, 560);
   await page.waitForFunction(() => /samples/.test(document.querySelector('#panel .hint').textContent));
   await shot('download');
-  return page.$eval('#panel .hint', (element) => element.textContent);
+  const told = [];
+  for (const format of ['raw', 'npy', 'tif', 'png']) {
+    await page.evaluate((name) => {
+      const select = [...document.querySelectorAll('#panel select')].find((one) => [...one.options].some((option) => option.value === 'npy'));
+      select.value = name;
+      select.dispatchEvent(new Event('change', { bubbles: true }));
+    }, format);
+    const hint = await page.$eval('#panel .hint', (element) => element.textContent);
+    await page.evaluate(() => {
+      const make = URL.createObjectURL;
+      window.saved = undefined;
+      URL.createObjectURL = (blob) => { window.saved = blob.size; URL.createObjectURL = make; return make.call(URL, blob); };
+      document.querySelector('#panel form').requestSubmit();
+    });
+    await until(`no ${format} came`, () => window.saved !== undefined);
+    const length = await page.evaluate(() => window.saved);
+    const [, number, unit] = /([\d.,]+) (B|kB|MB)$/.exec(hint.replace(/\u202f|\u00a0/g, ' '));
+    const said = Number(number.replace(',', '')) * { B: 1, kB: 1e3, MB: 1e6 }[unit];
+    const most = hint.includes('at most') ? 0 : 0.9;
+    must(length <= 1.1 * said + 2000 && length >= most * said, `${format}: ${hint}, and ${length} bytes came`);
+    told.push(`${format} ${said} B said, ${length} came`);
+  }
+  return told.join('; ');
 });
 
 await check('the 3-D view opens', async () => {
