@@ -185,15 +185,23 @@ fn val_too_much_work_is_refused_with_a_way_out() {
     let folder = area();
     world(folder.path());
     let server = Server::start(folder.path(), &["world.toml"], &[]);
-    for window in ["size=256,256&resolution_m=40.96", "size=5000,1&resolution_m=5.12", "size=1000000,1"] {
+    let refused = |path: &str| {
+        let answer = server.get(path);
+        let detail = answer.json()["detail"].as_str().unwrap().to_owned();
+        assert_eq!(answer.status, 413, "{path}: {detail}");
+        detail
+    };
+    for window in ["size=256,256&resolution_m=40.96", "size=5000,1&resolution_m=5.12"] {
         let path = format!("/v1/collections/world/patch?origin=0,0&{window}&format=raw");
-        let refused = server.get(&path);
-        let detail = refused.json()["detail"].as_str().unwrap().to_owned();
-        assert_eq!(refused.status, 413, "{window}: {detail}");
-        let Some((_, bound)) = detail.split_once("feature_min_m=") else { continue };
-        let bound = bound.split('`').next().unwrap();
-        assert_eq!(server.get(&format!("{path}&feature_min_m={bound}")).status, 200, "{detail}");
+        let detail = refused(&path);
+        let bound = detail.split_once("feature_min_m=").and_then(|(_, bound)| bound.split('`').next());
+        assert_eq!(server.get(&format!("{path}&feature_min_m={}", bound.unwrap())).status, 200, "{detail}");
     }
+    let wide = "/v1/collections/world/patch?origin=0,0&format=raw&size";
+    assert!(refused(&format!("{wide}=1000000,1")).contains("Request a smaller area"));
+    assert_eq!(server.get(&format!("{wide}=10000,1")).status, 200);
+    let line = "/v1/collections/world/profile?line=0,0;314572,0&samples=4096&resolution_m=5.12&feature_min_m=0";
+    assert!(refused(line).contains("Request a smaller area"));
     // A point of the same ground costs little.
     assert_eq!(server.get("/v1/collections/world/point?x=0&y=0&resolution_m=5.12").status, 200);
 }
@@ -361,6 +369,26 @@ fn val_the_door_is_kept() {
     assert!(metrics.contains("sastrugi_requests_total{route=\"/v1/collections\",status=\"401\"} 2"), "{metrics}");
     assert_eq!(server.get("/metrics").status, 401);
     assert_eq!(server.terminate(), Some(0));
+}
+
+/// A server that is told to stop finishes the requests that are open.
+#[test]
+fn val_a_stopping_server_finishes_open_requests() {
+    let folder = area();
+    world(folder.path());
+    let mut server = Server::start(folder.path(), &["world.toml", "--threads", "1"], &[]);
+    let (mut open, address) = (server.client().unwrap(), server.address.clone());
+    let patch = "/v1/collections/world/patch?origin=0,0&size=1024,1024&resolution_m=0.02&format=raw";
+    let answer = std::thread::scope(|scope| {
+        let asked = scope.spawn(move || open.get(patch).unwrap());
+        while server.get("/v1/library").json()["running"] == 0 {
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        assert_eq!(server.terminate(), Some(0));
+        asked.join().unwrap()
+    });
+    assert_eq!((answer.status, answer.body.len()), (200, 4 << 20));
+    assert!(sastrugi_tests::server::Client::connect(&address).is_err());
 }
 
 /// Work ahead: done, listed, cancelled.
@@ -677,6 +705,13 @@ fn val_elaborated_dems_are_served() {
     let [west, north] = [0, 1].map(|k| grid["origin_m"][k].as_f64().unwrap());
     let levels = grid["levels"].as_u64().unwrap();
     assert_eq!(levels, 8, "pixels of 2 cm to 2.56 m, half the posts: {described}");
+    let mut sorted = posts.values.clone();
+    sorted.sort_by(f64::total_cmp);
+    let range = [0, 1].map(|k| described["height_range_m"][k].as_f64().unwrap());
+    assert_eq!(range, [0.05, 0.95].map(|share| sorted[(share * sorted.len() as f64) as usize]));
+    // A line over all of it, whose samples are farther apart than the posts.
+    let line = server.get(&format!("{c}/profile?line=1030,2055;1320,2290&samples=20")).json();
+    assert_eq!(line["resolution_m"], json!(2.56), "{line}");
     for level in 0..levels {
         let step = grid["resolutions_m"][level as usize].as_f64().unwrap();
         let [col, row] = [(1180.0 - west) / step, (north - 2190.0) / step].map(|at| at as u32);
@@ -691,6 +726,38 @@ fn val_elaborated_dems_are_served() {
     let coarse = server.get(&format!("{c}/patch?origin=1130,2150&size=5,5&resolution_m=20"));
     assert_eq!(coarse.status, 400, "{}", coarse.json());
     assert_eq!(server.get(&format!("{c}/study?origin=1130,2150&size=5,5")).status, 400);
+    // TileJSON offers steps of 4 mm and 10 cm for pixels that they are fit for, and fine steps throughout.
+    for (layer, maxzoom) in [("terrarium", 8 + 4), ("terrain_rgb", 8 + 4), ("elevation", 8 + 7)] {
+        let offered = server.get(&format!("{c}/xyz/{layer}/tilejson.json")).json();
+        assert_eq!(offered["maxzoom"], json!(maxzoom), "{layer}");
+    }
+    // A hole is void on the map, and its edge is where points say that it is.
+    let mut holed = dem::read(&folder.path().join("dem.tif")).unwrap();
+    (0..50 * 60)
+        .filter(|k| (20..30).contains(&(k / 60)) && (20..40).contains(&(k % 60)))
+        .for_each(|k| holed.grid.values[k] = f64::NAN);
+    let options = dem::WriteOptions::default();
+    dem::write(&folder.path().join("holed.tif"), &holed.grid, &dem::Crs::default(), &options).unwrap();
+    write(
+        folder.path(),
+        "holed.toml",
+        &site.replace("dem.tif", "holed.tif").replace("1130.0, 2150.0", "1030.0, 2060.0"),
+    );
+    let holes = Server::start(folder.path(), &["holed.toml"], &[]);
+    let h = "/v1/collections/holed";
+    let [col, row] = [1150.0 - west, north - 2170.0].map(|at| (at / (256.0 * 0.02)) as u32);
+    assert_eq!(holes.get(&format!("{h}/styles/relief/map/tiles/holed/7/{row}/{col}")).status, 204);
+    let line = holes.get(&format!("{h}/patch?origin=1030,2170&size=128,1&resolution_m=0.64&format=raw")).floats();
+    for (k, z) in line.iter().enumerate() {
+        let point = holes.get(&format!("{h}/point?x={}&y=2170&resolution_m=0.64", 1030.0 + 0.64 * k as f64)).json();
+        assert_eq!(point["elevation_m"].as_f64().map(|own| own as f32), Some(*z).filter(|z| z.is_finite()), "{k}");
+    }
+    assert!(line.iter().any(|z| z.is_nan()) && line.iter().any(|z| z.is_finite()));
+    // What cannot be made is said at the start.
+    let near = "altimetry_points_m = [[1140.0, 2160.0, 9.0], [1140.004, 2160.0, 8.0]]\n";
+    write(folder.path(), "wrong.toml", &format!("{site}{near}"));
+    let refused = sastrugi_in(folder.path(), &["serve", "wrong.toml"]);
+    assert!(refused.code == 65 && refused.stderr.contains("altimetry_points_m"), "{}", refused.stderr);
     // Another DEM of that name is another collection.
     let tag = server.get(&format!("{c}/patch?origin=1130,2150&size=5,5")).header("etag").unwrap().to_owned();
     write(folder.path(), "dem.toml", &dem.replace("seed = 4", "seed = 6"));

@@ -240,7 +240,7 @@ fn serve_without_room(command: &mut Command, folder: &Path, library: &Path, name
     let metrics = String::from_utf8(server.get("/metrics").body).unwrap();
     server.kill();
     let said = fs::read_to_string(&log).unwrap();
-    let warnings = said.matches("cannot be kept on disk").count();
+    let warnings = said.matches("cannot be written to the library").count();
     println!(
         "{name}: answers 300, made {made}, unwritten {unwritten}, records {} of {} bytes, drafts {}, warnings {warnings}",
         records(library).len(),
@@ -499,8 +499,8 @@ fn val_who_cannot_be_served_now_is_told_when() {
     write(folder.path(), "world.toml", SLOW);
     // Four tiles each, of which no other has one.
     let across = &|k: usize| {
-        let [x, y] = [512 * k + 128, 128].map(|n| n as f64 * STEP_M);
-        format!("{PATCH}?origin={x:?},{y:?}&size=256,256&resolution_m={STEP_M}&format=raw")
+        let [x, y] = [512 * k + 192, 192].map(|n| n as f64 * STEP_M);
+        format!("{PATCH}?origin={x:?},{y:?}&size=128,128&resolution_m={STEP_M}&format=raw")
     };
     let tile = &|k: usize| {
         format!("{PATCH}?origin={},0&size=256,256&resolution_m={STEP_M}&format=raw", k as f64 * 256.0 * STEP_M)

@@ -26,7 +26,7 @@ pub struct Arguments {
 /// Options of every verb.
 #[derive(Debug, Args)]
 pub struct Common {
-    /// Threads to use; all cores when absent. Changes no byte of any result.
+    /// Threads to use; all cores when absent. Does not affect results.
     #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
     /// Machine-readable result on stdout.
@@ -984,10 +984,10 @@ pub struct Serve {
     /// Maximum size of the tile library on disk.
     #[arg(long, value_name = "BYTES", default_value = "10G")]
     pub library_bytes: String,
-    /// Maximum memory for cached tiles, and again for the rasters of releases.
+    /// Memory for cached tiles; as much again is used for rasters of releases.
     #[arg(long, value_name = "BYTES", default_value = "512M")]
     pub memory_bytes: String,
-    /// Maximum number of samples in one patch; of an image a quarter.
+    /// Maximum number of samples in a patch; a quarter of it in an image.
     #[arg(long, value_name = "N", default_value_t = 1 << 22, value_parser = clap::value_parser!(u64).range(1..=1 << 26))]
     pub samples_max: u64,
     /// Maximum number of concurrent requests per client.
@@ -1005,7 +1005,7 @@ pub struct Serve {
     /// Log every request on stderr; RUST_LOG gives finer control.
     #[arg(long)]
     pub log: bool,
-    /// Format of the log.
+    /// Format of the log, whether asked for or of warnings only.
     #[arg(long, value_enum, default_value_t = LogFormat::Text)]
     pub log_format: LogFormat,
 }

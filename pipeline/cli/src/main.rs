@@ -9,6 +9,7 @@ mod verbs;
 use clap::Parser;
 use failure::{Code, Failure};
 use std::process::ExitCode;
+use verbs::serve::Interrupt;
 
 fn main() -> ExitCode {
     let arguments = match args::Arguments::try_parse() {
@@ -36,12 +37,13 @@ fn refuse_arguments(error: &clap::Error) -> ExitCode {
 
 /// Every file appears whole or not at all, so the process may end here and now.
 fn interrupted() {
-    if verbs::serve::interrupted() {
-        return;
+    match verbs::serve::interrupted() {
+        Some(Interrupt::First) => return,
+        Some(Interrupt::Again) => output::warn("\nsastrugi: stopped at once; answers under way break off"),
+        None => output::warn(
+            "\nsastrugi: interrupted; nothing half-written bears its name, and a run goes on from what it finished",
+        ),
     }
-    output::warn(
-        "\nsastrugi: interrupted; nothing half-written bears its name, and a run goes on from what it finished",
-    );
     std::process::exit(i32::from(Code::Retry as u8));
 }
 

@@ -101,25 +101,34 @@ impl Layer {
         }
     }
 
+    /// The finest pixels that its steps are fit for, m.
+    pub fn finest_m(self) -> f64 {
+        match self {
+            Self::Terrarium | Self::TerrainRgb => 0.16 * (1.0 - 1e-9),
+            _ => 0.0,
+        }
+    }
+
     /// Whether it depends on light.
     pub fn is_lit(self) -> bool {
         matches!(self, Self::Relief | Self::Hillshade)
     }
 
-    /// PNG of a tile from its samples, which have one more on every side; `None` where there is no data, or a height that the packing cannot
-    /// hold.
+    /// Whether no pixel of a tile has data; its samples have one more on every side.
+    pub fn is_void(samples: &Samples) -> bool {
+        (0..TILE * TILE).all(|k| samples.heights[at(k)].is_nan())
+    }
+
+    /// PNG of a tile from its samples, which have one more on every side; `None` where a height is beyond what the packing can hold.
     pub fn draw(self, samples: &Samples, style: &Style) -> Option<Vec<u8>> {
-        let at = |k: usize| (k / TILE + 1) * (TILE + 2) + k % TILE + 1;
         let shade = if self.is_lit() { self.shade(samples, style) } else { Vec::new() };
         let mut pixels = Vec::with_capacity(TILE * TILE);
-        let mut void = true;
         for k in 0..TILE * TILE {
             let height = f64::from(samples.heights[at(k)]);
             if height.is_nan() {
                 pixels.push([0; 4]);
                 continue;
             }
-            void = false;
             let value = |field: &Option<Vec<f32>>| field.as_ref().map(|v| f64::from(v[at(k)]));
             pixels.push(match self {
                 Self::Hillshade => grey(f64::from(shade[k])),
@@ -136,19 +145,24 @@ impl Layer {
                     let share = value(&samples.rock).unwrap_or(0.0).clamp(0.0, 1.0);
                     [214, 90, 32, level(0.85 * share)]
                 }
-                Self::Albedo => value(&samples.albedo).map_or([0; 4], |a| grey(2.0 * a)),
+                Self::Albedo => value(&samples.albedo).filter(|a| a.is_finite()).map_or([0; 4], |a| grey(2.0 * a)),
                 Self::Terrarium => packed((height + 32768.0) * 256.0)?,
                 Self::TerrainRgb => packed((height + 10000.0) / 0.1)?,
                 Self::Elevation => packed((height - style.offset_m) / STEP_M)?,
             });
         }
-        if void { None } else { rgba_png([TILE, TILE], &pixels).ok() }
+        rgba_png([TILE, TILE], &pixels).ok()
     }
 
     fn shade(self, samples: &Samples, style: &Style) -> Vec<f32> {
         let shape = [samples.rows, samples.cols];
         shade_inner(&samples.heights, shape, style.cell_m, style.sun.direction(), style.exaggeration)
     }
+}
+
+/// The sample of a pixel.
+fn at(pixel: usize) -> usize {
+    (pixel / TILE + 1) * (TILE + 2) + pixel % TILE + 1
 }
 
 /// Level of a brightness.
@@ -197,5 +211,22 @@ mod tests {
         assert!((own - 0.123_456).abs() <= 0.5 * STEP_M + 1e-9);
         assert_eq!(packed(-1.0), None);
         assert_eq!(packed(16_777_216.0), None);
+    }
+
+    /// A tile of which only the ground around it has data is void; ground without an albedo is left open.
+    #[test]
+    fn val_pixels_without_data_are_open() {
+        let side = TILE + 2;
+        let mut samples = Samples { heights: vec![f32::NAN; side * side], ..Samples::empty(side, side) };
+        samples.heights[..side].fill(1.0);
+        assert!(Layer::is_void(&samples));
+        samples.heights[side + 1] = 1.0;
+        samples.albedo = Some(vec![f32::NAN; side * side]);
+        assert!(!Layer::is_void(&samples));
+        let sun = Sun::default();
+        let style = Style { sun, exaggeration: 1.0, range_m: [0.0, 1.0], offset_m: 0.0, cell_m: 1.0 };
+        let drawn = Layer::Albedo.draw(&samples, &style).unwrap();
+        let void = Layer::Albedo.draw(&Samples { heights: vec![f32::NAN; side * side], ..samples }, &style).unwrap();
+        assert_eq!(drawn, void);
     }
 }

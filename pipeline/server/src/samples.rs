@@ -110,8 +110,7 @@ impl Samples {
         let side = 1usize << m;
         if !self.rows.is_multiple_of(side) || !self.cols.is_multiple_of(side) {
             return Err(Problem::bad_request(format!(
-                "`downsample`: {} x {} samples are no whole number of blocks of {side} x {side}; \
-                 choose `size` as a multiple of {side}",
+                "`downsample`: {} x {} samples cannot be divided into blocks of {side} x {side}; make `size` a multiple of {side}",
                 self.cols, self.rows
             )));
         }

@@ -71,7 +71,13 @@ impl From<LibraryError> for Error {
             LibraryError::Occupied(_) | LibraryError::Version(_) | LibraryError::NoFolder(_) => {
                 Self::Usage(error.to_string())
             }
-            LibraryError::Io { path, source } => Self::at(&path, source),
+            LibraryError::Io { path, source } => {
+                let words = format!("{}: the tile library cannot be used: {source}", path.display());
+                match Self::at(&path, source) {
+                    Self::Retry(_) => Self::Retry(words),
+                    _ => Self::Failed(words),
+                }
+            }
         }
     }
 }
@@ -102,7 +108,7 @@ pub fn serve(
         metrics: Metrics::default(),
         under_way: Mutex::default(),
         sending: AtomicU64::new(0),
-        room: Arc::new(Semaphore::new(ROOM_UNITS)),
+        rooms: [0, 1].map(|_| Arc::new(Semaphore::new(ROOM_UNITS))),
         processors: Arc::new(Semaphore::new(settings.library.workers.max(1))),
     });
     ready(address, &service.collections);

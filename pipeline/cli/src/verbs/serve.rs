@@ -22,20 +22,32 @@ const GIB: f64 = (1u64 << 30) as f64;
 static RUNNING: OnceLock<Stop> = OnceLock::new();
 static STOPPING: AtomicBool = AtomicBool::new(false);
 
-/// Ends a server in good order at the first interrupt; false where there is none, or it is told for the second time.
-pub fn interrupted() -> bool {
-    let Some(stop) = RUNNING.get() else { return false };
-    let first = !STOPPING.swap(true, Ordering::Relaxed);
-    if first {
-        stop.stop();
+/// What an interrupt means to a server.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Interrupt {
+    /// It ends in good order.
+    First,
+    /// It is to end at once.
+    Again,
+}
+
+/// Ends a server in good order at the first interrupt; `None` where there is none.
+pub fn interrupted() -> Option<Interrupt> {
+    let stop = RUNNING.get()?;
+    if STOPPING.swap(true, Ordering::Relaxed) {
+        return Some(Interrupt::Again);
     }
-    first
+    stop.stop();
+    Some(Interrupt::First)
 }
 
 /// `serve`.
 pub fn serve(args: &Serve, common: &Common) -> Verdict {
     let listen: SocketAddr = args.listen.parse().map_err(|_| {
-        Failure::usage(format!("`--listen {}`: it must be an address and a port, as 127.0.0.1:8080", args.listen))
+        Failure::usage(format!(
+            "`--listen {}`: it must be an address and a port, for example 127.0.0.1:8080",
+            args.listen
+        ))
     })?;
     let token = std::env::var(TOKEN).ok().filter(|token| !token.is_empty());
     start_log(args, common);

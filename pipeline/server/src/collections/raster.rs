@@ -113,7 +113,7 @@ impl Raster {
             if same {
                 Ok(Some(single(&grid)))
             } else {
-                Err(format!("{}: its cells are not those of the heights", file.path.display()))
+                Err(format!("{}: its grid is not that of the heights", file.path.display()))
             }
         };
         let [albedo, rock, rock_potential] = MAPS.map(map);

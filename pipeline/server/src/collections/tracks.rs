@@ -86,14 +86,17 @@ impl Drives {
         })
     }
 
-    /// How many there are on a terrain; 0 where the tables cannot be read.
+    /// How many there are on a terrain; 0 as long as the tables cannot be read.
     fn count(&self, terrain: &str) -> usize {
-        let counts = self.counts.get_or_init(|| {
-            let mut counts = BTreeMap::new();
-            let read = self.each(|drive| *counts.entry(drive.terrain).or_insert(0) += 1);
-            read.map_or_else(|_| BTreeMap::new(), |()| counts)
-        });
-        counts.get(terrain).copied().unwrap_or(0)
+        let count = |counts: &BTreeMap<String, usize>| counts.get(terrain).copied().unwrap_or(0);
+        if let Some(counts) = self.counts.get() {
+            return count(counts);
+        }
+        let mut counts = BTreeMap::new();
+        match self.each(|drive| *counts.entry(drive.terrain).or_insert(0) += 1) {
+            Ok(()) => count(self.counts.get_or_init(|| counts)),
+            Err(_) => 0,
+        }
     }
 }
 

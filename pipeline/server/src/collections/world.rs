@@ -15,6 +15,7 @@ use sastrugi_stages::verbs::served::ServedWorld;
 use sastrugi_terrain::planetary::{self, Patch, Request, Window};
 use sastrugi_terrain::{Input, Windows};
 use serde_json::{Value, json};
+use std::collections::HashSet;
 use std::sync::Arc;
 use tokio::task::JoinSet;
 
@@ -93,9 +94,9 @@ impl World {
     /// An input that is missing.
     pub fn open(served: ServedWorld) -> Result<Self, Error> {
         let (spacing_m, offset_m) = (served.spacing_m(), served.offset_m());
-        let (grid, zoom_max) = match served.extent()? {
+        let (grid, zoom_max) = match served.dem() {
             None => (square(spacing_m), ZOOM_MAX),
-            Some((bounds_m, coarsest_m)) => bounded(spacing_m, offset_m, bounds_m, coarsest_m),
+            Some(dem) => bounded(spacing_m, offset_m, &dem.geometry),
         };
         // Where it starts does not matter to what it is.
         let mut parameters = served.parameters.clone();
@@ -114,36 +115,37 @@ impl World {
         Ok(world)
     }
 
-    /// Heights that nine tenths of the map lie between, by some of its samples.
+    /// Heights that nine tenths of the map lie between, by the posts of its DEM, or some of its samples.
     fn look(&self) -> [f64; 2] {
+        let mut heights = self.served.dem().map_or_else(|| self.sampled(), |dem| dem.values.clone());
+        heights.retain(|z| z.is_finite());
+        let mut part = |share: f64| {
+            let place = (share * heights.len() as f64) as usize;
+            if heights.is_empty() { 0.0 } else { *heights.select_nth_unstable_by(place, f64::total_cmp).1 }
+        };
+        [part(0.05), part(0.95)]
+    }
+
+    /// Some heights of a world without end.
+    fn sampled(&self) -> Vec<f64> {
         let [west, south, east, north] = self.grid.bounds_m();
         let zoom = self.zoom_below((east - west).max(north - south) / LOOK as f64);
         let step = self.step_m(zoom);
         let [west, south] = self.to_lattice([west, south]).map(|m| (m / step).round() as i64);
         let window = Window { zoom, west, south, cols: LOOK, rows: LOOK, centred: false };
         let request = Request { window, feature_min_m: FEATURE_PIXELS * step, cancel: None };
-        let patch = self.whole.patch_for(&request);
-        let mut heights = patch.map_or_else(Vec::new, |patch| patch.heights);
-        heights.retain(|z| z.is_finite());
-        heights.sort_by(f64::total_cmp);
-        let part = |share: f64| heights.get((share * heights.len() as f64) as usize).copied().unwrap_or_default();
-        [part(0.05), part(0.95)]
+        self.whole.patch_for(&request).map_or_else(Vec::new, |patch| patch.heights)
     }
 
-    /// The ground that some of its processes make. One is made once however many ask for it, and not on the threads of the runtime: an input may be
-    /// large.
-    async fn ground(self: &Arc<Self>, phenomena: &Option<Vec<usize>>) -> Result<Arc<dyn Windows>, Problem> {
+    /// The ground that some of its processes make. It shares what is large with the ground of all.
+    fn ground(&self, phenomena: &Option<Vec<usize>>) -> Result<Arc<dyn Windows>, Problem> {
         let Some(places) = phenomena else { return Ok(Arc::clone(&self.whole)) };
-        let make = async {
-            let (world, acting) = (Arc::clone(self), places.clone());
-            let made = tokio::task::spawn_blocking(move || world.served.ground(|place| acting.contains(&place)));
-            made.await.map_err(|e| Problem::internal(e.to_string()))?.map_err(|e| Problem::internal(e.to_string()))
-        };
-        self.parts.get_or_insert_async(places, make).await
+        let make = || self.served.ground(|place| places.contains(&place));
+        self.parts.get_or_insert_with(places, make).map_err(|e| Problem::internal(e.to_string()))
     }
 
     /// A place as distances from lattice point 0, m.
-    fn to_lattice(&self, place_m: [f64; 2]) -> [f64; 2] {
+    pub fn to_lattice(&self, place_m: [f64; 2]) -> [f64; 2] {
         [0, 1].map(|axis| place_m[axis] - self.offset_m[axis])
     }
 
@@ -228,13 +230,13 @@ impl World {
         let kind = self.served.kind();
         if kind != planetary::KIND {
             return Err(Problem::bad_request(format!(
-                "sections are for worlds of kind `{}`; a study makes this one as its file does",
+                "study sections are for worlds of kind `{}`; for this one, copy its file into the study",
                 planetary::KIND
             )));
         }
         sastrugi_terrain::prepare(kind, &parameters).map_err(|e| {
             Problem::bad_request(format!(
-                "a study cannot make this patch, whose samples lie between those of a lattice: {e}"
+                "no study can make this patch, because its samples lie between those of the lattice: {e}"
             ))
         })?;
         let (head, seed) = seed_lines(&self.served.streams.label(), self.id());
@@ -244,6 +246,11 @@ impl World {
     /// Distance of samples after some doublings, m.
     pub fn step_m(&self, zoom: u32) -> f64 {
         self.spacing_m() * (1u64 << zoom) as f64
+    }
+
+    /// Distance of its coarsest samples, m.
+    pub fn coarsest_m(&self) -> f64 {
+        self.step_m(self.zoom_max)
     }
 
     /// The doublings after which samples are no farther apart than that.
@@ -285,11 +292,14 @@ fn square(spacing_m: f64) -> TileGrid {
     TileGrid { origin_m: [-0.5 * side, 0.5 * side], size_m: [side; 2], finest_m, levels: LEVELS }
 }
 
-/// The map of a ground between four edges, in pixels of two basic spacings to `coarsest_m`, and the most doublings of the spacing.
-fn bounded(spacing_m: f64, offset_m: [f64; 2], edges_m: [f64; 4], coarsest_m: f64) -> (TileGrid, u32) {
+/// The map of a ground between the outer posts of a DEM, in pixels of two basic spacings to half the distance of the posts, and the most doublings of
+/// the spacing.
+fn bounded(spacing_m: f64, offset_m: [f64; 2], posts: &Geometry) -> (TileGrid, u32) {
+    let coarsest_m = 0.5 * posts.cell[0].min(posts.cell[1]);
     let zoom_max = (1..ZOOM_MAX).take_while(|k| spacing_m * (1u64 << k) as f64 <= coarsest_m).last().unwrap_or(1);
     let step_m = spacing_m * (1u64 << zoom_max) as f64;
-    let [west, south, east, north] = edges_m;
+    let [west, south] = [posts.x(0), posts.y(posts.rows - 1)];
+    let [east, north] = [posts.x(posts.cols - 1), posts.y(0)];
     let edge = |at: f64, axis: usize, to: fn(f64) -> f64| to((at - offset_m[axis]) / step_m) * step_m + offset_m[axis];
     let (west, north) = (edge(west, 0, f64::floor), edge(north, 1, f64::ceil));
     let size_m = [edge(east, 0, f64::ceil) - west, north - edge(south, 1, f64::floor)];
@@ -341,7 +351,7 @@ impl World {
     /// # Errors
     /// A library that has no room for the request.
     pub async fn map_tile(
-        self: &Arc<Self>,
+        &self,
         maker: &Maker,
         tile: TileIndex,
         phenomena: Option<&[usize]>,
@@ -361,18 +371,13 @@ impl World {
     }
 
     /// The samples of one window, as the library keeps them.
-    async fn window(
-        self: &Arc<Self>,
-        maker: &Maker,
-        window: Window,
-        selection: &Selection,
-    ) -> Result<Arc<Samples>, Problem> {
+    async fn window(&self, maker: &Maker, window: Window, selection: &Selection) -> Result<Arc<Samples>, Problem> {
         let Window { zoom, west, south, cols, rows, centred } = window;
         let key = TileKey::new(format!(
             "{} {:?} {:?} {zoom} {west} {south} {cols} {rows} {centred}",
             self.digest, selection.phenomena, selection.feature_min_m
         ));
-        let ground = self.ground(&selection.phenomena).await?;
+        let ground = self.ground(&selection.phenomena)?;
         self.check_seconds(&*ground, &window, selection.feature_min_m, [1.0, TILE_SECONDS])?;
         let feature_min_m = selection.feature_min_m;
         let make = move |cancel: &std::sync::atomic::AtomicBool| {
@@ -389,14 +394,8 @@ impl World {
     ///
     /// # Errors
     /// A sentence with a `feature_min_m` that would do.
-    pub async fn check_work(
-        self: &Arc<Self>,
-        zoom: u32,
-        tiles: u64,
-        selection: &Selection,
-        seconds_max: f64,
-    ) -> Result<(), Problem> {
-        let ground = self.ground(&selection.phenomena).await?;
+    pub fn check_work(&self, zoom: u32, tiles: u64, selection: &Selection, seconds_max: f64) -> Result<(), Problem> {
+        let ground = self.ground(&selection.phenomena)?;
         let window = Window { zoom, west: 0, south: 0, cols: TILE, rows: TILE, centred: false };
         self.check_seconds(&*ground, &window, selection.feature_min_m, [1.0, TILE_SECONDS])?;
         self.check_seconds(&*ground, &window, selection.feature_min_m, [tiles as f64, seconds_max])
@@ -418,13 +417,45 @@ impl World {
             return Ok(());
         }
         let mut wider = (0..64).map(|k| self.step_m(window.zoom) * (1u64 << k) as f64).filter(|m| *m > feature_min_m);
-        let advice = wider.find(|m| expected_s(*m) <= limit_s).map_or_else(String::new, |m| {
-            format!(", or `feature_min_m={m}` to leave out craters and rocks up to that width")
-        });
-        let detail = format!(
-            "this takes about {wanted_s:.0} s of processor time; the limit is {limit_s:.0} s. Ask for a smaller area{advice}"
-        );
+        let advice = wider.find(|m| expected_s(*m) <= limit_s);
+        let advice = advice.map(|m| format!("`feature_min_m={m}` to leave out craters and rocks up to that width"));
+        let detail = if tiles > 1.0 {
+            format!(
+                "this takes about {wanted_s:.0} s of processor time; the limit is {limit_s:.0} s. Request a smaller area{}",
+                advice.map_or_else(String::new, |advice| format!(", or {advice}"))
+            )
+        } else {
+            format!(
+                "samples this far apart see so many craters and rocks that a tile of them takes about {wanted_s:.0} s of processor time; the limit is \
+                 {limit_s:.0} s. {}",
+                advice.map_or_else(|| "Request a finer resolution".to_owned(), |advice| format!("Set {advice}"))
+            )
+        };
         Err(Problem::too_large(detail, "processor_seconds_max", limit_s as u64))
+    }
+
+    /// Refuses samples at some places that are expected to take too long together, each made by itself or from the tile that it lies in.
+    ///
+    /// # Errors
+    /// As [`Self::check_work`].
+    pub fn check_places(
+        &self,
+        places: &[[f64; 2]],
+        step_m: f64,
+        selection: &Selection,
+        piece: Piece,
+        seconds_max: f64,
+    ) -> Result<(), Problem> {
+        let zoom = self.zoom_below(step_m);
+        if piece == Piece::Alone {
+            let window = Window { zoom, west: 0, south: 0, cols: 2, rows: 2, centred: false };
+            let (ground, count) = (self.ground(&selection.phenomena)?, places.len() as f64);
+            return self.check_seconds(&*ground, &window, selection.feature_min_m, [count, seconds_max]);
+        }
+        let side_m = self.step_m(zoom) * TILE as f64;
+        let tile = |place: &[f64; 2]| self.to_lattice(*place).map(|at| (at / side_m).floor() as i64);
+        let tiles: HashSet<[i64; 2]> = places.iter().map(tile).collect();
+        self.check_work(zoom, tiles.len() as u64, selection, seconds_max)
     }
 
     /// The tiles that a window of the lattice lies in, as `(column, row)` of tiles.
@@ -439,7 +470,7 @@ impl World {
     /// # Errors
     /// A library that has no room for the request.
     pub async fn lattice_tile(
-        self: &Arc<Self>,
+        &self,
         maker: &Maker,
         zoom: u32,
         [col, row]: [i64; 2],
@@ -468,7 +499,7 @@ impl World {
         let own_m = self.step_m(zoom);
         if step_m > 2.0 * own_m {
             return Err(Problem::bad_request(format!(
-                "`resolution_m` is {step_m}; the posts of the DEM show no more from {} m on: take the DEM itself",
+                "`resolution_m` is {step_m}; from {} m on the DEM itself has all the detail: use it, or request a finer resolution",
                 2.0 * own_m
             )));
         }
@@ -520,7 +551,7 @@ impl World {
             return self.window(maker, window, selection).await.map(|samples| Samples::clone(&samples));
         }
         let places = Self::tiles_of(first, shape);
-        self.check_work(zoom, places.len() as u64, selection, maker.seconds_max).await?;
+        self.check_work(zoom, places.len() as u64, selection, maker.seconds_max)?;
         let mut places = places.into_iter();
         let (mut tiles, mut made) = (JoinSet::new(), None::<Samples>);
         loop {

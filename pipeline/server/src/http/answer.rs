@@ -12,7 +12,7 @@ use std::ops::Range;
 
 /// Longer answers are sent as they are: packing them would keep the runtime's threads from other clients, bytes.
 const PACKED_MAX: usize = 4 << 20;
-/// Longer parts of an answer are not copied, bytes; they count among those on their way to clients.
+/// Longer parts of an answer are not copied, bytes.
 const COPIED_MAX: usize = 256 << 10;
 /// Endings of the tags of packed answers.
 const ENCODINGS: [&str; 2] = ["gzip", "zstd"];
@@ -20,6 +20,10 @@ const ENCODINGS: [&str; 2] = ["gzip", "zstd"];
 /// Marks a response that is not to be packed.
 #[derive(Clone, Copy, Debug)]
 pub struct AsItIs;
+
+/// Bytes of memory that a response keeps while it is sent: a packed one all that it is packed from, a part the whole.
+#[derive(Clone, Copy, Debug)]
+pub struct Behind(pub u64);
 
 /// What is sent.
 #[derive(Clone, Debug)]
@@ -155,13 +159,17 @@ fn whole_or_part(headers: &HeaderMap, tag: &str, answer: Answer) -> Response {
     // Ranges are those of the bytes as they are: the tag of a packed answer names others.
     let same = headers.get(header::IF_RANGE).is_none_or(|value| value.as_bytes() == tag.as_bytes());
     let asked = headers.get(header::RANGE).and_then(|value| value.to_str().ok()).filter(|_| same);
+    let mut behind = length;
     let mut response = match asked.and_then(|text| range(text, length)) {
         None => Body::from(answer.body).into_response(),
         Some(Some(part)) => {
             let place = format!("bytes {}-{}/{length}", part.start, part.end - 1);
             let part = match part.len() {
                 // Alone: a slice would keep the whole answer in memory.
-                0..=COPIED_MAX => Bytes::copy_from_slice(&answer.body[part]),
+                0..=COPIED_MAX => {
+                    behind = part.len();
+                    Bytes::copy_from_slice(&answer.body[part])
+                }
                 _ => answer.body.slice(part),
             };
             (StatusCode::PARTIAL_CONTENT, [(header::CONTENT_RANGE, place)], part).into_response()
@@ -172,6 +180,7 @@ fn whole_or_part(headers: &HeaderMap, tag: &str, answer: Answer) -> Response {
     own.insert(header::CONTENT_TYPE, HeaderValue::from_static(answer.media));
     own.insert(header::ACCEPT_RANGES, HeaderValue::from_static("bytes"));
     own.extend(answer.more);
+    response.extensions_mut().insert(Behind(behind as u64));
     if length > PACKED_MAX {
         response.extensions_mut().insert(AsItIs);
     }
@@ -242,6 +251,19 @@ mod tests {
             let response = runtime.block_on(answers.answer(&HeaderMap::new(), "what", make)).unwrap();
             assert_eq!(response.headers()[header::CACHE_CONTROL], freshness);
         }
+    }
+
+    /// A part that is not copied keeps the whole in memory.
+    #[test]
+    fn val_parts_say_what_they_keep() {
+        let keeps = |range: &'static str| {
+            let headers = HeaderMap::from_iter([(header::RANGE, HeaderValue::from_static(range))]);
+            let answer = Answer::new("text/plain", vec![0; 1 << 20]);
+            whole_or_part(&headers, "\"tag\"", answer).extensions().get::<Behind>().map(|behind| behind.0)
+        };
+        assert_eq!(keeps("bytes=0-99"), Some(100));
+        assert_eq!(keeps("bytes=0-262144"), Some(1 << 20));
+        assert_eq!(keeps("lines=0-99"), Some(1 << 20));
     }
 
     /// An answer of more than half of the room is kept, on any number of processors.

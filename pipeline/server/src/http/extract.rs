@@ -117,7 +117,7 @@ impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for Body<T> {
             if e.status() == axum::http::StatusCode::PAYLOAD_TOO_LARGE {
                 Problem::too_large("the body is too long", "body_bytes_max", super::service::BODY_BYTES as u64)
             } else {
-                Problem::bad_request("the body cannot be read to its end")
+                Problem::bad_request("the body of the request ends early")
             }
         })?;
         let value: serde_json::Value =

@@ -1,12 +1,13 @@
 //! What every request passes: the token, the limits, and the books.
 
 use super::Problem;
+use super::answer::Behind;
 use super::extract::host;
 use super::query::TOKEN;
 use super::service::{BODY_BYTES, Service};
 use axum::body::Body;
 use axum::extract::{MatchedPath, Query, Request, State};
-use axum::http::{HeaderName, HeaderValue, header};
+use axum::http::{HeaderName, HeaderValue, StatusCode, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 use hyper::body::{Body as HttpBody, Bytes, Frame, SizeHint};
@@ -169,7 +170,8 @@ fn piece_of(rest: &mut Bytes) -> Bytes {
 
 fn send(service: &Arc<Service>, response: Response, seat: Option<Seat>) -> Response {
     // Small answers always go: clients that read nothing cannot keep others from them, and the number of connections bounds them.
-    let bytes = Some(response.body().size_hint().lower()).filter(|bytes| *bytes > PIECE as u64).unwrap_or(0);
+    let behind = response.extensions().get::<Behind>().map_or_else(|| response.body().size_hint().lower(), |b| b.0);
+    let bytes = Some(behind).filter(|bytes| *bytes > PIECE as u64).unwrap_or(0);
     let Some(load) = Load::take(service, bytes) else {
         return Problem::unavailable("too many bytes are on their way to clients; try again in 2 s").into_response();
     };
@@ -213,7 +215,7 @@ fn admit(service: &Arc<Service>, request: &Request) -> Result<Option<Seat>, Prob
 /// name lead here.
 fn check_host(service: &Service, request: &Request) -> Result<(), Problem> {
     if request.headers().get_all(header::HOST).iter().count() > 1 {
-        return Err(Problem::bad_request("`Host`: given twice; give it once"));
+        return Err(Problem::bad_request("the header `Host` is given more than once"));
     }
     let Some(host) = host(request.headers()) else { return Ok(()) };
     if !service.address.ip().is_loopback() || service.token.is_some() {
@@ -231,7 +233,7 @@ fn check_host(service: &Service, request: &Request) -> Result<(), Problem> {
         return Ok(());
     }
     Err(Problem::misdirected(format!(
-        "this server is for its own computer and is not called \"{name}\"; start it with --cors http://{name}, or with a token"
+        "host \"{name}\" is not allowed: the server listens on loopback only; to allow it, restart with `--cors http://{name}` or set SASTRUGI_TOKEN"
     )))
 }
 
@@ -255,6 +257,9 @@ fn same(a: &str, b: &str) -> bool {
 /// One tag for each encoding of an answer: compressed bytes are others.
 pub async fn tag_encodings(request: Request, next: Next) -> Response {
     let mut response = next.run(request).await;
+    if response.status() == StatusCode::NOT_ACCEPTABLE {
+        return Problem::not_acceptable("`Accept-Encoding` takes none of gzip, zstd and identity").into_response();
+    }
     let headers = response.headers_mut();
     let encoding = headers.get(header::CONTENT_ENCODING).and_then(|v| v.to_str().ok()).map(str::to_owned);
     let tag = headers.get(header::ETAG).and_then(|v| v.to_str().ok()).map(|tag| tag.trim_matches('"').to_owned());

@@ -24,6 +24,8 @@ use tokio::task::JoinSet;
 const JOBS_MAX: usize = 1000;
 /// Tiles of a job that are under way at once.
 const AT_ONCE: usize = 4;
+/// Areas lie no farther out, m.
+const FARTHEST_M: f64 = 1e12;
 /// How long a job waits where the library has no room for it.
 const WAIT: Duration = Duration::from_millis(200);
 
@@ -141,14 +143,20 @@ struct Area {
 }
 
 impl Area {
-    async fn of(service: &Service, order: &Order) -> Result<Self, Problem> {
+    fn of(service: &Service, order: &Order) -> Result<Self, Problem> {
         let collection = service.collection(&order.collection)?;
         let Ground::World(world) = &collection.ground else {
-            return Err(Problem::bad_request("a raster is read, not generated: there is nothing to prepare"));
+            return Err(Problem::bad_request(
+                "jobs are for worlds; a raster is read, and needs no generation in advance",
+            ));
         };
         let [west, south, east, north] = order.bounds_m;
-        let finite = order.bounds_m.iter().all(|v| v.is_finite() && v.abs() <= 1e12);
-        if !(finite && west < east && south < north) {
+        if !order.bounds_m.iter().all(|v| v.abs() <= FARTHEST_M) {
+            return Err(Problem::bad_request(format!(
+                "`bounds_m` must be four numbers from -{FARTHEST_M:e} to {FARTHEST_M:e}"
+            )));
+        }
+        if !(west < east && south < north) {
             return Err(Problem::bad_request(
                 "`bounds_m` must be west, south, east, north in metres, west below east and south below north",
             ));
@@ -164,9 +172,9 @@ impl Area {
             return Err(Problem::bad_request("`feature_min_m` must lie between 0 and 1e9"));
         }
         let side = world.step_m(zoom) * TILE as f64;
-        let tile = |at: f64| (at / side).floor() as i64;
-        let first = [tile(west), tile(south)];
-        let count = [tile(east) - first[0] + 1, tile(north) - first[1] + 1].map(|n| n.max(1) as u64);
+        let tile = |corner: [f64; 2]| world.to_lattice(corner).map(|at| (at / side).floor() as i64);
+        let (first, last) = (tile([west, south]), tile([east, north]));
+        let count = [0, 1].map(|a| (last[a] - first[a] + 1).max(1) as u64);
         let tiles = count[0].saturating_mul(count[1]);
         let most = service.limits.job_tiles;
         if tiles > most {
@@ -178,7 +186,7 @@ impl Area {
         }
         let phenomena = world.choose(order.phenomena.clone())?;
         let selection = Selection { phenomena, feature_min_m: order.feature_min_m };
-        world.check_work(zoom, tiles, &selection, f64::INFINITY).await?;
+        world.check_work(zoom, tiles, &selection, f64::INFINITY)?;
         let ends = |axis: usize| [first[axis], first[axis].saturating_add(count[axis] as i64)];
         [0, 1].into_iter().flat_map(ends).try_for_each(|tile| world.check_reach(zoom, tile as f64 * TILE as f64))?;
         Ok(Self { world: Arc::clone(world), zoom, first, count, selection })
@@ -196,7 +204,7 @@ pub async fn order(
     _: Plain,
     Body(order): Body<Order>,
 ) -> Result<Response, Problem> {
-    let area = Area::of(&service, &order).await?;
+    let area = Area::of(&service, &order)?;
     let job = service.jobs.add(order, area.count[0] * area.count[1])?;
     let described = job.describe();
     let place = format!("/v1/jobs/{}", job.id);

@@ -72,7 +72,7 @@ pub fn router(service: &Arc<Service>, origins: &[HeaderValue]) -> Router {
         .route("/", get(page::index))
         .route("/{*file}", get(page::file))
         .method_not_allowed_fallback(async |method: Method| {
-            Problem::method(format!("{method} is not for this address; the header `Allow` names what is"))
+            Problem::method(format!("method {method} is not allowed here; see the header `Allow`"))
         })
         .layer(DefaultBodyLimit::max(service::BODY_BYTES))
         .layer(CompressionLayer::new().compress_when(DefaultPredicate::new().and(is_packed)))

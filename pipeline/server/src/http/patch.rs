@@ -76,7 +76,7 @@ impl Window {
         if shape[0] * shape[1] > most as f64 {
             return Err(Problem::too_large(
                 format!(
-                    "{} x {} samples are too many: the limit is {most}; ask for fewer, or for parts",
+                    "{} x {} samples exceed the limit of {most}; request a smaller window, or several",
                     shape[0], shape[1]
                 ),
                 "samples_max",
@@ -194,7 +194,9 @@ impl Treatment {
         let there = |field: &Option<Vec<f32>>| {
             let name = self.field;
             field.clone().ok_or_else(|| {
-                Problem::bad_request(format!("`field`: no process that acts gives {name}; `phenomena` leaves it out"))
+                Problem::bad_request(format!(
+                    "`field`: `phenomena` excludes the process that produces {name}; include it"
+                ))
             })
         };
         match self.field {
@@ -327,7 +329,7 @@ async fn ground(
     if samples.is_void() {
         let [west, south, east, north] = collection.grid().bounds_m();
         return Err(Problem::not_found(format!(
-            "there is no data in this window; \"{}\" lies between x = {west} and {east} m, y = {south} and {north} m",
+            "there is no data in this window; \"{}\" lies between x = {west} and {east} m, y = {south} and {north} m, and may have holes there",
             collection.id
         )));
     }

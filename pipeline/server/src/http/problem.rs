@@ -49,6 +49,11 @@ impl Problem {
         Self::new(StatusCode::METHOD_NOT_ALLOWED, detail)
     }
 
+    /// 406: the client takes no encoding that there is.
+    pub fn not_acceptable(detail: impl Into<String>) -> Self {
+        Self::new(StatusCode::NOT_ACCEPTABLE, detail)
+    }
+
     /// 415: the body is of another type.
     pub fn media(detail: impl Into<String>) -> Self {
         Self::new(StatusCode::UNSUPPORTED_MEDIA_TYPE, detail)
@@ -56,7 +61,7 @@ impl Problem {
 
     /// 416: the range lies beyond the end of `length` bytes.
     pub fn range(length: usize) -> Self {
-        let detail = format!("the range lies beyond the end; there are {length} bytes");
+        let detail = format!("the range lies beyond the end of the answer, which has {length} bytes");
         Self { hint: Hint::Length(length), ..Self::new(StatusCode::RANGE_NOT_SATISFIABLE, detail) }
     }
 

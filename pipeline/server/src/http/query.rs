@@ -27,7 +27,7 @@ impl Query {
                 return Err(Problem::bad_request(format!("`{name}`: unknown parameter; this path takes {names}")));
             }
             if all.contains_key(&name) {
-                return Err(Problem::bad_request(format!("`{name}`: given twice; give it once")));
+                return Err(Problem::bad_request(format!("the parameter `{name}` is given more than once")));
             }
             all.insert(name, value);
         }
@@ -83,7 +83,9 @@ impl Query {
     /// Text that is not two finite numbers.
     pub fn pair(&self, name: &str) -> Result<Option<[f64; 2]>, Problem> {
         let Some(text) = self.text(name) else { return Ok(None) };
-        place(text).map(Some).ok_or_else(|| refused(name, text, "two numbers, as `12.5,-3`"))
+        place(text).map(Some).ok_or_else(|| {
+            refused(name, text, &format!("two numbers from -{FARTHEST_M:e} to {FARTHEST_M:e}, as `12.5,-3`"))
+        })
     }
 
     /// Places along a line, `x,y;x,y;...`.
@@ -93,9 +95,9 @@ impl Query {
     pub fn line(&self, name: &str, most: usize) -> Result<Vec<[f64; 2]>, Problem> {
         let text = self.text(name).ok_or_else(|| missing(name))?;
         let places: Option<Vec<[f64; 2]>> = text.split(';').map(place).collect();
-        places
-            .filter(|p| (2..=most).contains(&p.len()))
-            .ok_or_else(|| refused(name, text, &format!("2 to {most} places, as `0,0;10,5`")))
+        places.filter(|p| (2..=most).contains(&p.len())).ok_or_else(|| {
+            refused(name, text, &format!("2 to {most} places from -{FARTHEST_M:e} to {FARTHEST_M:e}, as `0,0;10,5`"))
+        })
     }
 
     /// Whole numbers, `1,3`; an empty text has none.
@@ -120,7 +122,7 @@ fn place(text: &str) -> Option<[f64; 2]> {
 }
 
 fn missing(name: &str) -> Problem {
-    Problem::bad_request(format!("`{name}`: missing; this path needs it"))
+    Problem::bad_request(format!("the parameter `{name}` is missing"))
 }
 
 fn refused(name: &str, text: &str, right: &str) -> Problem {

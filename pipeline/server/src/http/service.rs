@@ -22,10 +22,12 @@ pub const BODY_BYTES: usize = 1 << 16;
 /// Most bytes that a sample of a patch takes while the patch is put together: four fields of it and, where it lies between lattice points, of the
 /// four around it, and three copies for turns and files.
 const SAMPLE_BYTES: usize = 128;
-/// Room for patches is counted in so many bytes, and there are so many of them: two of the largest patches, or all windows of a map.
+/// Room for patches is counted in so many bytes. There are so many of them for small patches, and as many for large ones: the largest at a time.
 const ROOM_UNIT: usize = 1 << 20;
 /// See [`ROOM_UNIT`].
-pub const ROOM_UNITS: usize = 1 << 10;
+pub const ROOM_UNITS: usize = 1 << 9;
+/// A patch of more is large: 362 x 362 samples.
+const SMALL_UNITS: usize = 16;
 
 /// What a request may ask for, and how much may be under way.
 #[derive(Clone, Debug)]
@@ -87,8 +89,8 @@ pub struct Service {
     pub under_way: Mutex<HashMap<IpAddr, usize>>,
     /// Bytes of answers on their way to clients.
     pub sending: AtomicU64,
-    /// Room for patches that are being put together, [`ROOM_UNITS`].
-    pub room: Arc<Semaphore>,
+    /// Room for small and for large patches that are being put together, [`ROOM_UNITS`] each.
+    pub rooms: [Arc<Semaphore>; 2],
     /// Processors for work that is not that of the library.
     pub processors: Arc<Semaphore>,
 }
@@ -142,14 +144,15 @@ impl Service {
         raster.levels(self.blocking(move || reader.read())).await
     }
 
-    /// Room for the samples of a patch while it is put together; the others wait for theirs in line. A patch that would need more than there is
-    /// waits for all of it.
+    /// Room for the samples of a patch while it is put together; others wait for theirs in line, small ones not behind large ones. A patch that would
+    /// need more than there is waits for all of it.
     ///
     /// # Errors
     /// None while the server runs.
     pub async fn room(&self, samples: usize) -> Result<OwnedSemaphorePermit, Problem> {
         let units = (samples * SAMPLE_BYTES).div_ceil(ROOM_UNIT).min(ROOM_UNITS);
-        let room = Arc::clone(&self.room).acquire_many_owned(units as u32).await;
+        let room = &self.rooms[usize::from(units > SMALL_UNITS)];
+        let room = Arc::clone(room).acquire_many_owned(units as u32).await;
         room.map_err(|e| Problem::internal(e.to_string()))
     }
 
@@ -182,9 +185,9 @@ pub fn selection(collection: &Collection, query: &Query) -> Result<Selection, Pr
     let feature_min_m = query.number("feature_min_m", [0.0, 1e9])?.unwrap_or(0.0);
     match &collection.ground {
         Ground::World(world) => Ok(Selection { phenomena: world.choose(numbers)?, feature_min_m }),
-        Ground::Raster(_) if numbers.is_some() || feature_min_m > 0.0 => Err(Problem::bad_request(
-            "`phenomena` and `feature_min_m` are for worlds; a raster has the ground that its file holds",
-        )),
+        Ground::Raster(_) if numbers.is_some() || feature_min_m > 0.0 => {
+            Err(Problem::bad_request("`phenomena` and `feature_min_m` are for worlds; a raster does not support them"))
+        }
         Ground::Raster(_) => Ok(Selection::default()),
     }
 }

@@ -45,7 +45,7 @@ pub async fn xyz(
     let [z, x, y] = whole([&z, &x, y])?;
     let tile = of_web_mercator(z, x, y).ok_or_else(|| {
         let [col, row] = WINDOW_TILE;
-        Problem::not_found(format!("the map is the tile {WINDOW_ZOOM}/{col}/{row} and those within it"))
+        Problem::not_found(format!("outside the map, which is the tile {WINDOW_ZOOM}/{col}/{row} and those within it"))
     })?;
     send(&service, &collection, &layer, tile, pairs, &headers).await
 }
@@ -75,7 +75,7 @@ async fn send(
     if !grid.has(tile) {
         let levels = grid.levels - 1;
         return Err(Problem::not_found(format!(
-            "there is no such tile; levels are 0 to {levels}, and there are no tiles outside the collection"
+            "no such tile: the level must be 0 to {levels}, and row and column inside the collection"
         )));
     }
     let phenomena = selection(collection, &query)?.phenomena;
@@ -89,15 +89,12 @@ async fn send(
                 service.blocking(move || Ok(Arc::new(raster.tile(&levels, tile)))).await?
             }
         };
-        if samples.is_void() {
+        if Layer::is_void(&samples) {
             return Ok(None);
         }
         let drawn = service.blocking(move || Ok(layer.draw(&samples, &style))).await?;
         let png = drawn.ok_or_else(|| {
-            Problem::not_found(format!(
-                "heights of this tile lie beyond what `{}` can hold; `patch` has them",
-                layer.name()
-            ))
+            Problem::not_found(format!("heights of this tile are outside the range of `{}`; use `patch`", layer.name()))
         })?;
         Ok(Some(Answer::new("image/png", png)))
     };
@@ -140,7 +137,7 @@ pub async fn tilejson(
         "name": format!("{id}: {}", layer.summary()),
         "tiles": [format!("{host}/v1/collections/{id}/xyz/{}/{{z}}/{{x}}/{{y}}.png", layer.name())],
         "minzoom": WINDOW_ZOOM,
-        "maxzoom": WINDOW_ZOOM + collection.grid().levels - 1,
+        "maxzoom": WINDOW_ZOOM + finest_level(&collection, layer),
         "bounds": window_degrees(&collection),
         "scheme": "xyz",
         "description": "A plane in the place of one tile of the web-Mercator map: distances and areas that a client works out from longitude \
@@ -160,6 +157,13 @@ pub async fn tilejson(
         json.extend(encoding);
     }
     Ok(Json(json))
+}
+
+/// The finest level of which a layer is offered to web-Mercator clients.
+fn finest_level(collection: &Collection, layer: Layer) -> u32 {
+    let grid = collection.grid();
+    let fits = |level: &u32| grid.resolution_m(*level) >= layer.finest_m();
+    (0..grid.levels).rev().find(fits).unwrap_or(0)
 }
 
 /// West, south, east and north of the tiles of level 0 in a web-Mercator client, degrees.

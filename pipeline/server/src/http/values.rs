@@ -66,19 +66,25 @@ pub async fn profile(
     let line = query.line("line", CORNERS_MAX)?;
     let count = query.whole("samples", [2, SAMPLES_MAX])?.unwrap_or(SAMPLES) as usize;
     let (distances_m, places) = along(&line, count)
-        .ok_or_else(|| Problem::bad_request("`line`: its places are all the same; it must lead somewhere"))?;
+        .ok_or_else(|| Problem::bad_request("`line` has no length; give at least two different places"))?;
     let apart_m = distances_m[count - 1] / (count - 1) as f64;
     let [_, finest_m] = collection.spacings_m();
     // A spacing of the lattice, so that lines that differ a little share tiles.
-    let unasked_m = || finest_m * libm::exp2(libm::floor(libm::log2(apart_m / finest_m)).max(0.0));
+    let coarsest_m = match &collection.ground {
+        Ground::World(world) => world.coarsest_m(),
+        Ground::Raster(_) => f64::INFINITY,
+    };
+    let unasked_m = || (finest_m * libm::exp2(libm::floor(libm::log2(apart_m / finest_m)).max(0.0))).min(coarsest_m);
     let step_m = query.number("resolution_m", [1e-6, 1e9])?.unwrap_or_else(unasked_m);
     let mut selection = selection(&collection, &query)?;
-    let is_world = matches!(collection.ground, Ground::World(_));
-    if is_world && query.text("feature_min_m").is_none() && step_m > finest_m {
-        // As in map tiles of that resolution.
-        selection.feature_min_m = FEATURE_PIXELS * step_m;
-    }
     let piece = if apart_m * SHARED as f64 <= TILE as f64 * step_m { Piece::Tiles } else { Piece::Alone };
+    if let Ground::World(world) = &collection.ground {
+        if query.text("feature_min_m").is_none() && step_m > finest_m {
+            // As in map tiles of that resolution.
+            selection.feature_min_m = FEATURE_PIXELS * step_m;
+        }
+        world.check_places(&places, step_m, &selection, piece, service.limits.work_s)?;
+    }
     let feature_min_m = selection.feature_min_m;
     let heights = heights(&service, &collection, &places, step_m, (selection, piece)).await?;
     Ok(Json(json!({

@@ -140,7 +140,7 @@ impl Disk {
                 self.unwritten.fetch_add(1, Ordering::Relaxed);
                 let folder = self.folder.display();
                 self.warned.call_once(
-                    || tracing::warn!(%folder, %error, "tiles cannot be kept on disk; they are served all the same"),
+                    || tracing::warn!(%folder, %error, "tiles cannot be written to the library; they are served without it"),
                 );
             }
         }

@@ -79,7 +79,7 @@ pub enum LibraryError {
     #[error("{}: not a library of tiles, and not empty; choose another folder with --library", .0.display())]
     Occupied(PathBuf),
     /// The folder is of another version of the program.
-    #[error("{}: a library of another version of sastrugi; choose another folder with --library, or remove this one", .0.display())]
+    #[error("{}: a tile library of another version of sastrugi; choose another folder with --library, or remove this one", .0.display())]
     Version(PathBuf),
     /// There is a file of that name.
     #[error("{}: this is a file; --library takes a folder", .0.display())]
@@ -177,6 +177,7 @@ type Made = Result<Arc<Samples>, Unavailable>;
 struct Flight {
     number: u64,
     waiters: usize,
+    priority: Priority,
     cancel: Arc<AtomicBool>,
     landed: watch::Receiver<Option<Made>>,
 }
@@ -283,6 +284,7 @@ impl Library {
         if let Some(flight) = flights.get_mut(&digest) {
             flight.waiters += 1;
             if priority == Priority::Answer {
+                flight.priority = priority;
                 self.workers.promote(&flight.cancel);
                 self.readers.promote(&flight.cancel);
             }
@@ -295,12 +297,12 @@ impl Library {
         let is_kept = self.disk.as_ref().is_some_and(|disk| disk.has(&key));
         let trip = Trip { library: Arc::downgrade(self), key, number, cancel: Arc::clone(&cancel), land };
         let queued = if is_kept {
-            self.readers.push(priority, Arc::clone(&cancel), Box::new(move || trip.read(priority, make)))
+            self.readers.push(priority, Arc::clone(&cancel), Box::new(move || trip.read(make)))
         } else {
             self.workers.push(priority, Arc::clone(&cancel), Box::new(move || trip.make(make)))
         };
         queued.map_err(|_| Unavailable::Busy)?;
-        flights.insert(digest, Flight { number, waiters: 1, cancel, landed: landed.clone() });
+        flights.insert(digest, Flight { number, waiters: 1, priority, cancel, landed: landed.clone() });
         Ok(Boarded::Waiting(Waiter { library: Arc::clone(self), digest, number }, landed))
     }
 
@@ -363,18 +365,23 @@ struct Trip {
 
 impl Trip {
     /// Brings the tile of a record, on a reader. Where the record is damaged, a worker makes the tile.
-    fn read(self, priority: Priority, make: impl FnOnce(&AtomicBool) -> Option<Samples> + Send + 'static) {
+    fn read(self, make: impl FnOnce(&AtomicBool) -> Option<Samples> + Send + 'static) {
         let Some(library) = self.library.upgrade() else { return };
         if let Some(tile) = library.disk.as_ref().and_then(|disk| disk.read(&self.key)) {
             count(&library.counts.disk_hits);
             library.land(&self.land, self.key.digest, Ok(Arc::new(tile)));
             return library.forget(self.key.digest, self.number);
         }
-        let (cancel, land) = (Arc::clone(&self.cancel), self.land.clone());
-        let (key, number) = (self.key.digest, self.number);
-        if library.workers.push(priority, cancel, Box::new(move || self.make(make))).is_err() {
+        let (digest, number, land) = (self.key.digest, self.number, self.land.clone());
+        let pushed = {
+            // Who joins meanwhile finds it in one line or the other.
+            let flights = library.flights();
+            let Some(flight) = flights.get(&digest).filter(|flight| flight.number == number) else { return };
+            library.workers.push(flight.priority, Arc::clone(&self.cancel), Box::new(move || self.make(make)))
+        };
+        if pushed.is_err() {
             let _ = land.send(Some(Err(Unavailable::Busy)));
-            library.forget(key, number);
+            library.forget(digest, number);
         }
     }
 

@@ -160,6 +160,7 @@ impl Pool {
         let place = queue.background.iter().position(|waiting| Arc::ptr_eq(&waiting.cancel, cancel));
         if let Some(waiting) = place.and_then(|place| queue.background.remove(place)) {
             queue.answers.push_back(waiting);
+            self.shared.changed.notify_one();
         }
     }
 

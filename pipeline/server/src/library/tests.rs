@@ -438,10 +438,17 @@ fn val_work_ahead_leaves_a_thread_to_answers() {
         until(|| library.statistics().running == 2 && library.statistics().queued == 1).await;
         assert_eq!(*ask(&library, 7).await, tile_of(7, 8));
         until(|| library.statistics().running == 2 && library.statistics().queued == 1).await;
-        for (request, go) in held {
+        // One that waits to be made ahead is taken up by that thread once somebody waits for it.
+        let joined = tokio::spawn({
+            let library = Arc::clone(&library);
+            async move { ask(&library, 2).await }
+        });
+        until(|| library.statistics().running == 3).await;
+        for (request, go) in held.into_iter().rev() {
             go.send(()).unwrap();
             request.await.unwrap().unwrap();
         }
+        assert_eq!(*joined.await.unwrap(), tile_of(2, 8));
     });
 }
 

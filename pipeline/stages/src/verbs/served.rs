@@ -4,13 +4,13 @@ use super::terrain::prepare;
 use crate::error::Error;
 use crate::loaded;
 use crate::revision::Room;
-use sastrugi_numeric::Streams;
+use sastrugi_numeric::{Grid, Streams};
 use sastrugi_schemas::manifest::Source;
 use sastrugi_schemas::tables::TerrainRow;
 use sastrugi_store::release::Release;
-use sastrugi_terrain::elaborate::{self, Elaborate, RawElaborate};
+use sastrugi_terrain::elaborate::{self, Elaborate, Elaborated, RawElaborate};
 use sastrugi_terrain::planetary::{self, Planetary, RawPlanetary, RawProcess};
-use sastrugi_terrain::{Generator, Input, Windows};
+use sastrugi_terrain::{Generator, Input, TerrainError, Windows};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -20,14 +20,14 @@ use std::sync::Arc;
 const METRIC: &str = "metric";
 
 /// A world, at every place of which any patch can be made.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct ServedWorld {
     /// Name of the file, or id of the item in its study.
     pub id: String,
     /// What it is made from.
     pub surface: Surface,
     /// The inputs that it follows.
-    pub inputs: Arc<[Input]>,
+    pub inputs: Vec<Input>,
     /// Its full parameters.
     pub parameters: Value,
     /// Its random streams.
@@ -37,26 +37,23 @@ pub struct ServedWorld {
 }
 
 /// A generator that can make any window.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub enum Surface {
     /// A world without end, with the inputs that it follows.
     Planetary(Box<Planetary>),
     /// A DEM with finer detail.
-    Elaborate(Box<Elaborate>),
+    Elaborate(Arc<Elaborated>),
 }
 
 impl ServedWorld {
     /// The ground with the processes at some places of its list, from 0; the others keep their draws.
     ///
     /// # Errors
-    /// Inputs that cannot be used.
+    /// A raster that the rocks follow is missing.
     pub fn ground(&self, acts: impl Fn(usize) -> bool) -> Result<Arc<dyn Windows>, Error> {
         Ok(match &self.surface {
             Surface::Planetary(world) => Arc::new(world.world_of(&self.streams, acts)?),
-            Surface::Elaborate(form) => {
-                let made = form.elaborated(&self.streams, &self.inputs, acts);
-                Arc::new(made.map_err(|e| Error::Input(e.to_string()))?)
-            }
+            Surface::Elaborate(all) => Arc::new(all.selecting(&self.streams, acts)),
         })
     }
 
@@ -72,7 +69,7 @@ impl ServedWorld {
     pub fn spacing_m(&self) -> f64 {
         match &self.surface {
             Surface::Planetary(world) => world.spacing_m(),
-            Surface::Elaborate(form) => form.spacing_m(),
+            Surface::Elaborate(all) => all.spacing_m(),
         }
     }
 
@@ -80,7 +77,7 @@ impl ServedWorld {
     pub fn offset_m(&self) -> [f64; 2] {
         match &self.surface {
             Surface::Planetary(_) => [0.0; 2],
-            Surface::Elaborate(form) => form.offset_m(),
+            Surface::Elaborate(all) => all.offset_m(),
         }
     }
 
@@ -88,7 +85,7 @@ impl ServedWorld {
     pub fn window(&self) -> ([f64; 2], f64, Option<[u32; 2]>) {
         match &self.surface {
             Surface::Planetary(world) => (world.raw().origin_m, world.raw().cell_m, world.raw().size_px),
-            Surface::Elaborate(form) => (form.raw().origin_m, form.raw().cell_m, form.raw().size_px),
+            Surface::Elaborate(all) => (all.raw().origin_m, all.raw().cell_m, all.raw().size_px),
         }
     }
 
@@ -96,18 +93,16 @@ impl ServedWorld {
     pub fn processes(&self) -> &[RawProcess] {
         match &self.surface {
             Surface::Planetary(world) => &world.raw().processes,
-            Surface::Elaborate(form) => &form.raw().processes,
+            Surface::Elaborate(all) => &all.raw().processes,
         }
     }
 
-    /// Where it ends: west, south, east and north, m, and the coarsest samples that it has, m; `None` where it has no end.
-    ///
-    /// # Errors
-    /// Inputs that are missing.
-    pub fn extent(&self) -> Result<Option<([f64; 4], f64)>, Error> {
-        let Surface::Elaborate(form) = &self.surface else { return Ok(None) };
-        let (bounds_m, post_m) = form.posts_of(&self.inputs).map_err(|e| Error::Input(e.to_string()))?;
-        Ok(Some((bounds_m, 0.5 * post_m)))
+    /// The DEM that it follows, where it has an end.
+    pub fn dem(&self) -> Option<&Grid> {
+        match (&self.surface, self.inputs.first()) {
+            (Surface::Elaborate(_), Some(Input::Grid(dem))) => Some(dem),
+            _ => None,
+        }
     }
 }
 
@@ -140,7 +135,7 @@ pub struct ServedRaster {
 }
 
 /// What a file or folder has to serve.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub enum Served {
     /// Worlds of a file.
     Worlds(Vec<ServedWorld>),
@@ -158,6 +153,14 @@ pub fn served(path: &Path) -> Result<Served, Error> {
         let rasters = rasters(&release)?;
         return Ok(Served::Release(Box::new(release), rasters));
     }
+    if !path.to_string_lossy().to_ascii_lowercase().ends_with(".toml") {
+        return Err(Error::Usage(format!(
+            "{}: neither a TOML file of a world or a study, nor the folder of a release; a DEM is served as it stands in a release, or with finer \
+             detail by a TOML file with `kind = \"{}\"` and `dem = \"...\"`",
+            path.display(),
+            elaborate::KIND
+        )));
+    }
     let text = loaded::read(path)?;
     let is_study = text.parse::<toml_edit::DocumentMut>().is_ok_and(|file| file.contains_key("study"));
     let worlds = if is_study { worlds_of_study(path, &text)? } else { vec![world_of_file(path)?] };
@@ -174,22 +177,19 @@ pub fn served(path: &Path) -> Result<Served, Error> {
 /// The world of a terrain file: `kind`, `seed` and parameters, as the verb `terrain` reads it.
 fn world_of_file(path: &Path) -> Result<ServedWorld, Error> {
     let spec = path.display().to_string();
-    if !spec.to_ascii_lowercase().ends_with(".toml") {
-        return Err(Error::Usage(format!(
-            "{spec}: neither a TOML file of a world or a study, nor the folder of a release"
-        )));
-    }
     let prepared = prepare(&spec, &[], None)?;
     let (parameters, inputs) = (prepared.parameters(), || prepared.inputs());
     let (surface, inputs) = match prepared.kind() {
         planetary::KIND => {
             let inputs = inputs()?;
-            let world = world(&parameters)?.with_inputs(&inputs).map_err(|e| Error::Input(e.to_string()))?;
+            let world = world(&parameters)?.with_inputs(&inputs).map_err(unusable)?;
             (Surface::Planetary(Box::new(world)), inputs)
         }
         elaborate::KIND => {
             let raw: RawElaborate = sastrugi_schemas::kind::read_parameters(&parameters)?;
-            (Surface::Elaborate(Box::new(Elaborate::try_from(raw)?)), inputs()?)
+            let inputs = inputs()?;
+            let all = Elaborate::try_from(raw)?.elaborated(&prepared.streams(), &inputs);
+            (Surface::Elaborate(Arc::new(all.map_err(unusable)?)), inputs)
         }
         kind => {
             let (world, dem) = (planetary::KIND, elaborate::KIND);
@@ -199,8 +199,11 @@ fn world_of_file(path: &Path) -> Result<ServedWorld, Error> {
         }
     };
     let id = id_of(&path.file_stem().unwrap_or_default().to_string_lossy());
-    let (inputs, streams) = (inputs.into(), prepared.streams());
-    Ok(ServedWorld { id, surface, inputs, parameters, streams, license: None })
+    Ok(ServedWorld { id, surface, inputs, parameters, streams: prepared.streams(), license: None })
+}
+
+fn unusable(error: TerrainError) -> Error {
+    Error::Input(format!("failed to {error}"))
 }
 
 /// An id for addresses and studies from the name of a file: lower case, `-` for what else than letters, digits, `-` and `_` stands there.
@@ -231,7 +234,7 @@ fn worlds_of_study(path: &Path, text: &str) -> Result<Vec<ServedWorld>, Error> {
             worlds.push(ServedWorld {
                 id: id.clone(),
                 surface: Surface::Planetary(Box::new(world)),
-                inputs: Arc::default(),
+                inputs: Vec::new(),
                 parameters,
                 streams: streams.clone(),
                 license: license.clone(),

@@ -63,6 +63,7 @@ use serde_json::Value;
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Name in the registry.
 pub const KIND: &str = "elaborate";
@@ -124,14 +125,50 @@ struct Surroundings {
     albedo: Option<Part>,
 }
 
-/// What all windows of an elaborated DEM have in common.
-struct Model {
+/// What an elaborated DEM is made from, whatever the window and the processes that act.
+struct Basis {
     background: Arc<Background>,
     /// The measured albedo.
     albedo: Option<Background>,
+    points: Points,
+    potential: Option<Potential>,
+    /// Without what the DEM or images would show.
+    processes: Vec<RawProcess>,
+    texture: Option<TextureFit>,
+    notes: Vec<String>,
+}
+
+/// The surface that the processes of a selection make.
+struct Model {
+    basis: Arc<Basis>,
     /// The background with the detail.
     world: World,
-    notes: Vec<String>,
+}
+
+/// How a window is made.
+#[derive(Clone, Copy)]
+struct Pace<'a> {
+    /// Craters and rocks that are not wider are left out, m.
+    least_m: f64,
+    /// Tells that the window is no longer wanted.
+    cancel: Option<&'a AtomicBool>,
+    /// On all threads, or on this one.
+    on_all: bool,
+}
+
+impl Pace<'_> {
+    /// Of a window that is wanted whole.
+    const WHOLE: Self = Self { least_m: 0.0, cancel: None, on_all: true };
+
+    fn is_over(&self) -> bool {
+        self.cancel.is_some_and(|flag| flag.load(Ordering::Relaxed))
+    }
+
+    /// The values of `f` below a count; those that are no longer wanted are 0.
+    fn values(&self, count: usize, f: impl Fn(usize) -> f64 + Sync) -> Vec<f64> {
+        let value = |k: usize| if self.is_over() { 0.0 } else { f(k) };
+        if self.on_all { (0..count).into_par_iter().map(value).collect() } else { (0..count).map(value).collect() }
+    }
 }
 
 impl NamedInput {
@@ -244,115 +281,121 @@ impl Elaborate {
         Ok(Some(TextureFit { roughness_m: self.raw.roughness_m.unwrap_or(fitted.roughness_m), ..fitted }))
     }
 
-    /// The world of the detail, on the background; of its processes act those at some places of the list.
-    fn world(
-        &self,
-        background: Arc<Background>,
-        (processes, potential): (&[RawProcess], Option<Potential>),
-        texture: Option<TextureFit>,
-        anchor: u32,
-        streams: &Streams,
-        acts: impl Fn(usize) -> bool,
-    ) -> World {
+    /// The surface of a basis; of its processes act those at some places of the list.
+    fn model(&self, streams: &Streams, basis: Arc<Basis>, acts: impl Fn(usize) -> bool) -> Model {
+        let (background, own) = (Arc::clone(&basis.background), self.clone());
+        let anchor = planetary::nearest_zoom(background.geometry().mean_cell() / self.spacing_m);
         let mut assembly = Assembly::new(self.spacing_m, anchor);
-        let own = self.clone();
         assembly.add_base(Box::new(move |point| background.at(own.place(point))));
-        if let Some(t) = texture {
+        if let Some(t) = basis.texture {
             assembly.add_texture(t.roughness_m, t.hurst, Counter::new(&mut streams.stream("texture-1")));
         }
-        assembly.with(processes, streams, potential, acts)
+        let world = assembly.with(&basis.processes, streams, basis.potential.clone(), acts);
+        Model { basis, world }
     }
 
     /// A quantity of the detail at the posts of a part, interpolated as backgrounds are.
-    fn detail(&self, g: Geometry, [cols, rows]: &Part, of: impl Fn([i64; 2]) -> f64 + Sync) -> Background {
+    fn detail(
+        &self,
+        g: Geometry,
+        [cols, rows]: &Part,
+        pace: Pace<'_>,
+        of: impl Fn([i64; 2]) -> f64 + Sync,
+    ) -> Background {
         let posts = Geometry::square(rows.len(), cols.len(), 1.0);
-        let at = |k: usize| {
+        let values = pace.values(posts.len(), |k| {
             let (row, col) = (g.rows - rows.end + k / posts.cols, cols.start + k % posts.cols);
             of(self.nearest([g.x(col), g.y(row)]))
-        };
-        let values = (0..posts.len()).into_par_iter().map(at).collect();
+        });
         Background::of_part(g, [cols.start, rows.start], Grid::new(posts, values))
     }
 
     /// Changes the values of a window, each by a function of its lattice point.
-    fn change(&self, values: &mut [f64], by: impl Fn([f64; 2], f64) -> f64 + Sync) {
+    fn change(&self, values: &mut [f64], pace: Pace<'_>, by: impl Fn([f64; 2], f64) -> f64 + Sync) {
         let window = self.window;
-        values.par_chunks_mut(window.cols).enumerate().for_each(|(row, line)| {
+        let line = |(row, line): (usize, &mut [f64])| {
             let change = |(col, v): (usize, &mut f64)| *v = by([window.x(col), window.y(row)], *v);
-            line.iter_mut().enumerate().for_each(change);
-        });
+            if !pace.is_over() {
+                line.iter_mut().enumerate().for_each(change);
+            }
+        };
+        if pace.on_all {
+            values.par_chunks_mut(window.cols).enumerate().for_each(line);
+        } else {
+            values.chunks_mut(window.cols).enumerate().for_each(line);
+        }
     }
 
-    /// The altimetry that matters to the window.
-    fn points(&self, dem: &Grid, given: &[[f64; 4]]) -> Result<Points, AltimetryError> {
+    /// The altimetry of a DEM.
+    fn points(&self, inputs: &Inputs<'_>) -> Result<Points, TerrainError> {
+        let dem = inputs.dem;
         let posts = Posts { geometry: dem.geometry, spacing_m: self.spacing_m, offset_m: self.offset_m };
-        let points = Points::new(posts, given, |col, row| dem.at(dem.rows() - 1 - row, col))?;
-        let [[west, east], [south, north]] = self.ends();
-        Ok(points.within_reach(posts.to_lattice([west, south]), posts.to_lattice([east, north])))
+        let made = Points::new(posts, &inputs.points, |col, row| dem.at(dem.rows() - 1 - row, col));
+        made.map_err(|e| {
+            let listed = || NamedInput::points("altimetry_points_m", "altimetry_points_m");
+            self.altimetry().unwrap_or_else(listed).failed(&DemError::Altimetry(e))
+        })
     }
 
     /// How far altimetry moves the surface that is `world` less `residual`.
     fn correction(&self, points: &Points, world: Bounded<'_>, residual: &Background) -> Correction {
         let corners = points.corners();
-        let height =
-            |&[i, j]: &[i64; 2]| world.sample([i, j]).heights[0] - residual.at(self.place([i as f64, j as f64]));
-        let heights: Vec<f64> = corners.par_iter().map(height).collect();
+        let heights = world.pace.values(corners.len(), |k| {
+            let [i, j] = corners[k];
+            world.sample([i, j]).heights[0] - residual.at(self.place([i as f64, j as f64]))
+        });
         let known: BTreeMap<[i64; 2], f64> = corners.into_iter().zip(heights).collect();
         points.correction(|corner| known.get(&corner).copied().unwrap_or(f64::NAN))
     }
 
     /// The measured albedo at the window's samples, with the detail of the processes.
     fn measured_albedo(&self, measured: &Background, part: &Part, world: Bounded<'_>, patch: &mut Patch) {
-        let detail = self.detail(measured.geometry(), part, |point| world.sample(point).albedo[0]);
-        self.change(&mut patch.albedo, |point, own| {
+        let detail = self.detail(measured.geometry(), part, world.pace, |point| world.sample(point).albedo[0]);
+        self.change(&mut patch.albedo, world.pace, |point, own| {
             let place = self.place(point);
             (measured.at(place) + (own - detail.at(place))).clamp(0.0, 1.0)
         });
     }
 
-    /// What all windows have in common; of the processes act those at some places of the list.
-    fn model(
-        &self,
-        streams: &Streams,
-        inputs: &Inputs<'_>,
-        acts: impl Fn(usize) -> bool,
-    ) -> Result<Model, TerrainError> {
-        let dem = inputs.dem;
-        let of_dem = |e: DemError| self.dem().failed(&e);
+    /// What all windows and selections of processes have in common.
+    fn basis(&self, inputs: &Inputs<'_>, points: Points) -> Result<Basis, TerrainError> {
+        let (dem, of_dem) = (inputs.dem, |e: DemError| self.dem().failed(&e));
         let g = &dem.geometry;
         let (processes, bound_note) = self.bounded(g.cell[0].min(g.cell[1])).map_err(of_dem)?;
         let potential = self.potential(inputs)?;
         let texture = self.texture(dem).map_err(of_dem)?;
-        let anchor = planetary::nearest_zoom(g.mean_cell() / self.spacing_m);
-        let background = Arc::new(Background::new(without_holes(dem)));
-        let world = self.world(background.clone(), (&processes, potential), texture, anchor, streams, acts);
         let mut notes = texture.map_or_else(Vec::new, |t| self.texture_notes(&t, g));
         notes.extend(bound_note);
+        let background = Arc::new(Background::new(without_holes(dem)));
         let albedo = inputs.albedo.map(|albedo| Background::new(without_holes(albedo)));
-        Ok(Model { background, albedo, world, notes })
+        Ok(Basis { background, albedo, points, potential, processes, texture, notes })
     }
 
-    /// What the window is made from.
-    fn surroundings(&self, inputs: &Inputs<'_>) -> Result<Surroundings, TerrainError> {
-        let (dem, of_dem) = (inputs.dem, |e: DemError| self.dem().failed(&e));
-        let of_points = |e: AltimetryError| {
-            let listed = || NamedInput::points("altimetry_points_m", "altimetry_points_m");
-            self.altimetry().unwrap_or_else(listed).failed(&DemError::Altimetry(e))
-        };
-        let points = self.points(dem, &inputs.points).map_err(of_points)?;
-        let beyond_m = if points.is_empty() { 0.0 } else { self.altimetry_m(&dem.geometry) };
-        let posts = self.posts(&dem.geometry, beyond_m).map_err(of_dem)?;
-        let albedo = match (inputs.albedo, self.albedo()) {
-            (Some(albedo), Some(name)) => Some(self.posts(&albedo.geometry, 0.0).map_err(|e| name.failed(&e))?),
+    /// What the window is made from: posts of a DEM and of an albedo, and altimetry.
+    fn surroundings(
+        &self,
+        dem: &Geometry,
+        albedo: Option<Geometry>,
+        points: &Points,
+    ) -> Result<Surroundings, TerrainError> {
+        let posts = self.posts(dem, self.altimetry_m(dem, points)).map_err(|e| self.dem().failed(&e))?;
+        let lattice = |point: [f64; 2]| [0, 1].map(|a| (point[a] - self.offset_m[a]) / self.spacing_m);
+        let [[west, east], [south, north]] = self.ends();
+        let points = points.within_reach(lattice([west, south]), lattice([east, north]));
+        let albedo = match (albedo, self.albedo()) {
+            (Some(albedo), Some(name)) => Some(self.posts(&albedo, 0.0).map_err(|e| name.failed(&e))?),
             _ => None,
         };
         Ok(Surroundings { posts, points, albedo })
     }
 
-    /// How far around a sample the ground matters to the altimetry that moves it, m.
-    fn altimetry_m(&self, g: &Geometry) -> f64 {
+    /// How far around a sample the ground matters to the altimetry that may move it, m.
+    fn altimetry_m(&self, dem: &Geometry, points: &Points) -> f64 {
+        if points.is_empty() {
+            return 0.0;
+        }
         // The lattice points around a point may lie one spacing beyond its reach.
-        g.cell[0].max(g.cell[1]) + 2.0 * self.spacing_m
+        dem.cell[0].max(dem.cell[1]) + 2.0 * self.spacing_m
     }
 
     /// Whether there are data all around the window.
@@ -365,24 +408,17 @@ impl Elaborate {
     }
 
     /// Makes samples of the model into those of the surface, which goes through the posts and the altimetry; with a measured albedo its own.
-    fn settle(
-        &self,
-        dem: Geometry,
-        around: &Surroundings,
-        model: &Model,
-        least_m: f64,
-        patch: &mut Patch,
-    ) -> Option<Correction> {
-        let world = Bounded { world: &model.world, least_m };
-        let residual = self.detail(dem, &around.posts, |[i, j]| {
-            world.sample([i, j]).heights[0] - model.background.at(self.place([i as f64, j as f64]))
+    fn settle(&self, around: &Surroundings, model: &Model, pace: Pace<'_>, patch: &mut Patch) -> Option<Correction> {
+        let (world, background) = (Bounded { world: &model.world, pace }, &model.basis.background);
+        let residual = self.detail(background.geometry(), &around.posts, pace, |[i, j]| {
+            world.sample([i, j]).heights[0] - background.at(self.place([i as f64, j as f64]))
         });
-        self.change(&mut patch.heights, |point, z| z - residual.at(self.place(point)));
+        self.change(&mut patch.heights, pace, |point, z| z - residual.at(self.place(point)));
         let correction = (!around.points.is_empty()).then(|| self.correction(&around.points, world, &residual));
         if let Some(correction) = &correction {
-            self.change(&mut patch.heights, |point, z| z + correction.at(point));
+            self.change(&mut patch.heights, pace, |point, z| z + correction.at(point));
         }
-        if let (Some(albedo), Some(part)) = (&model.albedo, &around.albedo) {
+        if let (Some(albedo), Some(part)) = (&model.basis.albedo, &around.albedo) {
             self.measured_albedo(albedo, part, world, patch);
         }
         correction
@@ -390,17 +426,18 @@ impl Elaborate {
 
     fn refine(&self, streams: &Streams, inputs: &Inputs<'_>) -> Result<Terrain, TerrainError> {
         self.check_inputs(inputs)?;
-        let around = self.surroundings(inputs)?;
+        let points = self.points(inputs)?;
+        let around = self.surroundings(&inputs.dem.geometry, inputs.albedo.map(|albedo| albedo.geometry), &points)?;
         self.check_data(inputs, &around)?;
-        let model = self.model(streams, inputs, |_| true)?;
+        let model = self.model(streams, Arc::new(self.basis(inputs, points)?), |_| true);
         let mut patch = model.world.tiled_patch(&self.window);
-        let correction = self.settle(inputs.dem.geometry, &around, &model, 0.0, &mut patch);
+        let correction = self.settle(&around, &model, Pace::WHOLE, &mut patch);
         let mut maps = planetary::maps(&model.world, self.geometry(), &patch);
         if inputs.albedo.is_some() && model.world.albedo.is_none() {
             maps.push(Map { name: "albedo", values: planetary::to_grid(self.geometry(), &patch.albedo) });
         }
         let heights = planetary::to_grid(self.geometry(), &patch.heights);
-        let mut notes = model.notes;
+        let mut notes = model.basis.notes.clone();
         notes.extend(correction.map(|c| c.note()));
         notes.extend(planetary::potential_note(&model.world, &self.window));
         Ok(Terrain { heights, maps, lines: Vec::new(), notes })
@@ -464,17 +501,17 @@ impl Elaborate {
     }
 }
 
-/// A world without craters and rocks that are not wider than that, m.
+/// A world without craters and rocks that are not wider than its pace says.
 #[derive(Clone, Copy)]
 struct Bounded<'a> {
     world: &'a World,
-    least_m: f64,
+    pace: Pace<'a>,
 }
 
 impl Bounded<'_> {
     /// One lattice point.
     fn sample(self, [west, south]: [i64; 2]) -> Patch {
-        self.world.made(&Request { window: point(west, south), feature_min_m: self.least_m, cancel: None })
+        self.world.made(&Request { window: point(west, south), feature_min_m: self.pace.least_m, cancel: None })
     }
 }
 

@@ -1,7 +1,7 @@
 //! Windows of an elaborated DEM on the lattice of its parameters: all of one surface, at any zoom up to half the posts.
 
-use super::background::{around, lies_between};
-use super::{Elaborate, Model, RawElaborate, point, widened};
+use super::background::{Background, around, lies_between};
+use super::{Elaborate, Model, Pace, RawElaborate, point, widened};
 use crate::generator::{Input, TerrainError};
 use crate::planetary::{Patch, Request, SAND, Window};
 use crate::windows::Windows;
@@ -13,11 +13,9 @@ use std::sync::atomic::Ordering;
 /// A DEM with its detail.
 pub struct Elaborated {
     form: Elaborate,
-    inputs: Arc<[Input]>,
     model: Model,
-    dem: Geometry,
     /// Of the DEM and of the measured albedo.
-    cover: Vec<Cover>,
+    cover: Arc<[Cover]>,
 }
 
 /// Where the posts of a raster carry ground: a sample has ground where all posts that it depends on have data. That depends on the place of the
@@ -65,48 +63,20 @@ impl Cover {
 }
 
 impl Elaborate {
-    /// The surface of which this window is one, with the processes at some places of the list, from 0; the others keep their draws.
+    /// The surface of which this window is one.
     ///
     /// # Errors
     /// Inputs that cannot be used.
-    pub fn elaborated(
-        &self,
-        streams: &Streams,
-        inputs: &Arc<[Input]>,
-        acts: impl Fn(usize) -> bool,
-    ) -> Result<Elaborated, TerrainError> {
+    pub fn elaborated(&self, streams: &Streams, inputs: &[Input]) -> Result<Elaborated, TerrainError> {
         let sorted = self.sorted(inputs)?;
         self.check_inputs(&sorted)?;
-        let model = self.model(streams, &sorted, acts)?;
-        let dem = sorted.dem.geometry;
-        let beyond_m = if sorted.points.is_empty() { 0.0 } else { self.altimetry_m(&dem) };
+        let points = self.points(&sorted)?;
+        let beyond_m = self.altimetry_m(&sorted.dem.geometry, &points);
+        let basis = self.basis(&sorted, points)?;
         let albedo = sorted.albedo.map(|albedo| Cover::of(albedo, 0.0, 0));
-        let cover = std::iter::once(Cover::of(sorted.dem, beyond_m, self.margin())).chain(albedo).collect();
-        Ok(Elaborated { form: self.clone(), inputs: Arc::clone(inputs), model, dem, cover })
-    }
-
-    /// Basic spacing, m.
-    pub fn spacing_m(&self) -> f64 {
-        self.spacing_m
-    }
-
-    /// Where lattice point 0 lies in the DEM's coordinates, m.
-    pub fn offset_m(&self) -> [f64; 2] {
-        self.offset_m
-    }
-
-    /// Its parameters.
-    pub fn raw(&self) -> &RawElaborate {
-        &self.raw
-    }
-
-    /// The outer posts of its DEM: west, south, east and north, m, and the distance of posts, the shorter, m.
-    ///
-    /// # Errors
-    /// Inputs that are missing.
-    pub fn posts_of(&self, inputs: &[Input]) -> Result<([f64; 4], f64), TerrainError> {
-        let g = self.sorted(inputs)?.dem.geometry;
-        Ok(([g.x(0), g.y(g.rows - 1), g.x(g.cols - 1), g.y(0)], g.cell[0].min(g.cell[1])))
+        let dem = Cover::of(sorted.dem, beyond_m, self.margin());
+        let cover = std::iter::once(dem).chain(albedo).collect();
+        Ok(Elaborated { form: self.clone(), model: self.model(streams, Arc::new(basis), |_| true), cover })
     }
 
     /// The same surface in another window of its lattice.
@@ -119,6 +89,32 @@ impl Elaborate {
 }
 
 impl Elaborated {
+    /// The same with the processes at some places of the list, from 0; the others keep their draws.
+    pub fn selecting(&self, streams: &Streams, acts: impl Fn(usize) -> bool) -> Self {
+        let model = self.form.model(streams, Arc::clone(&self.model.basis), acts);
+        Self { form: self.form.clone(), model, cover: Arc::clone(&self.cover) }
+    }
+
+    /// Basic spacing, m.
+    pub fn spacing_m(&self) -> f64 {
+        self.form.spacing_m
+    }
+
+    /// Where lattice point 0 lies in the DEM's coordinates, m.
+    pub fn offset_m(&self) -> [f64; 2] {
+        self.form.offset_m
+    }
+
+    /// Its parameters.
+    pub fn raw(&self) -> &RawElaborate {
+        &self.form.raw
+    }
+
+    /// Where the posts of its DEM lie.
+    pub fn posts(&self) -> Geometry {
+        self.model.basis.background.geometry()
+    }
+
     /// Place of a lattice point in the DEM's coordinates, m.
     pub fn place(&self, point: [f64; 2]) -> [f64; 2] {
         self.form.place(point)
@@ -127,7 +123,7 @@ impl Elaborated {
     /// Which samples of a window have ground, row by row from the south.
     fn has_ground(&self, window: &Window) -> Vec<bool> {
         let mut has = vec![true; window.len()];
-        for cover in &self.cover {
+        for cover in self.cover.iter() {
             let place = |n: usize| self.place([window.x(n), window.y(n)]);
             let cols: Vec<_> = (0..window.cols).map(|n| cover.posts(0, place(n)[0])).collect();
             for (n, line) in has.chunks_exact_mut(window.cols).enumerate() {
@@ -143,9 +139,12 @@ impl Elaborated {
     /// The samples of a window all of which lie between the outer posts; those without ground are of no use.
     fn made(&self, request: &Request<'_>) -> Result<Patch, TerrainError> {
         let here = self.form.in_window(request.window);
-        let around = here.surroundings(&here.sorted(&self.inputs)?)?;
+        let basis = &self.model.basis;
+        let albedo = basis.albedo.as_ref().map(Background::geometry);
+        let around = here.surroundings(&self.posts(), albedo, &basis.points)?;
         let mut patch = self.model.world.made(request);
-        here.settle(self.dem, &around, &self.model, request.feature_min_m, &mut patch);
+        let pace = Pace { least_m: request.feature_min_m, cancel: request.cancel, on_all: false };
+        here.settle(&around, &self.model, pace, &mut patch);
         Ok(patch)
     }
 }
@@ -177,7 +176,8 @@ impl Windows for Elaborated {
     fn expected_seconds(&self, request: &Request<'_>) -> f64 {
         let window = request.window;
         let side_m = |count: usize| count as f64 * self.form.spacing_m * (1u64 << window.zoom) as f64;
-        let posts = (side_m(window.cols) / self.dem.cell[0] + 4.0) * (side_m(window.rows) / self.dem.cell[1] + 4.0);
+        let [x, y] = self.posts().cell;
+        let posts = (side_m(window.cols) / x + 4.0) * (side_m(window.rows) / y + 4.0);
         let one = Request { window: point(window.west << window.zoom, window.south << window.zoom), ..*request };
         self.model.world.expected_seconds(request) + posts * self.model.world.expected_seconds(&one)
     }

@@ -30,9 +30,10 @@ fn widest_rock_m(images: Value) -> f64 {
     let mut raw = json!({"dem": "site", "cell_m": 0.16, "basic_spacing_m": 0.01, "processes": up_to(50.0)});
     raw.as_object_mut().unwrap().extend(images.as_object().unwrap().clone());
     let own = Elaborate::try_from(crate::registry::read::<RawElaborate>(&raw).unwrap()).unwrap();
-    let background = Arc::new(Background::new(site(24, 24, [1.28, 1.28])));
-    let (processes, _) = own.bounded(1.28).unwrap();
-    let world = own.world(background, (&processes, None), None, 7, &streams(), |_| true);
+    let inputs = [site(24, 24, [1.28, 1.28]).into()];
+    let sorted = own.sorted(&inputs).unwrap();
+    let basis = own.basis(&sorted, own.points(&sorted).unwrap()).unwrap();
+    let world = own.model(&streams(), Arc::new(basis), |_| true).world;
     let area = Window { zoom: 0, west: 0, south: 0, cols: 20_000, rows: 20_000, centred: false };
     let rocks = world.rocks.as_ref().unwrap().0.find(&area, 0.0, None, |_| 0.3);
     assert!(rocks.len() > 1000);

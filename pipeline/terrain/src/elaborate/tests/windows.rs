@@ -7,7 +7,7 @@ fn surface(params: Value, inputs: &[Input]) -> Elaborated {
     let mut all = json!({"dem": "site", "cell_m": 0.16, "basic_spacing_m": 0.01, "origin_m": [105.0, 205.0], "size_px": [16, 16]});
     all.as_object_mut().unwrap().extend(params.as_object().unwrap().clone());
     let form = Elaborate::try_from(crate::registry::read::<RawElaborate>(&all).unwrap()).unwrap();
-    form.elaborated(&streams(), &Arc::from(inputs), |_| true).unwrap()
+    form.elaborated(&streams(), inputs).unwrap()
 }
 
 fn request(zoom: u32, first: [i64; 2], [cols, rows]: [usize; 2], least_m: f64) -> Request<'static> {
