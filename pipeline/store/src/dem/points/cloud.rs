@@ -1,19 +1,18 @@
 //! A LAS or LAZ file as a stream of points.
 //!
-//! The decoder is `las` 0.11 (MIT) with `laz` 0.13 (Apache-2.0), pure Rust and maintained. It sees a file only after
-//! [`DeclaredSize`] found its numbers possible, reads no further than the points reach, and a panic of it is an error.
+//! Points of LAS have a fixed length and are read as they are; those of LAZ are decoded in `laszip`. Neither sees a file before [`DeclaredSize`] found
+//! its numbers possible, and a panic of the decoder is an error.
 
 use super::crs;
-use super::header::{DeclaredSize, unreadable};
+use super::header::{Compression, DeclaredSize, unreadable};
+use super::laszip;
 use crate::dem::crs::Crs;
 use crate::dem::raster::Refusal;
-use las::{PointDataBuilder, Reader};
+use laz::LasZipError;
 use std::fs::File;
-use std::io::{self, BufReader, Read, Seek, SeekFrom};
+use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Decoded points held at a time, bytes (one point at least).
 const CHUNK_BYTES: u64 = 1 << 22;
@@ -30,8 +29,8 @@ pub(super) struct Cloud {
     pub declared: DeclaredSize,
     /// Coordinate reference system.
     pub crs: Crs,
-    /// Where the decoder must stop.
-    end: u64,
+    /// How LAZ stores its points.
+    compression: Option<Compression>,
 }
 
 /// A point as it is stored.
@@ -72,16 +71,10 @@ impl Cloud {
     pub fn open(path: &Path, file: File) -> Result<Self, Refusal> {
         let mut file = BufReader::new(file);
         let declared = DeclaredSize::read(&mut file)?;
-        file.seek(SeekFrom::Start(0)).map_err(|e| unreadable(&e))?;
-        let header = guarded(|| las::Header::new(&mut file))?;
-        let crs = crs::of_header(&header, declared.well_known_text)?;
-        let end = if declared.compressed {
-            let record = header.vlrs().iter().find(|vlr| las::laz::is_laszip_vlr(vlr)).map(|vlr| vlr.data.as_slice());
-            declared.check_compression(&mut file, record)?
-        } else {
-            u64::MAX
-        };
-        Ok(Self { path: path.to_owned(), declared, crs, end })
+        let records = declared.records(&mut file)?;
+        let crs = crs::of_records(&records, declared.well_known_text)?;
+        let compression = declared.compressed.then(|| declared.compression(&mut file, &records)).transpose()?;
+        Ok(Self { path: path.to_owned(), declared, crs, compression })
     }
 
     /// The coordinate that a stored number stands for.
@@ -96,61 +89,51 @@ impl Cloud {
 
     /// Calls `f` with every point, in the order of the file.
     pub fn for_each(&self, mut f: impl FnMut(Point)) -> Result<(), Refusal> {
-        let file = File::open(&self.path).map_err(|e| unreadable(&e))?;
-        let end = Arc::new(AtomicU64::new(u64::MAX));
-        let fenced = Fenced { file: BufReader::new(file), at: 0, end: end.clone() };
-        let mut reader = guarded(|| Reader::new(fenced))?;
-        end.store(self.end, Ordering::Relaxed);
-        let mut points = PointDataBuilder::new().for_header(reader.header()).build();
-        let (size, declared) = (points.record_len(), &self.declared);
-        if size != usize::from(declared.point_bytes) || reader.header().number_of_points() != declared.points {
+        let declared = &self.declared;
+        let mut source = BufReader::new(File::open(&self.path).map_err(|e| unreadable(&e))?);
+        if DeclaredSize::read(&mut source)? != *declared {
             return Err(Refusal::new("changed while it was read"));
         }
+        source.seek(SeekFrom::Start(declared.data_start)).map_err(|e| unreadable(&e))?;
+        let mut points = match &self.compression {
+            None => Points::Plain(source),
+            Some(compression) => Points::Packed(guarded(|| laszip::Points::new(source, compression))?),
+        };
+        let size = usize::from(declared.point_bytes);
         let at_a_time = (CHUNK_BYTES / size as u64).max(1);
-        let extended = declared.format >= 6;
-        let mut left = declared.points;
+        let (mut records, mut left) = (Vec::new(), declared.points);
         while left > 0 {
-            let read = guarded(|| reader.fill_points(at_a_time.min(left), &mut points))?;
-            if read == 0 {
-                return Err(Refusal::new(format!("breaks off {left} points before its end")));
-            }
-            left -= read;
-            points.raw_bytes().chunks_exact(size).for_each(|record| f(Point::of_record(record, extended)));
+            let count = at_a_time.min(left);
+            records.resize(count as usize * size, 0);
+            points.read(&mut records, size)?;
+            left -= count;
+            records.chunks_exact(size).for_each(|record| f(Point::of_record(record, declared.format >= 6)));
         }
         Ok(())
     }
 }
 
+/// Where points come from.
+enum Points {
+    Plain(BufReader<File>),
+    Packed(laszip::Points),
+}
+
+impl Points {
+    fn read(&mut self, records: &mut [u8], point_bytes: usize) -> Result<(), Refusal> {
+        match self {
+            Self::Plain(source) => source.read_exact(records).map_err(|e| unreadable(&e)),
+            Self::Packed(points) => guarded(|| points.read(records, point_bytes)),
+        }
+    }
+}
+
 /// Runs the decoder, which panics on some damaged files, and turns a panic into an error.
-fn guarded<T>(decode: impl FnOnce() -> las::Result<T>) -> Result<T, Refusal> {
+fn guarded<T>(decode: impl FnOnce() -> Result<T, LasZipError>) -> Result<T, Refusal> {
     match catch_unwind(AssertUnwindSafe(decode)) {
         Ok(Ok(decoded)) => Ok(decoded),
-        Ok(Err(las::Error::Io(error))) => Err(unreadable(&error)),
+        Ok(Err(LasZipError::IoError(error))) => Err(unreadable(&error)),
         Ok(Err(error)) => Err(Refusal::new(format!("is damaged or breaks off: {error}"))),
         Err(_) => Err(Refusal::new("is damaged: the decoder of its points gave up")),
-    }
-}
-
-/// A file that ends where its points do, once `end` says where that is.
-struct Fenced {
-    file: BufReader<File>,
-    at: u64,
-    end: Arc<AtomicU64>,
-}
-
-impl Read for Fenced {
-    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        let left = self.end.load(Ordering::Relaxed).saturating_sub(self.at);
-        let most = usize::try_from(left).map_or(buffer.len(), |left| left.min(buffer.len()));
-        let read = self.file.read(&mut buffer[..most])?;
-        self.at += read as u64;
-        Ok(read)
-    }
-}
-
-impl Seek for Fenced {
-    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
-        self.at = self.file.seek(to)?;
-        Ok(self.at)
     }
 }

@@ -3,11 +3,15 @@
 //!
 //! Of well-known text, the name, the EPSG code and the units of the horizontal and the vertical system are kept.
 
+use super::header::{PROJECTION, Record};
 use crate::dem::crs::{Crs, GeoKey};
 use crate::dem::raster::Refusal;
-use las::Header;
-use las::crs::GeoTiffData;
 
+/// Records of `LASF_Projection`.
+const WELL_KNOWN_TEXT: u16 = 2112;
+const KEYS: u16 = 34735;
+const DOUBLES: u16 = 34736;
+const TEXTS: u16 = 34737;
 const MODEL_TYPE: u16 = 1024;
 const CITATION: u16 = 1026;
 const GEODETIC_CRS: u16 = 2048;
@@ -19,13 +23,17 @@ const MODEL_GEOCENTRIC: u16 = 3;
 /// Nodes of well-known text within each other, at most.
 const DEPTH: usize = 24;
 
-/// The system that a header names: the default (a local plane in metres) where it names none.
+/// The system that records name: the default (a local plane in metres) where it names none.
 ///
 /// # Errors
 /// Coordinates that are degrees, or geocentric.
-pub(super) fn of_header(header: &Header, well_known_text: bool) -> Result<Crs, Refusal> {
-    let text = || Some(String::from_utf8_lossy(header.get_wkt_crs_bytes()?).into_owned());
-    let keys = || geotiff_keys(header).map(Crs::from_keys);
+pub(super) fn of_records(records: &[Record], well_known_text: bool) -> Result<Crs, Refusal> {
+    let of = |id: u16| {
+        let wanted = |record: &&Record| record.user.eq_ignore_ascii_case(PROJECTION) && record.id == id;
+        records.iter().find(wanted).map(|record| record.data.as_slice())
+    };
+    let text = || Some(String::from_utf8_lossy(of(WELL_KNOWN_TEXT)?).into_owned());
+    let keys = || geotiff_keys(of(KEYS)?, of(DOUBLES).unwrap_or(&[]), of(TEXTS).unwrap_or(&[])).map(Crs::from_keys);
     let crs = if well_known_text {
         text().and_then(|text| of_text(&text)).or_else(keys)
     } else {
@@ -43,14 +51,27 @@ pub(super) fn of_header(header: &Header, well_known_text: bool) -> Result<Crs, R
     Ok(crs)
 }
 
-fn geotiff_keys(header: &Header) -> Option<Vec<(u16, GeoKey)>> {
-    let found = header.get_geotiff_crs().ok()??;
-    let value = |data: GeoTiffData| match data {
-        GeoTiffData::U16(code) => GeoKey::Short(code),
-        GeoTiffData::String(text) => GeoKey::Ascii(text.trim_end_matches('\0').to_owned()),
-        GeoTiffData::Doubles(numbers) => GeoKey::Double(numbers),
+/// The keys of a directory of numbers, with its tables of doubles and of text.
+fn geotiff_keys(directory: &[u8], doubles: &[u8], texts: &[u8]) -> Option<Vec<(u16, GeoKey)>> {
+    let words: Vec<u16> = directory.as_chunks().0.iter().map(|word| u16::from_le_bytes(*word)).collect();
+    let count = usize::from(*words.get(3)?);
+    let key = |[id, table, count, value]: &[u16; 4]| {
+        let (count, first) = (usize::from(*count), usize::from(*value));
+        let key = match *table {
+            0 => GeoKey::Short(*value),
+            DOUBLES => {
+                let numbers = doubles.as_chunks().0.get(first..first + count)?;
+                GeoKey::Double(numbers.iter().map(|number| f64::from_le_bytes(*number)).collect())
+            }
+            TEXTS => {
+                let text = String::from_utf8_lossy(texts.get(first..first + count)?);
+                GeoKey::Ascii(text.trim_end_matches('\0').to_owned())
+            }
+            _ => return None,
+        };
+        Some((*id, key))
     };
-    let keys: Vec<(u16, GeoKey)> = found.entries.into_iter().map(|entry| (entry.id, value(entry.data))).collect();
+    let keys: Vec<(u16, GeoKey)> = words[4..].as_chunks().0.iter().take(count).filter_map(key).collect();
     (!keys.is_empty()).then_some(keys)
 }
 

@@ -4,16 +4,23 @@
 //! 7 to 17 (point records); Isenburg, "LASzip: lossless compression of LiDAR data", Photogrammetric Engineering and
 //! Remote Sensing 79(2), 2013, and the LASzip sources for the chunk table and the layers of point formats 6 to 10.
 //!
-//! The decoders (`las`, `laz`) ask for memory by numbers found in the file: the length of an extended record, the
-//! number of chunks, the bytes of a layer. Each of them is compared here with what the file can hold.
+//! Memory is asked for by numbers found in the file: the length of a record, the number of chunks, the bytes of a layer. Each of them is compared
+//! here with what the file can hold.
 
 use crate::dem::raster::Refusal;
+use laz::LazVlr;
 use std::io::{self, Read, Seek, SeekFrom};
 
 /// Longest header of a known version, bytes.
 const HEADER_BYTES: usize = 375;
 /// Header lengths by minor version.
 const HEADER_SIZES: [u16; 5] = [227, 227, 227, 235, 375];
+/// Who writes records that are of use, and longest such record, bytes.
+const USERS: [&str; 2] = [PROJECTION, LASZIP];
+pub(super) const PROJECTION: &str = "LASF_Projection";
+const LASZIP: &str = "laszip encoded";
+const LASZIP_ID: u16 = 22204;
+const RECORD_BYTES_MAX: u64 = 1 << 20;
 const RECORD_HEADER_BYTES: u64 = 54;
 const EXTENDED_RECORD_HEADER_BYTES: u64 = 60;
 /// Bytes of a point by format (LAS 1.4, tables 7 to 17).
@@ -30,7 +37,7 @@ const LAYERED: u16 = 3;
 pub(super) const SIGNATURE: &[u8; 4] = b"LASF";
 
 /// Number, size and scale of the points as the header declares them, held against the length of the file.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct DeclaredSize {
     /// Number of points, at least 1.
     pub points: u64,
@@ -49,9 +56,46 @@ pub(super) struct DeclaredSize {
     /// True when the reference system is well-known text.
     pub well_known_text: bool,
     /// Where the points start.
-    data_start: u64,
+    pub data_start: u64,
+    /// Where the records before them start, and how many there are.
+    records: (u64, u64),
+    /// Where the records after them start, and how many there are.
+    extended_records: (u64, u64),
     /// Length of the file.
     file_bytes: u64,
+}
+
+/// A record of a known kind.
+#[derive(Debug)]
+pub(super) struct Record {
+    /// `LASF_Projection` and the like.
+    pub user: String,
+    /// Kind of record of that user.
+    pub id: u16,
+    /// Content.
+    pub data: Vec<u8>,
+}
+
+/// How a LAZ file stores its points.
+#[derive(Debug)]
+pub(super) struct Compression {
+    /// The LASzip record.
+    pub description: LazVlr,
+    /// How they are divided.
+    pub chunks: Chunks,
+    /// Where they end: the decoder must not read on from there.
+    pub end: u64,
+}
+
+/// How compressed points are divided.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Chunks {
+    /// Formats 0 to 5, all in one.
+    One,
+    /// Formats 0 to 5.
+    Many,
+    /// Formats 6 to 10: chunks of layers.
+    Layered,
 }
 
 /// Little-endian numbers at the places where the specification puts them.
@@ -89,6 +133,7 @@ impl Header {
 pub(super) fn unreadable(error: &io::Error) -> Refusal {
     match error.kind() {
         io::ErrorKind::UnexpectedEof => Refusal::new("the point cloud breaks off"),
+        io::ErrorKind::InvalidData => Refusal::new(format!("is damaged: {error}")),
         _ => Refusal::new(format!("cannot be read: {error}")),
     }
 }
@@ -105,11 +150,7 @@ impl DeclaredSize {
         }
         let mut header = Header([0; HEADER_BYTES]);
         header.0[..bytes.len()].copy_from_slice(&bytes);
-        let declared = Self::check(&header, file_bytes)?;
-        if header.minor_version() == 4 && header.u64(235) > 0 && header.u32(243) > 0 {
-            declared.check_extended_record(file, header.u64(235))?;
-        }
-        Ok(declared)
+        Self::check(&header, file_bytes)
     }
 
     fn check(header: &Header, file_bytes: u64) -> Result<Self, Refusal> {
@@ -139,6 +180,8 @@ impl DeclaredSize {
             extent: [header.f64(179) - header.f64(187), header.f64(195) - header.f64(203)],
             well_known_text: minor == 4 && header.u16(6) & 16 != 0,
             data_start,
+            records: (u64::from(header_size), records),
+            extended_records: if minor == 4 { (header.u64(235), u64::from(header.u32(243))) } else { (0, 0) },
             file_bytes,
         };
         declared.check_points()?;
@@ -179,32 +222,71 @@ impl DeclaredSize {
         )))
     }
 
-    /// Checks the first extended record, which the decoder reads whole.
-    fn check_extended_record(&self, file: &mut (impl Read + Seek), start: u64) -> Result<(), Refusal> {
-        let room = self.file_bytes.checked_sub(EXTENDED_RECORD_HEADER_BYTES).and_then(|room| room.checked_sub(start));
-        let room =
-            room.ok_or_else(|| Refusal::new(format!("breaks off before its extended records at byte {start}")))?;
-        let length = u64_at(file, start + 20)?;
-        if length > room {
-            return Err(Refusal::new(format!("claims an extended record of {length} bytes where {room} are left")));
+    /// The records that say how coordinates and points are to be understood.
+    pub fn records(&self, file: &mut (impl Read + Seek)) -> Result<Vec<Record>, Refusal> {
+        let mut records = Vec::new();
+        let (mut at, count) = self.records;
+        for _ in 0..count {
+            let length = u64::from(u16_at(file, at + 20)?);
+            at = self.take_record(file, at, (RECORD_HEADER_BYTES, length), self.data_start, &mut records)?;
         }
-        Ok(())
+        let (mut at, count) = self.extended_records;
+        for _ in 0..count {
+            let room = self.file_bytes.checked_sub(EXTENDED_RECORD_HEADER_BYTES);
+            if room.is_none_or(|room| at > room) {
+                return Err(Refusal::new(format!("breaks off before its extended records at byte {at}")));
+            }
+            let length = u64_at(file, at + 20)?;
+            at = self.take_record(file, at, (EXTENDED_RECORD_HEADER_BYTES, length), self.file_bytes, &mut records)?;
+        }
+        Ok(records)
     }
 
-    /// Checks what the decoder of a compressed file would believe; `laszip` is the LASzip record. Returns where the
-    /// compressed points end: the decoder must not read on from there.
-    pub fn check_compression(&self, file: &mut (impl Read + Seek), laszip: Option<&[u8]>) -> Result<u64, Refusal> {
-        let record = laszip.ok_or_else(|| Refusal::new("is compressed, but lacks the LASzip record that says how"))?;
+    /// Reads the record that starts at a byte, if it is of use, and returns where the next one starts.
+    fn take_record(
+        &self,
+        file: &mut (impl Read + Seek),
+        start: u64,
+        (head, length): (u64, u64),
+        end: u64,
+        records: &mut Vec<Record>,
+    ) -> Result<u64, Refusal> {
+        let left = end.saturating_sub(start + head);
+        if length > left {
+            let kind = if head == RECORD_HEADER_BYTES { "a" } else { "an extended" };
+            return Err(Refusal::new(format!("claims {kind} record of {length} bytes where {left} are left")));
+        }
+        let mut user = [0; 16];
+        read_at(file, start + 2, &mut user)?;
+        let user = String::from_utf8_lossy(&user).trim_end_matches('\0').to_owned();
+        if length <= RECORD_BYTES_MAX && USERS.iter().any(|known| user.eq_ignore_ascii_case(known)) {
+            let id = u16_at(file, start + 18)?;
+            let mut data = vec![0; length as usize];
+            read_at(file, start + head, &mut data)?;
+            records.push(Record { user, id, data });
+        }
+        Ok(start + head + length)
+    }
+
+    /// How the points of a compressed file are stored: all that the decoder would believe is checked.
+    pub fn compression(&self, file: &mut (impl Read + Seek), records: &[Record]) -> Result<Compression, Refusal> {
+        let record = records.iter().find(|record| record.user.eq_ignore_ascii_case(LASZIP) && record.id == LASZIP_ID);
+        let record = record.ok_or_else(|| Refusal::new("is compressed, but lacks the LASzip record that says how"))?;
         let layered = self.format >= 6;
-        let compressor = self.check_items(record, layered)?;
-        if compressor == POINT_WISE {
-            return Ok(self.file_bytes);
+        let kind = self.check_items(&record.data, layered)?;
+        let description = LazVlr::from_buffer(&record.data)
+            .map_err(|error| Refusal::new(format!("its LASzip record cannot be read: {error}")))?;
+        if kind == POINT_WISE {
+            return Ok(Compression { description, chunks: Chunks::One, end: self.file_bytes });
         }
-        let table = self.chunk_table(file)?;
+        if description.chunk_size() == 0 {
+            return Err(Refusal::new("its LASzip record describes chunks of no points"));
+        }
+        let end = self.chunk_table(file)?;
         if layered {
-            self.check_layers(file, table)?;
+            self.check_layers(file, end)?;
         }
-        Ok(table)
+        Ok(Compression { description, chunks: if layered { Chunks::Layered } else { Chunks::Many }, end })
     }
 
     /// The fields that the LASzip record lists must be those of the point format, since the decoder takes their sizes
@@ -310,6 +392,12 @@ fn laszip_layers(format: u8, point_bytes: u16) -> usize {
         _ => 0,
     };
     9 + others + extra
+}
+
+fn u16_at(file: &mut (impl Read + Seek), at: u64) -> Result<u16, Refusal> {
+    let mut bytes = [0; 2];
+    read_at(file, at, &mut bytes)?;
+    Ok(u16::from_le_bytes(bytes))
 }
 
 fn u32_at(file: &mut (impl Read + Seek), at: u64) -> Result<u32, Refusal> {

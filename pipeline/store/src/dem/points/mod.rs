@@ -15,14 +15,16 @@
 //! twice, and once or twice more when no cell size is given (3.5 s per pass and 10^7 points of LAZ).
 //!
 //! Heights and coordinates in feet are taken as metres, with a note. The reference system is found in the GeoTIFF keys or
-//! the well-known text of the records before the points or the first one after them.
+//! the well-known text of the records before or after the points.
 
 mod cell_size;
 mod cloud;
 mod crs;
 mod fill;
+mod gps;
 mod grid;
 mod header;
+mod laszip;
 mod lattice;
 mod settings;
 mod survey;
