@@ -57,6 +57,17 @@ pub enum ReportError {
         /// The folder.
         path: PathBuf,
     },
+    /// The folder to write holds other files, and is left alone.
+    #[error("{}: it holds {}, which is not of a report; choose another folder with -o", path.display(), file.display())]
+    Occupied {
+        /// The folder.
+        path: PathBuf,
+        /// What is in the way.
+        file: PathBuf,
+    },
+    /// The report could not be given its name.
+    #[error(transparent)]
+    Place(#[from] sastrugi_store::release::ReleaseError),
     /// A file could not be written.
     #[error("write {path}: {source}")]
     Write {

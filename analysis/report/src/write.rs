@@ -6,7 +6,10 @@ use crate::questions;
 use crate::render::html::{self, Head};
 use crate::render::number as set;
 use crate::{Companions, ReportError};
+use sastrugi_store::atomic::{self, Draft};
+use sastrugi_store::release::Staging;
 use std::collections::BTreeSet;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 /// What a report consists of.
@@ -21,11 +24,11 @@ pub struct Summary {
 }
 
 /// Writes the report of the release at `release` into the folder `out`: `index.html`, `figures/*.svg`, `data/*.json`.
-/// The release need not be sealed. Files of the same names in `out` are replaced, others are left alone.
+/// The release need not be sealed. The folder appears whole or not at all; a report that is there is replaced.
 /// `progress` hears a few words before each part.
 ///
 /// # Errors
-/// A file of the release that is there but cannot be read; a file that cannot be written. What a release does not have is
+/// A folder `out` that holds anything but a report; a file of the release that is there but cannot be read; a file that cannot be written. What a release does not have is
 /// no error: the page leaves it out.
 pub fn render(release: &Path, out: &Path, progress: &dyn Fn(&str)) -> Result<Summary, ReportError> {
     render_with(release, &Companions::default(), out, progress)
@@ -47,6 +50,8 @@ pub fn render_with(
 
 /// The report of rows that are already read.
 pub(crate) fn write(data: &Data, out: &Path, progress: &dyn Fn(&str)) -> Result<Summary, ReportError> {
+    let out = &std::path::absolute(out).map_err(|source| ReportError::Write { path: out.to_owned(), source })?;
+    check_place(out)?;
     let mut sections = Vec::new();
     for question in &questions::ALL {
         progress(question.title);
@@ -54,17 +59,50 @@ pub(crate) fn write(data: &Data, out: &Path, progress: &dyn Fn(&str)) -> Result<
     }
     name_once(&mut sections);
     progress("writing");
-    let mut folder = Folder { root: out, summary: Summary::default() };
+    let staging = Staging::beside(out)?;
+    let mut folder = Folder { draft: staging.path(), summary: Summary::default() };
     folder.put("index.html", &html::page(&head(data), &sections))?;
     for section in &sections {
         section.blocks.iter().try_for_each(|block| folder.put_block(block))?;
     }
-    Ok(folder.summary)
+    for name in ["figures", "data", "."].map(|name| staging.path().join(name)).iter().filter(|path| path.exists()) {
+        atomic::sync_folder(name).map_err(|source| ReportError::Write { path: name.clone(), source })?;
+    }
+    let summary = folder.summary;
+    staging.put_in_place(out)?;
+    Ok(summary)
+}
+
+/// Refuses a place that holds anything but a report.
+fn check_place(out: &Path) -> Result<(), ReportError> {
+    let occupied = |file: PathBuf| ReportError::Occupied { path: out.to_owned(), file };
+    let entries = |folder: &Path| match std::fs::read_dir(folder) {
+        Err(e) if e.kind() == ErrorKind::NotFound => Ok(Vec::new()),
+        Err(e) if e.kind() == ErrorKind::NotADirectory => Err(occupied(PathBuf::new())),
+        listed => listed
+            .and_then(Iterator::collect::<Result<Vec<_>, _>>)
+            .map_err(|source| ReportError::Write { path: folder.to_owned(), source }),
+    };
+    for entry in entries(out)? {
+        let name = entry.file_name();
+        let ending = match name.to_str() {
+            Some("index.html") if entry.path().is_file() => continue,
+            Some("figures") => "svg",
+            Some("data") => "json",
+            _ => return Err(occupied(name.into())),
+        };
+        let foreign =
+            entries(&entry.path())?.into_iter().find(|e| e.path().extension().is_none_or(|own| own != ending));
+        if let Some(foreign) = foreign {
+            return Err(occupied(Path::new(&name).join(foreign.file_name())));
+        }
+    }
+    Ok(())
 }
 
 /// The folder being written.
 struct Folder<'a> {
-    root: &'a Path,
+    draft: &'a Path,
     summary: Summary,
 }
 
@@ -91,10 +129,8 @@ impl Folder<'_> {
     }
 
     fn put(&mut self, name: &str, content: &str) -> Result<(), ReportError> {
-        let path = self.root.join(name);
-        let failed = |source| ReportError::Write { path: path.clone(), source };
-        std::fs::create_dir_all(path.parent().unwrap_or(self.root)).map_err(failed)?;
-        sastrugi_store::atomic::write(&path, content.as_bytes()).map_err(failed)?;
+        let failed = |source| ReportError::Write { path: self.draft.join(name), source };
+        atomic::write(&Draft(self.draft).file(name), content.as_bytes()).map_err(failed)?;
         self.summary.files.push(name.into());
         self.summary.bytes += content.len() as u64;
         Ok(())

@@ -5,7 +5,11 @@ use miette::{GraphicalReportHandler, GraphicalTheme, LabeledSpan, MietteDiagnost
 use sastrugi_stages::Error;
 use serde_json::Value;
 use std::io::{IsTerminal, Write};
+use std::ops::Range;
 use std::process::ExitCode;
+
+/// A place farther right is told by its number: the drawing of a line that long helps nobody, and `miette` counts columns in 16 bits.
+const COLUMNS_SHOWN: usize = 1000;
 
 /// Prints JSON when asked for, else the text.
 ///
@@ -43,8 +47,14 @@ pub fn report(failure: Failure) -> ExitCode {
 
 fn print_study_error(name: &str, text: &str, error: &sastrugi_stages::study::StudyError) {
     let mut diagnostic = MietteDiagnostic::new(error.message.clone());
-    if let Some(span) = error.span.clone() {
-        diagnostic = diagnostic.with_label(LabeledSpan::underline(span));
+    match error.span.clone() {
+        Some(span) if is_narrow(text, &span) => diagnostic = diagnostic.with_label(LabeledSpan::underline(span)),
+        Some(span) => {
+            let before = text.get(..span.start).unwrap_or(text);
+            let (line, column) = (1 + before.matches('\n').count(), 1 + last_line(before).chars().count());
+            diagnostic = MietteDiagnostic::new(format!("{} (line {line}, column {column})", error.message));
+        }
+        None => {}
     }
     if let Some(help) = error.help.clone() {
         diagnostic = diagnostic.with_help(help);
@@ -58,6 +68,17 @@ fn print_study_error(name: &str, text: &str, error: &sastrugi_stages::study::Stu
         Ok(()) => warn(&format!("sastrugi: the study is refused\n{}", rendered.trim_end_matches('\n'))),
         Err(_) => warn(&format!("sastrugi: {name}: {}", error.message)),
     }
+}
+
+/// Whether the lines of a span are short enough to be drawn.
+fn is_narrow(text: &str, span: &Range<usize>) -> bool {
+    let start = text.get(..span.start).map_or(0, |before| span.start - last_line(before).len());
+    let end = text.get(span.end..).and_then(|rest| rest.find('\n')).map_or(text.len(), |length| span.end + length);
+    text.get(start..end).is_some_and(|lines| lines.lines().all(|line| line.len() <= COLUMNS_SHOWN))
+}
+
+fn last_line(text: &str) -> &str {
+    text.rsplit('\n').next().unwrap_or_default()
 }
 
 /// Rows of cells in aligned columns.
@@ -91,4 +112,18 @@ pub fn significant(value: f64) -> String {
     let exponent: i32 = scientific.split_once('e').and_then(|(_, exponent)| exponent.parse().ok()).unwrap_or(0);
     let decimals = (3 - exponent).clamp(0, 12) as usize;
     format!("{value:.decimals$}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn val_only_short_lines_are_drawn() {
+        let text = format!("a = 1\nb = \"{}\" x\nc = 2\n", "y".repeat(70_000));
+        let end = text.find(" x").unwrap() + 1;
+        assert!(is_narrow(&text, &(0..1)) && is_narrow(&text, &(text.len() - 2..text.len())));
+        assert!(!is_narrow(&text, &(end..end + 1)) && !is_narrow(&text, &(0..text.len())));
+        assert!(!is_narrow(&text, &(0..text.len() + 9)));
+    }
 }

@@ -15,6 +15,7 @@ use crate::digest;
 use crate::parquet::{self, TableError};
 use sastrugi_schemas::Record;
 use sastrugi_schemas::manifest::{Artifact, FORMAT, Manifest, PROGRAM};
+use std::collections::BTreeSet;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -186,6 +187,14 @@ fn parse_manifest(bytes: &[u8]) -> Result<Manifest, String> {
     if manifest.program != PROGRAM || manifest.format != FORMAT {
         return Err(format!("its {MANIFEST} is of {} format {}", manifest.program, manifest.format));
     }
+    let mut paths = BTreeSet::new();
+    for Artifact { path, .. } in &manifest.artifacts {
+        check_path(path).map_err(|e| format!("its {MANIFEST} lists a file that cannot be one: {e}"))?;
+        if !paths.insert(path) {
+            return Err(format!("its {MANIFEST} lists \"{path}\" twice"));
+        }
+    }
+    check_path(&manifest.name).map_err(|e| format!("its {MANIFEST} has a name that cannot be one: {e}"))?;
     Ok(manifest)
 }
 
@@ -197,7 +206,10 @@ fn table_of(path: &str) -> Option<&str> {
 }
 
 /// Refuses a path that would leave the release, or that `sha256sum` cannot list plainly.
-fn check_path(path: &str) -> Result<(), ReleaseError> {
+///
+/// # Errors
+/// Why it cannot be a file of a release.
+pub fn check_path(path: &str) -> Result<(), ReleaseError> {
     let refuse = |reason| Err(ReleaseError::Path { path: path.to_owned(), reason });
     if path == MANIFEST || path == SUMS {
         return refuse("the name is taken");

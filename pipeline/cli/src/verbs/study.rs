@@ -5,7 +5,7 @@ use crate::args::{Common, Merge, Pack, Place, Plan, Report, Run, Traverse, Verif
 use crate::failure::{Code, Failure};
 use crate::output::{bytes, columns, print, seconds};
 use crate::progress::Teller;
-use sastrugi_report::Companions;
+use sastrugi_report::{Companions, ReportError};
 use sastrugi_stages::loaded;
 use sastrugi_stages::packing;
 use sastrugi_stages::runner::execute::Limits;
@@ -191,7 +191,11 @@ pub fn report(args: &Report, common: &Common) -> Verdict {
     let companions = Companions { against: args.against.clone(), logs: args.logs.clone() };
     let teller = Teller::new(common.quiet);
     let summary = sastrugi_report::render_with(&args.release, &companions, &output, &|phase| teller.say(phase));
-    let summary = summary.map_err(|e| if e.unusable_input() { Failure::input(e) } else { Failure::failed(e) })?;
+    let summary = summary.map_err(|e| match e {
+        ReportError::Occupied { .. } => Failure::usage(e.to_string()),
+        e if e.unusable_input() => Failure::input(e),
+        e => Failure::failed(e),
+    })?;
     let page = output.join("index.html");
     let text = format!("{}: {} files", page.display(), summary.files.len());
     print(common.json, &json!({ "page": page, "files": summary.files }), &text)?;

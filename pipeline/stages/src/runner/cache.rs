@@ -9,6 +9,7 @@ use super::lock;
 use crate::job::{ItemRef, Outcome, Product};
 use sastrugi_store::atomic::{self, Draft};
 use sastrugi_store::digest;
+use sastrugi_store::release::check_path;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::fs::{self, File};
@@ -307,9 +308,12 @@ fn read_json<T: DeserializeOwned>(path: &Path) -> Option<T> {
     serde_json::from_slice(&fs::read(path).ok()?).ok()
 }
 
-/// True when all files are there with their lengths.
+/// True when all files are there, in the folder itself, with their lengths.
 fn are_whole(folder: &Path, files: &[StoredFile]) -> bool {
-    let whole = |f: &StoredFile| fs::metadata(folder.join(&f.product.file)).is_ok_and(|m| m.len() == f.bytes);
+    let whole = |f: &StoredFile| {
+        let found = || fs::symlink_metadata(folder.join(&f.product.file));
+        check_path(&f.product.file).is_ok() && found().is_ok_and(|m| m.is_file() && m.len() == f.bytes)
+    };
     files.iter().all(whole)
 }
 

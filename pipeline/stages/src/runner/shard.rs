@@ -11,7 +11,7 @@ use crate::error::Error;
 use crate::job::ItemRef;
 use crate::loaded::Loaded;
 use crate::splits::Splits;
-use sastrugi_store::release::Staging;
+use sastrugi_store::release::{Staging, check_path};
 use sastrugi_store::{atomic, digest};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -20,6 +20,8 @@ use std::path::{Path, PathBuf};
 
 const DESCRIPTION: &str = sastrugi_store::release::SHARD;
 const STUDY: &str = "study.toml";
+/// Most parts of a run.
+const PARTS_MAX: u32 = 100_000;
 
 /// Part `index` of `count`, counted from 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -38,9 +40,14 @@ impl Part {
     pub fn parse(text: &str) -> Result<Self, Error> {
         let numbers = text.split_once('/').and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)));
         match numbers {
-            Some((index, count)) if 1 <= index && index <= count && count <= 100_000 => Ok(Self { index, count }),
+            Some((index, count)) if (Self { index, count }).is_one() => Ok(Self { index, count }),
             _ => Err(Error::Usage(format!("`--shard {text}`: it takes I/N with 1 <= I <= N, as 1/3"))),
         }
+    }
+
+    /// True for a part that there can be.
+    fn is_one(self) -> bool {
+        1 <= self.index && self.index <= self.count && self.count <= PARTS_MAX
     }
 
     /// True for a key of this part.
@@ -114,6 +121,20 @@ pub fn write(
 }
 
 impl Description {
+    /// Whether it can be believed: its part is one, and its items lie in its folder.
+    fn check(&self) -> Result<(), String> {
+        let Part { index, count } = self.part;
+        if !self.part.is_one() {
+            return Err(format!(
+                "it is part {index} of {count}; a part is 1 to the number of parts, {PARTS_MAX} at most"
+            ));
+        }
+        self.items.iter().try_for_each(|(item, _)| {
+            let place = format!("{}/{}", item.stage, item.id);
+            check_path(&place).map_err(|e| e.to_string())
+        })
+    }
+
     /// Whether it is of the same part of the same study, with fewer failed items.
     fn holds_more_than(&self, other: &Self) -> bool {
         let same = self.study_sha256 == other.study_sha256 && self.part == other.part;
@@ -199,7 +220,10 @@ fn read(folder: &Path) -> Result<Description, Error> {
     let path = folder.join(DESCRIPTION);
     let bytes = fs::read(&path)
         .map_err(|_| Error::Input(format!("{}: no shard (it has no {DESCRIPTION})", folder.display())))?;
-    serde_json::from_slice(&bytes).map_err(|e| Error::Input(format!("{}: {e}", path.display())))
+    let description: Description =
+        serde_json::from_slice(&bytes).map_err(|e| Error::Input(format!("{}: {e}", path.display())))?;
+    description.check().map_err(|reason| Error::Input(format!("{}: {reason}", path.display())))?;
+    Ok(description)
 }
 
 fn check_set(folders: &[PathBuf], shards: &[Description]) -> Result<(), Error> {

@@ -47,7 +47,7 @@ impl HeightScale {
     fn parse(text: &str) -> Option<Self> {
         let (offset, step) = text.split_once(' ')?;
         let scale = Self { offset_m: offset.parse().ok()?, step_m: step.parse().ok()? };
-        (scale.offset_m.is_finite() && scale.step_m.is_finite()).then_some(scale)
+        (scale.offset_m.is_finite() && scale.step_m.is_finite() && scale.step_m > 0.0).then_some(scale)
     }
 }
 
@@ -124,7 +124,10 @@ fn encode(grid: &Grid<u16>, scale: Option<HeightScale>) -> Result<Vec<u8>, Refus
 /// Reads a greyscale PNG: heights where the text gives a scale, levels otherwise.
 pub(super) fn parse(bytes: &[u8], options: &ReadOptions) -> Result<Dem, Refusal> {
     let refused = |e: png::DecodingError| Refusal::new(format!("is no PNG that can be read: {e}"));
-    let mut reader = png::Decoder::new(Cursor::new(bytes)).read_info().map_err(refused)?;
+    let mut strict = png::DecodeOptions::default();
+    // A text that is damaged is not left out: it may hold the scale of the heights.
+    strict.set_skip_ancillary_crc_failures(false);
+    let mut reader = png::Decoder::new_with_options(Cursor::new(bytes), strict).read_info().map_err(refused)?;
     let info = reader.info();
     let (rows, cols, depth) = (u64::from(info.height), u64::from(info.width), info.bit_depth);
     let wide = match (info.color_type, depth) {
@@ -134,8 +137,12 @@ pub(super) fn parse(bytes: &[u8], options: &ReadOptions) -> Result<Dem, Refusal>
             return Err(Refusal::new(format!("is a PNG of {colour:?} {depth:?}; heights are 8- or 16-bit grey")));
         }
     };
-    let scale = info.uncompressed_latin1_text.iter().find(|t| t.keyword == KEYWORD);
-    let scale = scale.and_then(|t| HeightScale::parse(&t.text));
+    let scale = info.uncompressed_latin1_text.iter().find(|t| t.keyword == KEYWORD).map(|t| {
+        let wrong =
+            || format!("its text `{KEYWORD}` is {:?}; it must be an offset and a step above 0, both in metres", t.text);
+        HeightScale::parse(&t.text).ok_or_else(|| Refusal::new(wrong()))
+    });
+    let scale = scale.transpose()?;
     let cells = cell_count(rows, cols)?;
     // Deflate stores at best 1032 bytes in one.
     if cells as u64 > (bytes.len() as u64).saturating_mul(1032) {
@@ -166,4 +173,37 @@ pub(super) fn parse(bytes: &[u8], options: &ReadOptions) -> Result<Dem, Refusal>
         notes,
     };
     Ok(Dem { grid: Grid::new(geometry, values), info })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sastrugi_numeric::Geometry;
+
+    /// A text that is damaged anywhere is refused: without it levels would pass for metres.
+    #[test]
+    fn val_damaged_scales_are_refused() {
+        let g = Geometry::square(8, 9, 1.0);
+        let grid = Grid::new(g, (0..72).map(|k| 100.0 + 0.01 * f64::from(k)).collect());
+        let (bytes, _) = scaled(&grid).unwrap();
+        let start = bytes.windows(4).position(|name| name == b"tEXt").unwrap();
+        let length = u32::from_be_bytes(bytes[start - 4..start].try_into().unwrap()) as usize;
+        let options = ReadOptions::default();
+        assert!(parse(&bytes, &options).unwrap().info.notes.iter().all(|note| !note.contains("no height scale")));
+        for at in start - 4..start + 4 + length + 4 {
+            for bit in 0..8 {
+                let mut damaged = bytes.clone();
+                damaged[at] ^= 1 << bit;
+                assert!(parse(&damaged, &options).is_err(), "byte {at}, bit {bit}");
+            }
+        }
+    }
+
+    #[test]
+    fn val_scales_that_are_none_are_refused() {
+        for text in ["1.0", "1.0 zero", "1.0 0", "1.0 -2", "inf 1.0", "1.0 1.0 1.0"] {
+            assert_eq!(HeightScale::parse(text), None, "{text}");
+        }
+        assert_eq!(HeightScale::parse("-2.5 0.001"), Some(HeightScale { offset_m: -2.5, step_m: 0.001 }));
+    }
 }

@@ -11,7 +11,7 @@ use std::collections::BTreeSet;
 use std::ffi::OsString;
 use std::fmt::Write as _;
 use std::fs::{self, File};
-use std::io::{BufWriter, Write as _};
+use std::io::{BufWriter, ErrorKind, Write as _};
 use std::path::{Path, PathBuf};
 
 /// What a release says of itself.
@@ -285,6 +285,7 @@ impl ReleaseBuilder {
     /// [`ReleaseError::Occupied`] when `dest` holds something that is no release; the file system failed.
     pub fn seal(mut self, dest: &Path) -> Result<Release, ReleaseError> {
         check_dest(dest)?;
+        remove_empty_folders(self.staging())?;
         let sha256 = self.write_manifest()?;
         let path = self.staging().join(SUMS);
         fs::write(&path, sums(&self.manifest, &sha256)).map_err(ReleaseError::io(&path))?;
@@ -331,6 +332,22 @@ fn remove_folder(folder: &Path) -> Result<(), ReleaseError> {
         Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(ReleaseError::io(folder)(e)),
         _ => Ok(()),
     }
+}
+
+/// Removes the folders below a folder that hold nothing, as those of tables without rows.
+fn remove_empty_folders(folder: &Path) -> Result<(), ReleaseError> {
+    for entry in fs::read_dir(folder).map_err(ReleaseError::io(folder))? {
+        let entry = entry.map_err(ReleaseError::io(folder))?;
+        if entry.file_type().map_err(ReleaseError::io(folder))?.is_dir() {
+            let path = entry.path();
+            remove_empty_folders(&path)?;
+            match fs::remove_dir(&path) {
+                Err(e) if e.kind() != ErrorKind::DirectoryNotEmpty => return Err(ReleaseError::io(&path)(e)),
+                _ => {}
+            }
+        }
+    }
+    Ok(())
 }
 
 /// A folder under construction, `.sastrugi-assembling-<dest>`: removed on drop unless it was put in place.

@@ -90,6 +90,46 @@ fn flip(path: &Path, at: u64) {
     file.write_all(&[byte[0] ^ 1]).unwrap();
 }
 
+/// Places outside the release are neither read nor looked at, whoever wrote its lists; a list has a file once; a folder without files is extra.
+#[test]
+fn val_hostile_folders_are_refused() {
+    let root = tempfile::tempdir().unwrap();
+    let dest = root.path().join("demo");
+    sealed(&dest);
+    fs::write(root.path().join("secret"), "secret").unwrap();
+    let manifest = fs::read_to_string(dest.join(MANIFEST)).unwrap();
+    let first = Release::open(&dest).unwrap().manifest().artifacts[0].path.clone();
+    let outside = root.path().join("secret").display().to_string();
+    for path in ["../secret", outside.as_str(), "a/../../secret", ".hidden", MANIFEST] {
+        fs::write(dest.join(MANIFEST), manifest.replacen(&first, path, 1)).unwrap();
+        let refused = Release::open(&dest).unwrap_err();
+        assert!(refused.unusable_input() && refused.to_string().contains("cannot be"), "{path}: {refused}");
+        let problems = verify(&dest).unwrap().problems;
+        assert!(problems.iter().any(|p| p.path == MANIFEST && p.kind == ProblemKind::Inconsistent), "{problems:?}");
+    }
+    let second = Release::open(&rebuilt(&dest, &manifest)).unwrap().manifest().artifacts[1].path.clone();
+    fs::write(dest.join(MANIFEST), manifest.replacen(&second, &first, 1)).unwrap();
+    assert!(Release::open(&dest).unwrap_err().to_string().contains("twice"));
+    // Without a manifest the checksums count.
+    let sums = fs::read_to_string(dest.join(SUMS)).unwrap();
+    fs::remove_file(dest.join(MANIFEST)).unwrap();
+    fs::write(dest.join(SUMS), sums.replacen(&first, "../secret", 1)).unwrap();
+    let problems = verify(&dest).unwrap().problems;
+    assert!(problems.iter().any(|p| p.path == SUMS && p.message.contains("../secret")), "{problems:?}");
+    assert!(problems.iter().all(|p| p.path != "../secret"), "{problems:?}");
+    fs::write(dest.join(SUMS), sums).unwrap();
+    rebuilt(&dest, &manifest);
+    assert_eq!(verify(&dest).unwrap().problems, []);
+    fs::create_dir_all(dest.join("more/folders")).unwrap();
+    let problems = verify(&dest).unwrap().problems;
+    assert_eq!((problems.len(), problems[0].path.as_str(), problems[0].kind), (1, "more/folders/", ProblemKind::Extra));
+}
+
+fn rebuilt(dest: &Path, manifest: &str) -> PathBuf {
+    fs::write(dest.join(MANIFEST), manifest).unwrap();
+    dest.to_owned()
+}
+
 #[test]
 fn val_missing_extra_and_truncated_files_are_named() {
     let folder = tempfile::tempdir().unwrap();

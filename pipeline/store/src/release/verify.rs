@@ -1,7 +1,7 @@
 //! Checking a release against its own checksums, manifest and table descriptions.
 
 use super::builder::sums;
-use super::{MANIFEST, ReleaseError, SUMS, parse_manifest, table_of};
+use super::{MANIFEST, ReleaseError, SUMS, check_path, parse_manifest, table_of};
 use crate::digest;
 use crate::parquet::check_table;
 use rayon::prelude::*;
@@ -85,7 +85,14 @@ pub fn verify(folder: &Path) -> Result<VerifyReport, ReleaseError> {
             None
         }
     });
-    let listed = sums_text.as_deref().map(parse_sums).unwrap_or_default();
+    let mut listed = sums_text.as_deref().map(parse_sums).unwrap_or_default();
+    listed.retain(|path, _| match check_path(path) {
+        Err(_) if path != MANIFEST => {
+            problem(SUMS, ProblemKind::Inconsistent, format!("lists \"{path}\", which cannot be a file of a release"));
+            false
+        }
+        _ => true,
+    });
     if let (Some(manifest), Some(bytes), Some(text)) = (&manifest, &manifest_text, &sums_text)
         && sums(manifest, &digest::of_bytes(bytes)).as_bytes() != text
     {
@@ -96,7 +103,8 @@ pub fn verify(folder: &Path) -> Result<VerifyReport, ReleaseError> {
     let artifacts = expected(manifest.as_ref(), &listed);
     let names: BTreeSet<&str> = artifacts.keys().map(String::as_str).chain([MANIFEST, SUMS]).collect();
     for path in there.iter().filter(|path| !names.contains(path.as_str())) {
-        problem(path, ProblemKind::Extra, "the file is not listed".to_owned());
+        let what = if path.ends_with('/') { "the folder is empty" } else { "the file is not listed" };
+        problem(path, ProblemKind::Extra, what.to_owned());
     }
     let checks: Vec<(u64, Option<Problem>)> =
         artifacts.par_iter().map(|(_, artifact)| check(folder, artifact)).collect::<Result<_, _>>()?;
@@ -173,12 +181,14 @@ fn check_rows(path: &Path, artifact: &Artifact) -> Result<(), String> {
     }
 }
 
-/// Paths of everything below a folder that is not a folder, with `/` between folders.
+/// Paths of everything below a folder that is not a folder, with `/` between folders, and of folders without anything, with `/` at the end.
 fn files_of(folder: &Path) -> Result<BTreeSet<String>, ReleaseError> {
     let mut files = BTreeSet::new();
     let mut folders = vec![(folder.to_owned(), String::new())];
     while let Some((folder, prefix)) = folders.pop() {
+        let mut is_empty = true;
         for entry in fs::read_dir(&folder).map_err(ReleaseError::io(&folder))? {
+            is_empty = false;
             let entry = entry.map_err(ReleaseError::io(&folder))?;
             let name = format!("{prefix}{}", entry.file_name().to_string_lossy());
             let kind = entry.file_type().map_err(ReleaseError::io(&folder))?;
@@ -187,6 +197,9 @@ fn files_of(folder: &Path) -> Result<BTreeSet<String>, ReleaseError> {
             } else {
                 files.insert(name);
             }
+        }
+        if is_empty && !prefix.is_empty() {
+            files.insert(prefix);
         }
     }
     Ok(files)

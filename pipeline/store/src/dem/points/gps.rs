@@ -124,14 +124,14 @@ impl GpsTimes {
         Ok(self.sequences[self.last].time)
     }
 
-    fn first_step<R: Read>(&mut self, mut decoder: &mut ArithmeticDecoder<R>) -> io::Result<()> {
-        let step = self.integers.decompress(&mut decoder, 0, context::FIRST_STEP)?;
+    fn first_step<R: Read>(&mut self, decoder: &mut ArithmeticDecoder<R>) -> io::Result<()> {
+        let step = self.integers.decompress(decoder, 0, context::FIRST_STEP)?;
         let sequence = &mut self.sequences[self.last];
         *sequence = Sequence { time: sequence.time.wrapping_add(i64::from(step)), step, unlike: 0 };
         Ok(())
     }
 
-    fn step<R: Read>(&mut self, mut decoder: &mut ArithmeticDecoder<R>, multiple: i32) -> io::Result<()> {
+    fn step<R: Read>(&mut self, decoder: &mut ArithmeticDecoder<R>, multiple: i32) -> io::Result<()> {
         let context = match multiple {
             0 => context::UNLIKE,
             1 => context::ONCE,
@@ -142,7 +142,7 @@ impl GpsTimes {
             _ => context::BACK,
         };
         let sequence = &mut self.sequences[self.last];
-        let step = self.integers.decompress(&mut decoder, multiple.wrapping_mul(sequence.step), context)?;
+        let step = self.integers.decompress(decoder, multiple.wrapping_mul(sequence.step), context)?;
         sequence.time = sequence.time.wrapping_add(i64::from(step));
         match multiple {
             1 => sequence.unlike = 0,
@@ -158,9 +158,9 @@ impl GpsTimes {
     }
 
     /// A sequence begins.
-    fn full<R: Read>(&mut self, mut decoder: &mut ArithmeticDecoder<R>) -> io::Result<()> {
+    fn full<R: Read>(&mut self, decoder: &mut ArithmeticDecoder<R>) -> io::Result<()> {
         let expected = (self.sequences[self.last].time >> 32) as i32;
-        let high = self.integers.decompress(&mut decoder, expected, context::HIGH_WORD)?;
+        let high = self.integers.decompress(decoder, expected, context::HIGH_WORD)?;
         let time = (i64::from(high) << 32) | i64::from(decoder.read_int()?);
         self.newest = (self.newest + 1) % SEQUENCES;
         self.last = self.newest;
