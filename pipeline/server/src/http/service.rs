@@ -24,7 +24,7 @@ pub const BODY_BYTES: usize = 1 << 16;
 const SAMPLE_BYTES: usize = 128;
 /// Room for patches is counted in so many bytes. There are so many of them for small patches, and as many for large ones: the largest at a time.
 const ROOM_UNIT: usize = 1 << 20;
-/// See [`ROOM_UNIT`].
+/// Room for small patches, and as much for large ones, MiB.
 pub const ROOM_UNITS: usize = 1 << 9;
 /// A patch of more is large: 362 x 362 samples.
 const SMALL_UNITS: usize = 16;
