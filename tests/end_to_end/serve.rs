@@ -9,7 +9,7 @@ use sastrugi_tests::server::{Server, WORLD};
 use sastrugi_tests::{area, sastrugi_in, write};
 use serde_json::json;
 use std::cell::RefCell;
-use std::collections::{BTreeSet, HashMap};
+use std::collections::HashMap;
 use std::fs;
 use std::io::{Read, Write};
 use std::path::Path;
@@ -58,6 +58,49 @@ fn val_patches_are_those_of_the_program() {
     assert_eq!((&library["made"], &library["disk_hits"]), (&0.into(), &4.into()), "{library}");
 }
 
+/// A small window is made by itself when nobody has asked for ground around it, and its tiles when somebody has; the bits are the same.
+#[test]
+fn val_lone_patches_are_made_by_themselves() {
+    let folder = area();
+    world(folder.path());
+    let mut server = Server::start(folder.path(), &["world.toml", "--library", "tiles"], &[]);
+    let patch = |server: &Server, first: i32, more: &str| {
+        let origin = f64::from(first) * 0.02;
+        let answer = server.get(&format!(
+            "/v1/collections/world/patch?origin={origin:?},{origin:?}&size=256,256&resolution_m=0.02&format=raw{more}"
+        ));
+        assert_eq!(answer.status, 200);
+        answer.floats()
+    };
+    let made = |server: &Server| {
+        // A tile counts when it has been handed over.
+        while server.get("/v1/library").json()["running"] != 0 {
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        server.get("/v1/library").json()["made"].as_u64().unwrap()
+    };
+    // Across the corner of four tiles.
+    let alone = patch(&server, 100, "");
+    assert_eq!(made(&server), 1);
+    patch(&server, 100, "&field=albedo");
+    patch(&server, 100, "&rotate=90");
+    assert_eq!(made(&server), 1);
+    let beside = patch(&server, 101, "");
+    assert_eq!(made(&server), 5);
+    for r in 1..256 {
+        let (a, b) = (&alone[256 * (r - 1) + 1..256 * r], &beside[256 * r..256 * r + 255]);
+        assert!(a.iter().zip(b).all(|(a, b)| a.to_bits() == b.to_bits()), "row {r}");
+    }
+    server.kill();
+    let again = Server::start(folder.path(), &["world.toml", "--library", "tiles"], &[]);
+    assert_eq!((patch(&again, 100, "&flip=none") == alone, patch(&again, 103, "").len()), (true, 1 << 16));
+    assert_eq!(made(&again), 0);
+    // A tile itself is made as one.
+    patch(&again, 1024, "");
+    patch(&again, 1024, "&field=albedo");
+    assert_eq!(made(&again), 1);
+}
+
 /// A pixel of a map tile is the ground at the middle of its cell, without features narrower than two pixels, at every level.
 #[test]
 fn val_pixels_are_the_ground_at_their_middles() {
@@ -68,15 +111,12 @@ fn val_pixels_are_the_ground_at_their_middles() {
     let grid = &described["tile_grid"];
     let [west, north] = [0, 1].map(|k| grid["origin_m"][k].as_f64().unwrap());
     let offset = server.get("/v1/collections/world/xyz/elevation/tilejson.json").json()["offset_m"].as_f64().unwrap();
-    let mut seen = 0;
     for level in [16, 13, 9, 3, 0] {
         let step = grid["resolutions_m"][level].as_f64().unwrap();
         let side = 256.0 * step;
         let [col, row] = [((3.0 - west) / side) as u32, ((north - 4.0) / side) as u32];
         let tile = server.get(&format!("{TILES}/elevation/map/tiles/world/{level}/{row}/{col}"));
-        if tile.status == 404 {
-            continue;
-        }
+        assert_eq!(tile.status, 200, "level {level}");
         let pixels = rgba(&tile.body);
         for (r, c) in [(0, 0), (17, 200), (128, 128), (255, 3)] {
             let [red, green, blue, _] = pixels[256 * r + c];
@@ -87,7 +127,6 @@ fn val_pixels_are_the_ground_at_their_middles() {
             let exact = point.json()["elevation_m"].as_f64().unwrap();
             // Half a step of the encoding, and single precision.
             assert!((height - exact).abs() < 2.6e-5 + 1e-7 * exact.abs(), "level {level}: {height} {exact}");
-            seen += 1;
         }
         // The same tile by z, x, y.
         let window = format!(
@@ -98,7 +137,6 @@ fn val_pixels_are_the_ground_at_their_middles() {
         );
         assert_eq!(server.get(&window).body, tile.body);
     }
-    assert!(seen >= 12, "{seen}");
 }
 
 fn rgba(png: &[u8]) -> Vec<[u8; 4]> {
@@ -371,6 +409,36 @@ fn val_the_door_is_kept() {
     assert_eq!(server.terminate(), Some(0));
 }
 
+/// The log has a line for each request: an object of JSON where that is asked for, else words.
+#[test]
+fn val_requests_are_logged() {
+    let folder = area();
+    world(folder.path());
+    for (format, is_json) in [("json", true), ("text", false)] {
+        let log = folder.path().join(format);
+        let mut command = std::process::Command::new(sastrugi_tests::program());
+        command.args(["serve", "--listen", "127.0.0.1:0", "world.toml", "--log", "--log-format", format]);
+        command.env_remove("RUST_LOG").current_dir(folder.path()).stderr(fs::File::create(&log).unwrap());
+        let mut server = Server::start_command(&mut command);
+        assert_eq!((server.get("/v1/collections").status, server.get("/v1/jobs/99?token=secret").status), (200, 404));
+        assert_eq!(server.terminate(), Some(0));
+        let said = fs::read_to_string(&log).unwrap();
+        assert!(!said.contains("secret"), "tokens may stand behind the path: {said}");
+        let lines: Vec<&str> =
+            said.lines().filter(|line| line.contains("\"request\"") || line.contains(" request ")).collect();
+        assert_eq!(lines.len(), 2, "{said}");
+        assert_eq!(said.lines().all(|line| serde_json::from_str::<serde_json::Value>(line).is_ok()), is_json, "{said}");
+        if is_json {
+            let fields =
+                lines.iter().map(|line| serde_json::from_str::<serde_json::Value>(line).unwrap()["fields"].clone());
+            let fields: Vec<_> =
+                fields.map(|f| (f["method"].clone(), f["path"].clone(), f["status"].clone())).collect();
+            assert_eq!(fields[0], (json!("GET"), json!("/v1/collections"), json!(200)));
+            assert_eq!(fields[1], (json!("GET"), json!("/v1/jobs/99"), json!(404)));
+        }
+    }
+}
+
 /// A server that is told to stop finishes the requests that are open.
 #[test]
 fn val_a_stopping_server_finishes_open_requests() {
@@ -424,6 +492,7 @@ fn val_jobs_make_tiles_ahead() {
     let body = "{\"collection\": \"world\", \"bounds_m\": [1e5, 1e5, 2e5, 2e5], \"resolution_m\": 2.56}";
     assert_eq!(server.send("POST", "/v1/jobs", &["Content-Type: application/json"], body).status, 202);
     assert_eq!(server.get("/v1/collections/world/point?x=777&y=777").status, 200);
+    assert_eq!(server.get("/v1/jobs/2").json()["state"], "running");
     let cancelled = server.send("DELETE", "/v1/jobs/2", &[], "");
     assert_eq!((cancelled.status, &cancelled.json()["state"]), (200, &"cancelled".into()));
     let idle = (0..600).any(|_| {
@@ -435,34 +504,6 @@ fn val_jobs_make_tiles_ahead() {
     assert_eq!(order("[0, 0, 1e9, 1e9]").status, 413);
     assert_eq!(order("[5, 0, 1, 1]").status, 400);
     assert_eq!(server.get("/v1/jobs").json()["jobs"].as_array().unwrap().len(), 2);
-}
-
-/// Ten kills and restarts while clients ask: nothing wrong is ever answered with 200.
-#[test]
-fn val_nothing_half_written_is_served() {
-    let folder = area();
-    world(folder.path());
-    let truth = Server::start(folder.path(), &["world.toml"], &[]);
-    let path = |k: u64| {
-        format!(
-            "/v1/collections/world/patch?origin={},0&size=64,64&resolution_m=0.02&format=raw",
-            1.28 * (k % 40) as f64
-        )
-    };
-    let right: Vec<Vec<u8>> = (0..40).map(|k| truth.get(&path(k)).body).collect();
-    let mut bodies = BTreeSet::new();
-    for kill in 0..10u64 {
-        let mut server =
-            Server::start(folder.path(), &["world.toml", "--library", "tiles", "--memory-bytes", "0"], &[]);
-        for k in 0..(3 * kill + 2) {
-            let answer = server.get(&path(7 * kill + k));
-            assert_eq!(answer.status, 200);
-            assert_eq!(answer.body, right[((7 * kill + k) % 40) as usize]);
-            bodies.insert((7 * kill + k) % 40);
-        }
-        server.kill();
-    }
-    assert!(bodies.len() > 30);
 }
 
 /// The terrains of a release are served with their maps and tracks; their pixels at the finest level are their cells.
@@ -498,7 +539,17 @@ fn val_releases_are_served() {
             }
         }
         let level = own["levels"].as_u64().unwrap() - 1;
-        assert_eq!(server.get(&format!("/v1/collections/{id}/styles/relief/map/tiles/{id}/{level}/0/0")).status, 200);
+        let tile = |layer: &str| server.get(&format!("/v1/collections/{id}/styles/{layer}/map/tiles/{id}/{level}/0/0"));
+        assert_eq!(tile("relief").status, 200);
+        let pixels = rgba(&tile("terrarium").body);
+        if g.cell[0] == g.cell[1] {
+            for (r, c) in (0..rows).flat_map(|r| (0..cols).map(move |c| (r, c))) {
+                let [red, green, blue, opaque] = pixels[256 * r + c];
+                let seen = f64::from(red) * 256.0 + f64::from(green) + f64::from(blue) / 256.0 - 32768.0;
+                let height = grid.at(r, c);
+                assert!((seen - height).abs() < 0.002 || (opaque == 0 && height.is_nan()), "{id} {r} {c}");
+            }
+        }
         for track in server.get(&format!("/v1/collections/{id}/tracks")).json()["tracks"].as_array().unwrap() {
             let one = server.get(&format!("/v1/collections/{id}/tracks/{}", track["id"].as_str().unwrap())).json();
             assert!(one["x_m"].as_array().unwrap().len() > 1);

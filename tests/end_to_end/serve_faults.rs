@@ -139,6 +139,23 @@ fn records(library: &Path) -> Vec<PathBuf> {
     files(library, |name| name.ends_with(".tile"))
 }
 
+/// Rows and columns of a record, and whether it is shorter than the heights and albedo of so many samples.
+fn shape_of(path: &Path) -> Option<([usize; 2], bool)> {
+    let bytes = fs::read(path).ok()?;
+    let word = |at: usize| Some(u32::from_le_bytes(bytes.get(at..at + 4)?.try_into().ok()?) as usize);
+    // A magic of 16 bytes and the key come first; a checksum of 32 bytes is last.
+    let head = 20 + word(16)?;
+    let shape = [word(head)?, word(head + 4)?];
+    Some((shape, bytes.len() < head + 12 + 2 * 4 * shape[0] * shape[1] + 32))
+}
+
+/// Records of whole tiles: those of small windows are seldom asked for again.
+fn tiles(library: &Path) -> Vec<PathBuf> {
+    let mut all = records(library);
+    all.retain(|path| shape_of(path).is_some_and(|(shape, _)| shape == [SIDE; 2]));
+    all
+}
+
 fn drafts(library: &Path) -> usize {
     files(library, |name| name.starts_with(".sastrugi-partial")).len()
 }
@@ -199,19 +216,18 @@ fn kill_and_restart(kills: usize) {
         leftovers += drafts(&library);
         let kept = records(&library);
         seen = seen.max(kept.len());
-        torn +=
-            kept.iter().filter(|path| fs::metadata(path).is_ok_and(|m| m.len() < 2 * 4 * (SIDE * SIDE) as u64)).count();
+        torn += kept.iter().filter(|path| shape_of(path).is_none_or(|(_, torn)| torn)).count();
         kept.iter().filter(|_| draws.below(3) == 0).for_each(|path| fs::remove_file(path).unwrap());
     }
     let server = Server::start(folder.path(), &arguments, &[]);
-    let kept = records(&library).len() as u64;
+    let kept = tiles(&library).len() as u64;
     ask_times(&server, &truth, &mut draws, 400);
     assert_eq!((torn, counted(&server, "damaged")), (0, 0), "a record was half written");
-    assert!(counted(&server, "disk_hits") >= kept && answered.load(Ordering::Relaxed) > kills / 2);
+    let (hits, answered) = (counted(&server, "disk_hits"), answered.into_inner());
+    assert!(kept > 0 && hits >= kept && answered > 10 * kills, "{hits} of {kept} records read, {answered} answers");
     println!(
-        "kills {kills}, restarts {kills}, answers of 200 {}, most records {seen}, drafts left by kills and cleared {leftovers}, \
-         half-written records {torn} (seed 31)",
-        answered.load(Ordering::Relaxed)
+        "kills {kills}, restarts {kills}, answers of 200 {answered}, most records {seen}, drafts left by kills and cleared {leftovers}, \
+         half-written records {torn} (seed 31)"
     );
 }
 
@@ -351,7 +367,7 @@ fn damage_a_library(rounds: usize) {
         if round == 0 {
             ask_times(&server, &truth, &mut draws, 300);
             until("all records are written", || counted(&server, "queued") == 0);
-            all = records(&library);
+            all = tiles(&library);
         }
         for _ in 0..EACH {
             // One each time is damaged while the server runs.
@@ -376,7 +392,8 @@ fn damage_a_library(rounds: usize) {
          wrong answers 0 (seed 33)",
         ways[0], ways[1], ways[2], ways[3], ways[4], ways[5]
     );
-    assert!(found > 0 && hits > found && damages > rounds * EACH);
+    // Folders in place of records are no records; what is damaged twice before it is asked for is found once.
+    assert!(found > damages as u64 / 4 && hits > found && damages > rounds * EACH, "{found} of {damages}");
 }
 
 #[test]
@@ -467,27 +484,30 @@ fn val_floods_are_refused() {
     let server = Server::start(folder.path(), &["world.toml"], &[]);
     let headers: String = (0..1000).map(|k| format!("X-{k}: {k}\r\n")).collect();
     let long = |bytes: usize| "x".repeat(bytes);
+    let order =
+        "POST /v1/jobs HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nContent-Length: 100000\r\n\r\n";
+    let unended = "GET /v1 HTTP/1.1\r\nHost: localhost\r\nX: ";
     let cases = [
         ("1000 headers", 431, format!("GET /v1 HTTP/1.1\r\nHost: localhost\r\n{headers}\r\n")),
-        ("a header of 1 MB", 431, format!("GET /v1 HTTP/1.1\r\nHost: localhost\r\nX: {}\r\n\r\n", long(1 << 20))),
+        ("a head of 32 kB", 431, format!("{unended}{}", long((32 << 10) - unended.len()))),
         ("an address of 9 kB", 414, format!("GET /v1?{} HTTP/1.1\r\nHost: localhost\r\n\r\n", long(9000))),
-        (
-            "a body of 100 kB",
-            413,
-            format!(
-                "POST /v1/jobs HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nContent-Length: 100000\r\n\r\n{}",
-                long(100_000)
-            ),
-        ),
+        ("a body of 100 kB, announced", 413, order.to_owned()),
         ("no HTTP", 400, "hello\r\n\r\n".to_owned()),
     ];
     for (name, status, request) in &cases {
+        for _ in 0..20 {
+            assert_eq!(said_to(&server, request.as_bytes()).map(|a| a.0), Some(*status), "{name}");
+        }
+    }
+    // The answer may be lost on a connection that is closed while the client still writes.
+    for (name, status, request) in [
+        ("a header of 1 MB", 431, format!("{unended}{}\r\n\r\n", long(1 << 20))),
+        ("a body of 100 kB", 413, format!("{order}{}", long(100_000))),
+    ] {
         let all: Vec<Option<u16>> = (0..20).map(|_| said_to(&server, request.as_bytes()).map(|a| a.0)).collect();
-        let right = all.iter().filter(|said| **said == Some(*status)).count();
         let cut = all.iter().filter(|said| said.is_none()).count();
-        println!("{name}: {right} of 20 times {status}, {cut} times cut off before the answer");
-        // The answer may be lost on a connection that is closed while the client still writes.
-        assert!(right + cut == 20 && (right > 0 || request.len() > 1 << 16), "{name}: {all:?}");
+        println!("{name}: {} of 20 times {status}, {cut} times cut off before the answer", 20 - cut);
+        assert!(all.iter().flatten().all(|said| *said == status), "{name}: {all:?}");
     }
     assert_eq!(server.get("/healthz").status, 200);
 }
@@ -497,10 +517,10 @@ fn val_floods_are_refused() {
 fn val_who_cannot_be_served_now_is_told_when() {
     let folder = area();
     write(folder.path(), "world.toml", SLOW);
-    // Four tiles each, of which no other has one.
+    // Ten tiles each, of which no other has one.
     let across = &|k: usize| {
-        let [x, y] = [512 * k + 192, 192].map(|n| n as f64 * STEP_M);
-        format!("{PATCH}?origin={x:?},{y:?}&size=128,128&resolution_m={STEP_M}&format=raw")
+        let [x, y] = [2048 * k, 236].map(|n| n as f64 * STEP_M);
+        format!("{PATCH}?origin={x:?},{y:?}&size=1200,40&resolution_m={STEP_M}&format=raw")
     };
     let tile = &|k: usize| {
         format!("{PATCH}?origin={},0&size=256,256&resolution_m={STEP_M}&format=raw", k as f64 * 256.0 * STEP_M)
@@ -561,6 +581,35 @@ fn val_who_cannot_be_served_now_is_told_when() {
     until("there is room again", || {
         said_to(&server, b"GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n").is_some_and(|a| a.0 == 200)
     });
+}
+
+/// Clients that read nothing of 16 MB each: more than 512 MB are not on their way at once. Small answers go all the same, and large ones again once
+/// there is room.
+#[test]
+fn val_bytes_on_their_way_are_bounded() {
+    let folder = area();
+    write(folder.path(), "world.toml", QUICK);
+    let server = Server::start(folder.path(), &["world.toml"], &[]);
+    let large = format!("{PATCH}?origin=0,0&size=2048,2048&resolution_m={STEP_M}&format=raw");
+    let mut reader = server.client().unwrap();
+    assert_eq!(reader.get(&large).unwrap().status, 200);
+    let mut held: Vec<Client> = (0..33).map(|_| server.client().unwrap()).collect();
+    for client in &mut held {
+        write!(client.stream(), "GET {large} HTTP/1.1\r\nHost: localhost\r\n\r\n").unwrap();
+    }
+    let on_their_way = || {
+        let metrics = String::from_utf8(server.get("/metrics").body).unwrap();
+        let bytes = metrics.lines().find_map(|line| line.strip_prefix("sastrugi_sending_bytes ")?.parse::<u64>().ok());
+        bytes.unwrap()
+    };
+    until("no more fits", || on_their_way() + (16 << 20) > 512 << 20);
+    let refused = server.get(&large);
+    assert_eq!((refused.status, refused.header("retry-after")), (503, Some("2")));
+    assert!(refused.json()["detail"].as_str().unwrap().contains("too many bytes"), "{}", refused.json());
+    assert_eq!(reader.get(&Truth::window(&mut Draws(36)).path()).unwrap().status, 200);
+    drop(held);
+    until("their bytes are forgotten", || on_their_way() == 0);
+    assert_eq!(reader.get(&large).unwrap().status, 200);
 }
 
 /// Ways of being slow.
@@ -673,8 +722,8 @@ fn bear_slow_clients(count: usize, to_the_end: bool) {
         let all = (0..count).filter(|k| way_of(*k) == way).count();
         println!("  {name}: {all}, let go {}, the last by {:.0} s", gone[way], last[way]);
     }
-    // 300 kB a connection.
-    assert!(most < before + 300 * count as u64 + (1 << 16), "{most} kB");
+    // 64 kB a connection, and 32 MB.
+    assert!(most < before + 64 * count as u64 + (1 << 15), "{most} kB, {before} kB before");
     if to_the_end {
         assert!(slow.is_empty() && open < 5, "{} and {open} are not let go: {gone:?}", slow.len());
         // What was written to them before does not make three answers.

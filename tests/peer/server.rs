@@ -6,6 +6,8 @@ use std::process::Command;
 
 /// Generated requests of each operation and phase.
 const EXAMPLES: &str = "200";
+/// Requests that are right, and answered with 200, at least: refusals alone would say little about the answers.
+const RIGHT_MIN: u64 = 500;
 
 /// No answer is other than described, and none is a fault of the server: several thousand requests, the same every time. One check is left out:
 /// that whatever the description allows is accepted. It cannot say that `origin` and `center` exclude each other, nor where ground ends.
@@ -26,4 +28,7 @@ fn val_answers_are_as_described() {
     assert_eq!(call.code, 0, "{}{}", call.stdout, call.stderr);
     let metrics = String::from_utf8(server.get("/metrics").body).unwrap();
     assert!(!metrics.contains("status=\"500\""), "{metrics}");
+    let right = metrics.lines().filter(|line| line.contains("requests_total") && line.contains("status=\"200\""));
+    let right: u64 = right.filter_map(|line| line.rsplit(' ').next()?.parse::<u64>().ok()).sum();
+    assert!(right > RIGHT_MIN, "of all requests only {right} were answered with 200: {metrics}");
 }

@@ -5,7 +5,7 @@ use crate::http::answer::Answers;
 use crate::http::guard::Peer;
 use crate::http::jobs::Jobs;
 use crate::http::metrics::Metrics;
-use crate::http::service::ROOM_UNITS;
+use crate::http::room::{Rooms, Sending};
 use crate::http::{Limits, Service, router};
 use crate::library::{Library, LibraryError, Settings as LibrarySettings};
 use axum::http::HeaderValue;
@@ -16,7 +16,6 @@ use hyper_util::service::TowerToHyperService;
 use sastrugi_stages::Error;
 use std::net::SocketAddr;
 use std::path::PathBuf;
-use std::sync::atomic::AtomicU64;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 use tokio::net::{TcpListener, TcpStream};
@@ -107,8 +106,8 @@ pub fn serve(
         jobs: Jobs::default(),
         metrics: Metrics::default(),
         under_way: Mutex::default(),
-        sending: AtomicU64::new(0),
-        rooms: [0, 1].map(|_| Arc::new(Semaphore::new(ROOM_UNITS))),
+        sending: Sending::default(),
+        rooms: Rooms::default(),
         processors: Arc::new(Semaphore::new(settings.library.workers.max(1))),
     });
     ready(address, &service.collections);

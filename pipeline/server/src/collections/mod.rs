@@ -22,8 +22,8 @@ use std::sync::Arc;
 pub struct Collection {
     /// Its id in addresses.
     pub id: String,
-    /// File or release that it comes from, as it was given.
-    pub source: String,
+    /// File or release that it comes from, as it was given. Clients learn its name, not where it lies.
+    pub source: PathBuf,
     /// Its ground.
     pub ground: Ground,
     /// What was driven in the release that it stands in.
@@ -87,7 +87,7 @@ impl Collection {
             "id": self.id,
             "title": self.title(),
             "kind": match self.ground { Ground::World(_) => "world", Ground::Raster(_) => "raster" },
-            "source": self.source,
+            "source": self.source.file_name().unwrap_or(self.source.as_os_str()).to_string_lossy(),
             "release": self.drives.as_ref().map(|d| d.release.manifest().name.clone()),
             "bounds_m": self.grid().bounds_m(),
             "cell_m": cell_m,
@@ -147,7 +147,6 @@ impl Collection {
 pub fn open(paths: &[PathBuf], raster_bytes: u64) -> Result<Collections, Error> {
     let (mut all, memory) = (Collections::new(), raster::Memory::new(raster_bytes));
     for path in paths {
-        let source = path.display().to_string();
         let found = match served(path)? {
             Served::Worlds(worlds) => worlds
                 .into_iter()
@@ -167,11 +166,12 @@ pub fn open(paths: &[PathBuf], raster_bytes: u64) -> Result<Collections, Error> 
         for (id, ground, drives) in found {
             if let Some(other) = all.get(&id) {
                 return Err(Error::Usage(format!(
-                    "{source}: \"{id}\" is served from {} already; rename one of them, or name the file once",
-                    other.source
+                    "{}: \"{id}\" is served from {} already; rename one of them, or name the file once",
+                    path.display(),
+                    other.source.display()
                 )));
             }
-            all.insert(id.clone(), Arc::new(Collection { id, source: source.clone(), ground, drives }));
+            all.insert(id.clone(), Arc::new(Collection { id, source: path.clone(), ground, drives }));
         }
     }
     Ok(all)

@@ -35,6 +35,10 @@ const GROUNDS: usize = 32;
 const FEW: usize = 16;
 /// Tiles of one request that are asked of the library at once.
 const AT_ONCE: usize = 16;
+/// Windows up to this size are made by themselves at first; larger ones are made in tiles, side by side.
+const ALONE_MAX: usize = TILE + 2;
+/// A window is made by itself where its tiles take so many times as long.
+const ALONE_GAIN: f64 = 2.0;
 /// Samples along the side of a look at the whole map, for its range of heights.
 const LOOK: usize = 64;
 /// A distance of samples is that of a lattice when it differs by no more than this part of it.
@@ -58,6 +62,8 @@ pub struct Selection {
 pub enum Piece {
     /// In tiles that the library keeps, for what lies around it too.
     Tiles,
+    /// By itself where that is cheaper and nobody has asked for its tiles before, else in tiles.
+    Either,
     /// By itself: right for a few samples.
     Alone,
 }
@@ -65,7 +71,7 @@ pub enum Piece {
 impl Piece {
     /// The cheaper of the two for a window that stands alone.
     pub fn of([rows, cols]: [usize; 2]) -> Self {
-        if rows * cols <= FEW { Self::Alone } else { Self::Tiles }
+        if rows * cols <= FEW { Self::Alone } else { Self::Either }
     }
 }
 
@@ -285,6 +291,12 @@ impl World {
     }
 }
 
+/// A tile of the lattice, by its column and row of tiles.
+fn tile_window(zoom: u32, [col, row]: [i64; 2]) -> Window {
+    let (west, south) = (TILE as i64 * col, TILE as i64 * row);
+    Window { zoom, west, south, cols: TILE, rows: TILE, centred: false }
+}
+
 /// The square about the origin that the map of a world without end shows.
 fn square(spacing_m: f64) -> TileGrid {
     let finest_m = FINEST_SPACINGS * spacing_m;
@@ -370,13 +382,17 @@ impl World {
         self.window(maker, window, &selection).await
     }
 
-    /// The samples of one window, as the library keeps them.
-    async fn window(&self, maker: &Maker, window: Window, selection: &Selection) -> Result<Arc<Samples>, Problem> {
+    fn key(&self, window: &Window, selection: &Selection) -> TileKey {
         let Window { zoom, west, south, cols, rows, centred } = window;
-        let key = TileKey::new(format!(
+        TileKey::new(format!(
             "{} {:?} {:?} {zoom} {west} {south} {cols} {rows} {centred}",
             self.digest, selection.phenomena, selection.feature_min_m
-        ));
+        ))
+    }
+
+    /// The samples of one window, as the library keeps them.
+    async fn window(&self, maker: &Maker, window: Window, selection: &Selection) -> Result<Arc<Samples>, Problem> {
+        let key = self.key(&window, selection);
         let ground = self.ground(&selection.phenomena)?;
         self.check_seconds(&*ground, &window, selection.feature_min_m, [1.0, TILE_SECONDS])?;
         let feature_min_m = selection.feature_min_m;
@@ -396,7 +412,7 @@ impl World {
     /// A sentence with a `feature_min_m` that would do.
     pub fn check_work(&self, zoom: u32, tiles: u64, selection: &Selection, seconds_max: f64) -> Result<(), Problem> {
         let ground = self.ground(&selection.phenomena)?;
-        let window = Window { zoom, west: 0, south: 0, cols: TILE, rows: TILE, centred: false };
+        let window = tile_window(zoom, [0, 0]);
         self.check_seconds(&*ground, &window, selection.feature_min_m, [1.0, TILE_SECONDS])?;
         self.check_seconds(&*ground, &window, selection.feature_min_m, [tiles as f64, seconds_max])
     }
@@ -476,9 +492,33 @@ impl World {
         [col, row]: [i64; 2],
         selection: &Selection,
     ) -> Result<Arc<Samples>, Problem> {
-        let (west, south) = (TILE as i64 * col, TILE as i64 * row);
-        let window = Window { zoom, west, south, cols: TILE, rows: TILE, centred: false };
-        self.window(maker, window, selection).await
+        self.window(maker, tile_window(zoom, [col, row]), selection).await
+    }
+
+    /// Whether a window is better made by itself than in its tiles: it is cheaper, and no other window has asked for one of them before. Clients
+    /// that ask here and there get their samples soon; those that go on to what lies beside them find tiles.
+    fn stands_alone(
+        &self,
+        library: &Library,
+        window: &Window,
+        tiles: &[[i64; 2]],
+        selection: &Selection,
+    ) -> Result<bool, Problem> {
+        if window.cols.max(window.rows) > ALONE_MAX {
+            return Ok(false);
+        }
+        let ground = self.ground(&selection.phenomena)?;
+        let expected_s = |window: Window| {
+            ground.expected_seconds(&Request { window, feature_min_m: selection.feature_min_m, cancel: None })
+        };
+        let own_s = expected_s(*window);
+        let tiles_s: f64 = tiles.iter().map(|tile| expected_s(tile_window(window.zoom, *tile))).sum();
+        if own_s > TILE_SECONDS || ALONE_GAIN * own_s > tiles_s {
+            return Ok(false);
+        }
+        let keys: Vec<TileKey> =
+            tiles.iter().map(|tile| self.key(&tile_window(window.zoom, *tile), selection)).collect();
+        Ok(library.has(&self.key(window, selection)) || library.are_new(&keys))
     }
 
     /// Samples `step_m` apart, the south-west one at `origin_m`: lattice points where they stand on them, bilinear between the points of the next
@@ -546,12 +586,17 @@ impl World {
             self.check_reach(zoom, first as f64 + count as f64)?;
         }
         let [rows, cols] = shape;
+        let window = Window { zoom, west: first[0], south: first[1], cols, rows, centred: false };
+        let alone = async || self.window(maker, window, selection).await.map(|samples| Samples::clone(&samples));
         if piece == Piece::Alone {
-            let window = Window { zoom, west: first[0], south: first[1], cols, rows, centred: false };
-            return self.window(maker, window, selection).await.map(|samples| Samples::clone(&samples));
+            return alone().await;
         }
         let places = Self::tiles_of(first, shape);
+        // The same request is refused or not, however it is made.
         self.check_work(zoom, places.len() as u64, selection, maker.seconds_max)?;
+        if piece == Piece::Either && self.stands_alone(&maker.library, &window, &places, selection)? {
+            return alone().await;
+        }
         let mut places = places.into_iter();
         let (mut tiles, mut made) = (JoinSet::new(), None::<Samples>);
         loop {

@@ -4,6 +4,7 @@ use super::Problem;
 use super::answer::Behind;
 use super::extract::host;
 use super::query::TOKEN;
+use super::room::Load;
 use super::service::{BODY_BYTES, Service};
 use axum::body::Body;
 use axum::extract::{MatchedPath, Query, Request, State};
@@ -14,7 +15,6 @@ use hyper::body::{Body as HttpBody, Bytes, Frame, SizeHint};
 use std::collections::HashMap;
 use std::net::{IpAddr, SocketAddr};
 use std::pin::Pin;
-use std::sync::atomic::Ordering;
 use std::sync::{Arc, MutexGuard, PoisonError};
 use std::task::{Context, Poll, ready};
 use std::time::{Duration, Instant};
@@ -89,28 +89,6 @@ fn seats(service: &Service) -> MutexGuard<'_, HashMap<IpAddr, usize>> {
     service.under_way.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Bytes on their way to a client; given back when dropped.
-struct Load {
-    service: Arc<Service>,
-    bytes: u64,
-}
-
-impl Load {
-    /// `None` where too many are on their way; one answer alone may have any length.
-    fn take(service: &Arc<Service>, bytes: u64) -> Option<Self> {
-        let more =
-            |sending: u64| (sending == 0 || sending + bytes <= service.limits.sending).then_some(sending + bytes);
-        service.sending.fetch_update(Ordering::Relaxed, Ordering::Relaxed, more).ok()?;
-        Some(Self { service: Arc::clone(service), bytes })
-    }
-}
-
-impl Drop for Load {
-    fn drop(&mut self) {
-        self.service.sending.fetch_sub(self.bytes, Ordering::Relaxed);
-    }
-}
-
 /// A body that keeps its place among requests, and its bytes among those on their way, until it is sent: a piece goes out when the one before has
 /// gone.
 struct Held {
@@ -172,7 +150,7 @@ fn send(service: &Arc<Service>, response: Response, seat: Option<Seat>) -> Respo
     // Small answers always go: clients that read nothing cannot keep others from them, and the number of connections bounds them.
     let behind = response.extensions().get::<Behind>().map_or_else(|| response.body().size_hint().lower(), |b| b.0);
     let bytes = Some(behind).filter(|bytes| *bytes > PIECE as u64).unwrap_or(0);
-    let Some(load) = Load::take(service, bytes) else {
+    let Some(load) = service.sending.add(bytes, service.limits.sending) else {
         return Problem::unavailable("too many bytes are on their way to clients; try again in 2 s").into_response();
     };
     let (rest, until) = (Bytes::new(), Instant::now() + SENDING);
@@ -273,7 +251,28 @@ pub async fn tag_encodings(request: Request, next: Next) -> Response {
 
 #[cfg(test)]
 mod tests {
+    use super::super::room::Sending;
     use super::*;
+    use std::task::Waker;
+
+    /// A client that takes too long gets no more of its answer, and what it held is free again.
+    #[test]
+    fn val_answers_end_for_who_takes_too_long() {
+        let sending = Sending::default();
+        let next = |late: Duration| {
+            let until = (Instant::now() + SENDING).checked_sub(late).unwrap();
+            let (body, rest) = (Body::from(vec![7; 2 * PIECE]), Bytes::new());
+            let load = sending.add(2 * PIECE as u64, u64::MAX).unwrap();
+            let mut held = Held { body, rest, until, _seat: None, _load: load };
+            match Pin::new(&mut held).poll_frame(&mut Context::from_waker(Waker::noop())) {
+                Poll::Ready(Some(frame)) => frame.map(|frame| frame.into_data().unwrap().len()),
+                other => panic!("{other:?}"),
+            }
+        };
+        assert_eq!(next(SENDING - Duration::from_secs(60)).unwrap(), PIECE);
+        assert!(next(SENDING + Duration::from_secs(1)).unwrap_err().to_string().contains("too slowly"));
+        assert_eq!(sending.bytes(), 0);
+    }
 
     /// The last pieces do not keep the whole in memory.
     #[test]

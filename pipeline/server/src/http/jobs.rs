@@ -277,3 +277,29 @@ pub async fn cancel(
         Err(Problem::conflict("the job has ended; only one that is running can be cancelled"))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// As many jobs as are remembered may run; one that has ended makes room.
+    #[test]
+    fn val_running_jobs_are_bounded() {
+        let jobs = Jobs::default();
+        let add = || {
+            let order = Order {
+                collection: "world".to_owned(),
+                bounds_m: [0.0, 0.0, 1.0, 1.0],
+                resolution_m: None,
+                phenomena: None,
+                feature_min_m: 0.0,
+            };
+            jobs.add(order, 1)
+        };
+        let all: Vec<Arc<Job>> = (0..JOBS_MAX).map(|_| add().unwrap()).collect();
+        assert!(add().is_err_and(|problem| problem.status() == StatusCode::SERVICE_UNAVAILABLE));
+        assert!(all[7].end(Progress::Done) && !all[7].end(Progress::Cancelled));
+        assert_eq!(add().unwrap().id, JOBS_MAX as u64 + 1);
+        assert!(jobs.get("8").is_err() && jobs.get("9").is_ok() && add().is_err());
+    }
+}

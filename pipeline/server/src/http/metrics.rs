@@ -12,7 +12,6 @@ use prometheus_client::metrics::gauge::Gauge;
 use prometheus_client::metrics::histogram::Histogram;
 use prometheus_client::registry::Registry;
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
 
 /// Bounds of the times of answers, s.
 const SECONDS: [f64; 11] = [0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.3, 1.0, 5.0, 30.0];
@@ -75,7 +74,7 @@ impl Metrics {
         answers.set(i64::try_from(service.answers.bytes()).unwrap_or(i64::MAX));
         registry.register("answers_bytes", "Bytes of answers in memory", answers);
         let sending: Gauge = Gauge::default();
-        sending.set(i64::try_from(service.sending.load(Ordering::Relaxed)).unwrap_or(i64::MAX));
+        sending.set(i64::try_from(service.sending.bytes()).unwrap_or(i64::MAX));
         registry.register("sending_bytes", "Bytes of answers on their way to clients", sending);
         let mut text = String::new();
         encode(&mut text, &registry)?;

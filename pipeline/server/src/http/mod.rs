@@ -11,6 +11,7 @@ pub mod page;
 pub mod patch;
 pub mod problem;
 pub mod query;
+pub mod room;
 pub mod service;
 pub mod tiles;
 pub mod values;

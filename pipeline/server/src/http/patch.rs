@@ -302,7 +302,7 @@ pub async fn patch(
     let window = Window::of(&query, &collection, most.max(1))?;
     let what = format!("patch {} {window:?} {treatment:?} {selection:?}", collection.digest());
     let make = async {
-        let room = service.room(window.shape[0] * window.shape[1]).await?;
+        let room = service.rooms.take(window.shape[0] * window.shape[1]).await;
         let samples = ground(&service, &collection, &window, &selection).await?;
         let crs = match &collection.ground {
             Ground::World(_) => Crs::default(),

@@ -3,6 +3,7 @@
 use super::answer::Answers;
 use super::jobs::Jobs;
 use super::metrics::Metrics;
+use super::room::{Rooms, Sending};
 use super::{Problem, Query};
 use crate::collections::raster::Pyramid;
 use crate::collections::world::{Maker, Piece, Selection};
@@ -11,23 +12,12 @@ use crate::library::{Library, Priority};
 use crate::samples::Samples;
 use std::collections::HashMap;
 use std::net::{IpAddr, SocketAddr};
-use std::sync::atomic::AtomicU64;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
-use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use tokio::sync::Semaphore;
 
 /// Most bytes of the body of a request.
 pub const BODY_BYTES: usize = 1 << 16;
-
-/// Most bytes that a sample of a patch takes while the patch is put together: four fields of it and, where it lies between lattice points, of the
-/// four around it, and three copies for turns and files.
-const SAMPLE_BYTES: usize = 128;
-/// Room for patches is counted in so many bytes. There are so many of them for small patches, and as many for large ones: the largest at a time.
-const ROOM_UNIT: usize = 1 << 20;
-/// Room for small patches, and as much for large ones, MiB.
-pub const ROOM_UNITS: usize = 1 << 9;
-/// A patch of more is large: 362 x 362 samples.
-const SMALL_UNITS: usize = 16;
 
 /// What a request may ask for, and how much may be under way.
 #[derive(Clone, Debug)]
@@ -88,9 +78,9 @@ pub struct Service {
     /// Requests under way by client.
     pub under_way: Mutex<HashMap<IpAddr, usize>>,
     /// Bytes of answers on their way to clients.
-    pub sending: AtomicU64,
-    /// Room for small and for large patches that are being put together, [`ROOM_UNITS`] each.
-    pub rooms: [Arc<Semaphore>; 2],
+    pub sending: Sending,
+    /// Room for patches that are being put together.
+    pub rooms: Rooms,
     /// Processors for work that is not that of the library.
     pub processors: Arc<Semaphore>,
 }
@@ -142,18 +132,6 @@ impl Service {
     pub async fn levels(&self, raster: &Arc<Raster>) -> Result<Arc<Pyramid>, Problem> {
         let reader = Arc::clone(raster);
         raster.levels(self.blocking(move || reader.read())).await
-    }
-
-    /// Room for the samples of a patch while it is put together; others wait for theirs in line, small ones not behind large ones. A patch that would
-    /// need more than there is waits for all of it.
-    ///
-    /// # Errors
-    /// None while the server runs.
-    pub async fn room(&self, samples: usize) -> Result<OwnedSemaphorePermit, Problem> {
-        let units = (samples * SAMPLE_BYTES).div_ceil(ROOM_UNIT).min(ROOM_UNITS);
-        let room = &self.rooms[usize::from(units > SMALL_UNITS)];
-        let room = Arc::clone(room).acquire_many_owned(units as u32).await;
-        room.map_err(|e| Problem::internal(e.to_string()))
     }
 
     /// Work that takes a processor for a while, or reads files: not on the threads of the runtime, and no more of it at once than there are

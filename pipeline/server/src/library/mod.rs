@@ -28,6 +28,8 @@ use tokio::sync::watch;
 const RECORD_MIN: usize = 64;
 /// Threads that read records.
 const READERS: usize = 4;
+/// Tiles that are known to have been asked for, beside those that are kept.
+const ASKED: usize = 1 << 16;
 /// Most records that wait for a reader.
 const READS: usize = 4096;
 
@@ -214,6 +216,8 @@ where
 pub struct Library {
     memory: Cache<[u8; 32], Arc<Samples>, Bytes>,
     disk: Option<Disk>,
+    /// Tiles that somebody asked about, see [`Library::are_new`].
+    asked: Cache<[u8; 32], ()>,
     flights: Mutex<HashMap<[u8; 32], Flight>>,
     flown: AtomicU64,
     workers: Pool,
@@ -233,6 +237,7 @@ impl Library {
         Ok(Arc::new(Self {
             memory: Cache::with_weighter(typical, settings.memory_bytes, Bytes),
             disk,
+            asked: Cache::new(ASKED),
             flights: Mutex::default(),
             flown: AtomicU64::new(0),
             workers: Pool::new("tiles", settings.workers, settings.queue),
@@ -265,6 +270,20 @@ impl Library {
             Ok(Some(made)) => made,
             _ => Err(Unavailable::Failed("its worker ended".to_owned())),
         }
+    }
+
+    /// Whether a tile is kept or on its way.
+    pub fn has(&self, key: &TileKey) -> bool {
+        self.memory.peek(&key.digest).is_some()
+            || self.flights().contains_key(&key.digest)
+            || self.disk.as_ref().is_some_and(|disk| disk.has(key))
+    }
+
+    /// Whether none of these tiles is kept, on its way, or was asked about before; now they were.
+    pub fn are_new(&self, keys: &[TileKey]) -> bool {
+        let known = keys.iter().filter(|key| self.asked.peek(&key.digest).is_some() || self.has(key)).count();
+        keys.iter().for_each(|key| self.asked.insert(key.digest, ()));
+        known == 0
     }
 
     /// Joins the flight of a key, or starts it.
