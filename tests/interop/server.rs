@@ -4,7 +4,8 @@ use super::{called, python};
 use sastrugi_tests::server::Server;
 use std::process::Command;
 
-/// GDAL reads the COG by ranges and map tiles by its TMS driver, numpy and Pillow the other formats: all the same ground.
+/// GDAL reads the COG by ranges and map tiles by its drivers TMS and OGCAPI, numpy and Pillow the other formats: all the same ground. Links of
+/// OGC API - Tiles lead to what they say, and morecantile places tiles where the server does.
 #[test]
 fn val_clients_read_the_server() {
     let Some(python) = python() else { return };

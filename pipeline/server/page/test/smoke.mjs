@@ -54,6 +54,8 @@ const slide = (label, value) => page.evaluate((name, to) => {
   for (const kind of ['input', 'change']) input.dispatchEvent(new Event(kind, { bubbles: true }));
 }, label, value);
 const tilesAsked = () => page.evaluate(() => performance.getEntriesByType('resource').map(({ name }) => name).filter((name) => name.includes('/map/tiles/')));
+const levelsAsked = async () => [...new Set((await tilesAsked()).map((name) => Number(/\/tiles\/[^/]+\/(\d+)\//.exec(name)[1])))];
+const nearest = (numbers, to) => numbers.reduce((best, one) => (Math.abs(one - to) < Math.abs(best - to) ? one : best));
 const shot = (name) => page.screenshot({ path: join(folder, `${name}.png`) });
 const settled = () => page.evaluate(() => new Promise((resolve) => {
   const { map } = window.sastrugi;
@@ -79,6 +81,15 @@ const colour = (x, y, half) => page.evaluate((cx, cy, size) => {
   for (let at = 0; at < data.length; at += 4) for (let k = 0; k < 3; k++) mean[k] += data[at + k] / (data.length / 4);
   return mean;
 }, x, y, half);
+
+/** Colours of one pixel of the base canvas in 97. */
+const thinned = () => page.evaluate(() => {
+  const canvas = window.sastrugi.map.getViewport().querySelector('canvas');
+  const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
+  return Array.from({ length: Math.floor(data.length / 388) }, (_, k) => [...data.subarray(388 * k, 388 * k + 3)]);
+});
+/** Mean difference of two lists of colours. */
+const difference = (ours, theirs) => ours.reduce((sum, colour, k) => sum + colour.reduce((all, value, c) => all + Math.abs(value - theirs[k][c]), 0), 0) / (3 * ours.length);
 
 /** Mean differences of neighbouring columns of pixels around a place: the largest in the middle, and the largest elsewhere. */
 const steps = (x, y) => page.evaluate((cx, cy) => {
@@ -114,19 +125,24 @@ const at = (resolution, more = '', place = middle) => `#c=${encodeURIComponent(c
 // A small window, since each scale needs its own tiles made.
 await page.setViewport({ width: width >> 1, height: height / 3 | 0 });
 await check('four scales', async () => {
-  const coarse = Math.log(resolutions[0]), fine = Math.log(finest / 8);
-  for (let k = 0; k < 4; k++) {
-    await visit(at(Math.exp(coarse + (fine - coarse) * (0.25 + 0.25 * k))));
-    const colours = await page.evaluate(() => {
-      const canvas = window.sastrugi.map.getViewport().querySelector('canvas');
-      const data = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data;
-      const seen = new Set();
-      for (let i = 0; i < data.length; i += 4 * 97) seen.add((data[i] << 16) | (data[i + 1] << 8) | data[i + 2]);
-      return seen.size;
-    });
+  const pictures = [], levels = [];
+  for (const [k, factor] of [1.4, 1.2, 0.8, 0.125].entries()) {
+    const resolution = resolutions[Math.round((resolutions.length - 1) * (k + 1) / 4)] * factor;
+    await visit(at(resolution));
+    const fitting = resolutions.indexOf(nearest(resolutions, resolution));
+    const asked = await levelsAsked();
+    // The next coarser level is loaded ahead, to fill gaps.
+    must(Math.max(...asked) === fitting && Math.min(...asked) >= fitting - 1, `at ${resolution} m a pixel levels ${asked.join(', ')} were asked for; ${fitting} fits`);
+    levels.push(fitting);
+    pictures.push(await thinned());
     await shot(`scale-${k + 1}`);
+    const colours = new Set(pictures[k].map(String)).size;
     must(colours > 8, `the map shows ${colours} colours at scale ${k + 1}`);
   }
+  must(resolutions.length < 5 || new Set(levels).size === 4, `the four scales show levels ${levels.join(', ')}`);
+  const least = Math.min(...pictures.flatMap((one, k) => pictures.slice(k + 1).map((other) => difference(one, other))));
+  must(least > 5, `two of the scales look the same, to ${least.toFixed(1)} of 255`);
+  return `levels ${levels.join(', ')}; pictures differ by ${least.toFixed(1)} of 255 and more`;
 });
 
 await check('levels agree across a tile seam', async () => {
@@ -314,7 +330,74 @@ async function driven() {
   }
   return [...found];
 }
-for (const [kind, { collection: ground, track }] of await driven()) await check(`a ${kind} is listed and played`, async () => {
+const rides = await driven();
+/** Colours of the chosen track on the map, and of tracks in the 3-D view. */
+const CHOSEN = [0xa8, 0x45, 0x2c], IN_SPACE = [0xd2, 0x55, 0x2f];
+/** A drawn track: its coordinates, and the share of places along it whose pixels have its colour. */
+const drawnTrack = (id, colour) => page.evaluate((name, wanted) => {
+  const { map } = window.sastrugi;
+  const lines = map.getLayers().getArray().at(-1);
+  const line = lines.getSource().getFeatures().find((feature) => feature.get('track') === name)?.getGeometry();
+  if (!line) return { coordinates: [], coloured: 0 };
+  const canvas = map.getViewport().querySelector(`.${lines.getClassName()} canvas`);
+  const isColoured = (place) => {
+    const [x, y] = map.getPixelFromCoordinate(place).map((value) => Math.floor(value * devicePixelRatio));
+    const { data } = canvas.getContext('2d').getImageData(x - 1, y - 1, 3, 3);
+    return [...Array(9).keys()].some((k) => wanted.every((value, c) => Math.abs(data[4 * k + c] - value) <= 12) && data[4 * k + 3] === 255);
+  };
+  const places = [...Array(50).keys()].map((k) => line.getCoordinateAt((k + 0.5) / 50));
+  return { coordinates: line.getCoordinates(), coloured: places.filter(isColoured).length / places.length };
+}, id, colour);
+
+/** A picture of the 3-D view of a collection without its controls, once it stands still. */
+async function relief(ground, tracks) {
+  await visit(`#c=${encodeURIComponent(ground.id)}`);
+  if (tracks) await until('no track is drawn', () => window.sastrugi.map.getLayers().getArray().at(-1).getSource().getFeatures().some((feature) => feature.get('track')));
+  await page.click('[data-panel=relief]');
+  await page.waitForSelector('#space canvas');
+  await page.$eval('.space-bar', (bar) => { bar.style.visibility = 'hidden'; });
+  let before, now;
+  const end = Date.now() + PATIENCE;
+  do {
+    must(Date.now() < end, 'the 3-D view does not stand still');
+    before = now;
+    await wait(500);
+    now = await page.screenshot({ encoding: 'base64' });
+  } while (now !== before);
+  return now;
+}
+/** The same, as if nothing had been driven on it. */
+async function reliefWithoutTracks(ground) {
+  const answer = (request) => (request.url().endsWith('/tracks') ? request.respond({ contentType: 'application/json', body: '{"tracks":[]}' }) : request.continue());
+  await page.setRequestInterception(true);
+  page.on('request', answer);
+  try {
+    return await relief(ground, false);
+  } finally {
+    page.off('request', answer);
+    await page.setRequestInterception(false);
+  }
+}
+/** Number of pixels that differ between two pictures, and of those that are nearer to a colour in the first. */
+const changed = (one, other, colour) => page.evaluate(async (pictures, wanted) => {
+  const read = async (text) => {
+    const image = await createImageBitmap(new Blob([Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0))]));
+    const context = new OffscreenCanvas(image.width, image.height).getContext('2d');
+    context.drawImage(image, 0, 0);
+    return context.getImageData(0, 0, image.width, image.height).data;
+  };
+  const [ours, theirs] = await Promise.all(pictures.map(read));
+  const away = (data, at) => wanted.reduce((sum, value, k) => sum + Math.abs(data[at + k] - value), 0);
+  let pixels = 0, nearer = 0;
+  for (let at = 0; at < ours.length; at += 4) {
+    if (ours[at] === theirs[at] && ours[at + 1] === theirs[at + 1] && ours[at + 2] === theirs[at + 2]) continue;
+    pixels++;
+    if (away(ours, at) < away(theirs, at)) nearer++;
+  }
+  return { pixels, nearer };
+}, [one, other], colour);
+
+for (const [kind, { collection: ground, track }] of rides) await check(`a ${kind} is listed and played`, async () => {
   await visit(`#c=${encodeURIComponent(ground.id)}`);
   await page.click('[data-panel=tracks]');
   await page.waitForSelector('#panel [data-track]');
@@ -353,20 +436,36 @@ for (const [kind, { collection: ground, track }] of await driven()) await check(
   }
   must(moves >= 5, `the marker moved ${moves} times only`);
   must(along >= 0.9 * moves, `the arrow points along the motion in ${along} of ${moves} moves only`);
-  await page.click('[data-panel=relief]');
-  await page.waitForSelector('#space canvas');
-  await wait(800);
-  await shot(`space-tracks-${kind}`);
   return `${ground.id}, ${track.id}: the arrow points along the motion in ${along} of ${moves} moves`;
+});
+for (const [kind, { collection: ground, track }] of rides) await check(`the track of a ${kind} is on the map`, async () => {
+  await visit(`#c=${encodeURIComponent(ground.id)}&track=${encodeURIComponent(track.id)}`);
+  await page.click('[data-panel=tracks]');
+  await page.waitForSelector('#panel .chart');
+  await settled();
+  const { x_m: x, y_m: y } = await (await fetch(`${url}/v1/collections/${encodeURIComponent(ground.id)}/tracks/${encodeURIComponent(track.id)}`)).json();
+  const { coordinates, coloured } = await drawnTrack(track.id, CHOSEN);
+  await shot(`track-${kind}`);
+  must(coordinates.length === x.length && coordinates.every((place, k) => place[0] === x[k] && place[1] === y[k]), `the line of ${track.id} is not that of the server`);
+  must(coloured >= 0.9, `${(100 * coloured).toFixed()} % of the track have its colour`);
+  return `${x.length} places, ${(100 * coloured).toFixed()} % of the line in its colour`;
+});
+for (const [kind, { collection: ground }] of rides) await check(`the track of a ${kind} is in the 3-D view`, async () => {
+  const shown = await relief(ground, true);
+  await shot(`space-tracks-${kind}`);
+  const { pixels, nearer } = await changed(shown, await reliefWithoutTracks(ground), IN_SPACE);
+  must(pixels > 100, `${pixels} pixels show tracks`);
+  must(nearer > 0.9 * pixels, `${nearer} of ${pixels} pixels have the colour of tracks`);
+  return `${pixels} pixels`;
 });
 
 await check('a dense screen gets the next finer level', async () => {
   await page.setViewport({ width: 480, height: 320, deviceScaleFactor: 2 });
   await visit(at(finest * 2));
-  const levels = (await tilesAsked()).map((name) => Number(/\/tiles\/[^/]+\/(\d+)\//.exec(name)[1]));
+  const levels = await levelsAsked();
   await shot('dense');
   await page.setViewport({ width, height });
-  must(Math.max(...levels) === resolutions.length - 1, `levels ${[...new Set(levels)].join(', ')} of ${resolutions.length} were asked for`);
+  must(Math.max(...levels) === resolutions.length - 1, `levels ${levels.join(', ')} of ${resolutions.length} were asked for`);
 });
 
 await check('every control is reached by keys', async () => {

@@ -83,6 +83,7 @@ pub struct World {
     /// Hash of all that samples depend on: parameters, streams, sources of the generator.
     pub digest: String,
     range_m: [f64; 2],
+    middle_m: f64,
     /// Where lattice point 0 lies, m.
     offset_m: [f64; 2],
     /// Most doublings of the basic spacing.
@@ -116,8 +117,9 @@ impl World {
         let digest = super::digest(&what);
         let (whole, range_m) = (served.ground(|_| true)?, [0.0; 2]);
         let parts = Cache::new(GROUNDS);
-        let mut world = Self { served, grid, digest, range_m, offset_m, zoom_max, whole, parts };
+        let mut world = Self { served, grid, digest, range_m, middle_m: 0.0, offset_m, zoom_max, whole, parts };
         world.range_m = world.look();
+        world.middle_m = world.middle();
         Ok(world)
     }
 
@@ -130,6 +132,18 @@ impl World {
             if heights.is_empty() { 0.0 } else { *heights.select_nth_unstable_by(place, f64::total_cmp).1 }
         };
         [part(0.05), part(0.95)]
+    }
+
+    /// Height in the middle of the window of its file; that in the middle of its range where there is no ground.
+    fn middle(&self) -> f64 {
+        let [west, south, east, north] = self.home_m();
+        let zoom = self.zoom_below(self.cell_m());
+        let at = self.to_lattice([0.5 * (west + east), 0.5 * (south + north)]);
+        let [west, south] = at.map(|m| (m / self.step_m(zoom)).round() as i64);
+        let window = Window { zoom, west, south, cols: 1, rows: 1, centred: false };
+        let request = Request { window, feature_min_m: 0.0, cancel: None };
+        let height = self.whole.patch_for(&request).map_or(f64::NAN, |patch| patch.heights[0]);
+        if height.is_finite() { height } else { 0.5 * (self.range_m[0] + self.range_m[1]) }
     }
 
     /// Some heights of a world without end.
@@ -185,6 +199,11 @@ impl World {
     /// Heights that nine tenths of its map lie between, m.
     pub fn height_range_m(&self) -> [f64; 2] {
         self.range_m
+    }
+
+    /// Height in the middle of the window of its file, m.
+    pub fn middle_height_m(&self) -> f64 {
+        self.middle_m
     }
 
     fn kinds(&self) -> impl Iterator<Item = &'static str> {

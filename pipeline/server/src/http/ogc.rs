@@ -12,9 +12,12 @@ use std::sync::Arc;
 /// Side of a pixel that scale denominators refer to, m.
 const STANDARD_PIXEL_M: f64 = 0.00028;
 const JSON: &str = "application/json";
+/// Media type of the description of the API.
+pub const OPENAPI: &str = "application/vnd.oai.openapi+json;version=3.1";
 /// Conformance classes.
-const CONFORMANCE: [&str; 6] = [
+const CONFORMANCE: [&str; 7] = [
     "http://www.opengis.net/spec/ogcapi-common-1/1.0/conf/core",
+    "http://www.opengis.net/spec/ogcapi-common-1/1.0/conf/landing-page",
     "http://www.opengis.net/spec/ogcapi-common-1/1.0/conf/json",
     "http://www.opengis.net/spec/ogcapi-tiles-1/1.0/conf/core",
     "http://www.opengis.net/spec/ogcapi-tiles-1/1.0/conf/tileset",
@@ -23,6 +26,8 @@ const CONFORMANCE: [&str; 6] = [
 ];
 /// Relation of a link to the tile sets of a map.
 const MAP_TILESETS: &str = "http://www.opengis.net/def/rel/ogc/1.0/tilesets-map";
+/// Relation of a link to the conformance classes; clients of the first drafts look for the plain word.
+const CONFORMANCE_RELATION: &str = "http://www.opengis.net/def/rel/ogc/1.0/conformance";
 const SCHEME: &str = "http://www.opengis.net/def/rel/ogc/1.0/tiling-scheme";
 const SCHEMES: &str = "http://www.opengis.net/def/rel/ogc/1.0/tiling-schemes";
 
@@ -39,7 +44,8 @@ pub async fn landing(State(service): State<Arc<Service>>, _: Plain, Base(base): 
         "collections": service.collections.len(),
         "links": [
             link(v1.clone(), "self", JSON, "this page"),
-            link(format!("{v1}/openapi.json"), "service-desc", "application/vnd.oai.openapi+json;version=3.1", "the API"),
+            link(format!("{v1}/openapi.json"), "service-desc", OPENAPI, "the API"),
+            link(format!("{v1}/conformance"), CONFORMANCE_RELATION, JSON, "conformance classes"),
             link(format!("{v1}/conformance"), "conformance", JSON, "conformance classes"),
             link(format!("{v1}/collections"), "data", JSON, "worlds and rasters"),
             link(format!("{v1}/tileMatrixSets"), SCHEMES, JSON, "tile matrix sets"),
@@ -88,21 +94,31 @@ fn described(collection: &Collection, base: &str) -> Value {
     if let Value::Object(all) = &mut all {
         all.insert("links".to_owned(), json!(links));
         let [west, south, east, north] = collection.grid().bounds_m();
-        all.insert("extent".to_owned(), json!({ "spatial": { "bbox": [[west, south, east, north]], "crs": crs(id) } }));
+        let plane = format!("urn:sastrugi:plane:{id}");
+        all.insert("extent".to_owned(), json!({ "spatial": { "bbox": [[west, south, east, north]], "crs": plane } }));
     }
     all
 }
 
-/// Name of the plane of a collection: its coordinates are metres from its own origin.
-fn crs(id: &str) -> String {
-    format!("urn:sastrugi:plane:{id}")
+/// The plane of a collection, whose coordinates are metres from its own origin, as PROJJSON, which tile matrix sets take where no registry has a
+/// name for it.
+fn crs(id: &str) -> Value {
+    let axis = |name: &str, letter: &str, direction: &str| json!({ "name": name, "abbreviation": letter, "direction": direction, "unit": "metre" });
+    json!({ "wkt": {
+        "$schema": "https://proj.org/schemas/v0.7/projjson.schema.json",
+        "type": "EngineeringCRS", "name": id, "datum": { "name": id },
+        "coordinate_system": {
+            "subtype": "Cartesian", "axis": [axis("Easting", "E", "east"), axis("Northing", "N", "north")],
+        },
+    } })
 }
 
 /// `GET /v1/tileMatrixSets`
 pub async fn matrix_sets(State(service): State<Arc<Service>>, _: Plain, Base(base): Base) -> Json<Value> {
     let set = |id: &String| {
         let address = format!("{base}/v1/tileMatrixSets/{id}");
-        json!({ "id": id, "title": id, "crs": crs(id), "links": [link(address, SCHEME, JSON, id)] })
+        let links = [link(address.clone(), "self", JSON, id), link(address, SCHEME, JSON, id)];
+        json!({ "id": id, "title": id, "crs": crs(id), "links": links })
     };
     Json(json!({ "tileMatrixSets": service.collections.keys().map(set).collect::<Vec<_>>() }))
 }

@@ -1,15 +1,18 @@
 //! The description of the API: OpenAPI 3.1.
 
+use super::ogc::OPENAPI;
 use super::patch::{FIELDS, FORMATS};
 use super::{Plain, Service};
 use axum::Json;
 use axum::extract::State;
+use axum::http::header;
+use axum::response::{IntoResponse, Response};
 use serde_json::{Map, Value, json};
 use std::sync::Arc;
 
 /// `GET /v1/openapi.json`
-pub async fn description(State(service): State<Arc<Service>>, _: Plain) -> Json<Value> {
-    Json(document(&service))
+pub async fn description(State(service): State<Arc<Service>>, _: Plain) -> Response {
+    ([(header::CONTENT_TYPE, OPENAPI)], Json(document(&service))).into_response()
 }
 
 /// A parameter of a query.
@@ -128,7 +131,7 @@ fn operations() -> Vec<Operation> {
     vec![
         operation("/v1", "Landing page", vec![], JSON),
         operation("/v1/conformance", "Conformance classes", vec![], JSON),
-        operation("/v1/openapi.json", "This description", vec![], JSON),
+        operation("/v1/openapi.json", "This description", vec![], &[OPENAPI]),
         operation("/v1/library", "What the tile library has done", vec![], JSON),
         operation("/v1/collections", "Worlds and rasters", vec![], JSON),
         operation("/v1/collections/{id}", "One of them", vec![], JSON),

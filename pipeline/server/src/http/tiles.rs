@@ -102,26 +102,30 @@ async fn send(
 }
 
 fn style(collection: &Collection, query: &Query, level: u32) -> Result<Style, Problem> {
-    let range_m = range_m(collection);
+    let (range_m, middle_m) = heights(collection);
     Ok(Style {
         sun: sun(query)?,
         exaggeration: query.number("exaggeration", [0.1, 100.0])?.unwrap_or(1.0),
         range_m,
-        offset_m: offset_m(range_m),
+        offset_m: offset_m(middle_m),
         cell_m: collection.grid().resolution_m(level),
     })
 }
 
-fn range_m(collection: &Collection) -> [f64; 2] {
+/// Lowest and highest height of the tints, and the height in the middle of what is looked at first, m.
+fn heights(collection: &Collection) -> ([f64; 2], f64) {
     match &collection.ground {
-        Ground::World(world) => world.height_range_m(),
-        Ground::Raster(raster) => raster.files.height_range_m,
+        Ground::World(world) => (world.height_range_m(), world.middle_height_m()),
+        Ground::Raster(raster) => {
+            let [low, high] = raster.files.height_range_m;
+            ([low, high], 0.5 * (low + high))
+        }
     }
 }
 
-/// Height of step 0 of [`Layer::Elevation`]: whole metres, the home of the collection in the middle.
-fn offset_m([low, high]: [f64; 2]) -> f64 {
-    (0.5 * (low + high) - 0.5 * STEPS * STEP_M).round()
+/// Height of step 0 of [`Layer::Elevation`] for a height in the middle of its range: whole metres.
+fn offset_m(middle_m: f64) -> f64 {
+    (middle_m - 0.5 * STEPS * STEP_M).round()
 }
 
 /// `GET /v1/collections/{id}/xyz/{layer}/tilejson.json`
@@ -144,12 +148,13 @@ pub async fn tilejson(
                         and latitude are not those of the ground; `metres_per_pixel` are.",
         "metres_per_pixel": (0..collection.grid().levels).map(|l| collection.grid().resolution_m(l)).collect::<Vec<_>>(),
     });
+    let (_, middle_m) = heights(&collection);
     let encoding = match layer {
         Layer::Terrarium => Some(json!({ "encoding": "terrarium" })),
         Layer::TerrainRgb => Some(json!({ "encoding": "mapbox" })),
         Layer::Elevation => Some(json!({
             "encoding": "custom", "redFactor": 65536.0 * STEP_M, "greenFactor": 256.0 * STEP_M, "blueFactor": STEP_M,
-            "baseShift": -offset_m(range_m(&collection)), "offset_m": offset_m(range_m(&collection)), "step_m": STEP_M,
+            "baseShift": -offset_m(middle_m), "offset_m": offset_m(middle_m), "step_m": STEP_M,
         })),
         _ => None,
     };
