@@ -83,7 +83,7 @@ fn val_errors_of_the_machine_are_no_failed_items() {
     assert_eq!(run(path, &[]).code, 0);
     let before = sums(&path.join("release"));
     fs::remove_dir_all(path.join("release.work")).unwrap();
-    let limited = format!("trap '' XFSZ; ulimit -f 8; exec {} run study.toml -o release --quiet", program().display());
+    let limited = format!("ulimit -f 8; exec {} run study.toml -o release --quiet", program().display());
     let call = called(Command::new("bash").args(["-c", &limited]).current_dir(path));
     assert_eq!(call.code, 1, "{}", call.stderr);
     let words = ["File too large", "release.work", "no release was written"];
@@ -91,6 +91,69 @@ fn val_errors_of_the_machine_are_no_failed_items() {
     assert_eq!(sums(&path.join("release")), before);
     assert_eq!(run(path, &[]).code, 0);
     assert_eq!(sums(&path.join("release")), before);
+}
+
+/// What never ends, or never begins, is not read: at the command line, and where a study names it.
+#[cfg(unix)]
+#[test]
+fn val_pipes_and_devices_are_no_input() {
+    let folder = area();
+    let path = folder.path();
+    study(path);
+    assert!(Command::new("mkfifo").arg(path.join("pipe")).status().unwrap().success());
+    std::os::unix::fs::symlink("/dev/zero", path.join("zero.tif")).unwrap();
+    let calls = [
+        vec!["info", "pipe"],
+        vec!["info", "zero.tif"],
+        vec!["fit", "pipe", "-o", "fit.json"],
+        vec!["roughness", "zero.tif"],
+        vec!["plan", "pipe"],
+        vec!["run", "pipe", "-o", "release"],
+        vec!["analyze", "pipe"],
+        vec!["convert", "zero.tif", "out.asc"],
+    ];
+    for arguments in calls {
+        let call = sastrugi_in(path, &arguments);
+        let word = if arguments[1] == "pipe" { "is a pipe" } else { "is a device" };
+        assert!(call.code == 65 && call.stderr.contains(word), "{arguments:?}: {} {}", call.code, call.stderr);
+    }
+    for name in ["pipe", "zero.tif"] {
+        write(path, "study.toml", &STUDY.replace("d.asc", name));
+        let call = run(path, &[]);
+        assert!(call.code == 65 && call.stderr.contains(name), "{name}: {} {}", call.code, call.stderr);
+    }
+}
+
+/// Where memory is out, the call ends with the code of what may work later, and nothing is left that looks whole.
+#[cfg(unix)]
+#[test]
+fn val_a_lack_of_memory_is_no_crash() {
+    let folder = area();
+    let path = folder.path();
+    write(path, "world.toml", "kind = \"multifractal\"\nseed = 1\nsize_px = [6000, 6000]\n");
+    let limited = format!("ulimit -v 600000; exec {} terrain world.toml -o out.tif --threads 1", program().display());
+    let call = called(Command::new("bash").args(["-c", &limited]).current_dir(path));
+    assert!(call.code == 75 && call.stderr.contains("memory"), "{} {}", call.code, call.stderr);
+    assert!(!path.join("out.tif").exists());
+}
+
+/// A limit that is given holds: nothing is begun that needs more. Without one the same study runs, and `plan` says what it needs.
+#[test]
+fn val_a_limit_of_memory_is_kept() {
+    let folder = area();
+    let path = folder.path();
+    study(path);
+    let plan = sastrugi_in(path, &["plan", "study.toml", "--json"]);
+    let plan: serde_json::Value = serde_json::from_str(&plan.stdout).unwrap();
+    let largest = plan["stale"].as_array().unwrap().iter().map(|s| s["memory_bytes"].as_u64().unwrap()).max().unwrap();
+    let gib = largest as f64 / f64::from(1u32 << 30);
+    let call = run(path, &["--memory", &format!("{:.4}", 0.9 * gib)]);
+    assert!(call.code == 2 && call.stderr.contains("by itself"), "{} {}", call.code, call.stderr);
+    assert!(!path.join("release").exists());
+    assert_eq!(run(path, &["--memory", &format!("{:.4}", 1.1 * gib)]).code, 0);
+    // What is there needs no memory.
+    assert_eq!(run(path, &["--memory", "0.001"]).code, 0);
+    assert_eq!(run(path, &["--memory", "0"]).code, 2);
 }
 
 #[test]

@@ -150,7 +150,7 @@ impl Release {
     }
 
     fn text(&self, path: &str) -> Result<Option<String>, ReportError> {
-        self.read(path, |file| fs::read_to_string(file))
+        self.read(path, sastrugi_store::file::read_text)
     }
 
     fn json<T: serde::de::DeserializeOwned>(&self, path: &str) -> Result<Option<T>, ReportError> {

@@ -253,9 +253,9 @@ pub struct Run {
     /// Replace an existing release of this study even if it has fewer failed items than the new one.
     #[arg(long)]
     pub replace: bool,
-    /// Working memory of the items at once, GiB.
-    #[arg(long, value_name = "GIB", default_value_t = 4.0, allow_negative_numbers = true)]
-    pub memory: f64,
+    /// Working memory of the items at once, GiB; an item that needs more is refused. When absent, 4, and larger items run alone.
+    #[arg(long, value_name = "GIB", allow_negative_numbers = true)]
+    pub memory: Option<f64>,
 }
 
 /// `plan`.
@@ -770,9 +770,9 @@ pub struct Rover {
     /// Replace an existing release of these rovers even if it has fewer failed items than the new one.
     #[arg(long)]
     pub replace: bool,
-    /// Working memory of the items at once, GiB.
-    #[arg(long, value_name = "GIB", default_value_t = 4.0, allow_negative_numbers = true)]
-    pub memory: f64,
+    /// Working memory of the items at once, GiB; an item that needs more is refused. When absent, 4, and larger items run alone.
+    #[arg(long, value_name = "GIB", allow_negative_numbers = true)]
+    pub memory: Option<f64>,
 }
 
 /// `report`.

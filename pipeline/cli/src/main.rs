@@ -4,19 +4,19 @@ mod args;
 mod failure;
 mod output;
 mod progress;
+mod signals;
 mod verbs;
 
 use clap::Parser;
 use failure::{Code, Failure};
 use std::process::ExitCode;
-use verbs::serve::Interrupt;
 
 fn main() -> ExitCode {
     let arguments = match args::Arguments::try_parse() {
         Ok(arguments) => arguments,
         Err(error) => return refuse_arguments(&error),
     };
-    if let Err(error) = ctrlc::set_handler(interrupted) {
+    if let Err(error) = signals::listen() {
         output::warn(&format!("sastrugi: note: Ctrl-C will not be announced: {error}"));
     }
     if let Err(failure) = verbs::start_threads(arguments.common.threads) {
@@ -33,18 +33,6 @@ fn refuse_arguments(error: &clap::Error) -> ExitCode {
     // Nothing can be done about a terminal that is gone.
     let _ = error.print();
     if error.use_stderr() { Code::Usage.into() } else { Code::Done.into() }
-}
-
-/// Every file appears whole or not at all, so the process may end here and now.
-fn interrupted() {
-    match verbs::serve::interrupted() {
-        Some(Interrupt::First) => return,
-        Some(Interrupt::Again) => output::warn("\nsastrugi: stopped at once; answers under way break off"),
-        None => output::warn(
-            "\nsastrugi: interrupted; nothing half-written bears its name, and a run goes on from what it finished",
-        ),
-    }
-    std::process::exit(i32::from(Code::Retry as u8));
 }
 
 /// What a verb comes to.

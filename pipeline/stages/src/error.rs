@@ -52,9 +52,12 @@ impl Error {
         }
     }
 
-    /// The same about a file.
+    /// The same about a file; one that is no regular file is unusable input.
     pub fn at(path: &Path, error: std::io::Error) -> Self {
         let words = format!("{}: {error}", path.display());
+        if error.kind() == std::io::ErrorKind::InvalidInput {
+            return Self::Input(words);
+        }
         match Self::io(error) {
             Self::Retry(_) => Self::Retry(words),
             _ => Self::Failed(words),

@@ -215,8 +215,11 @@ impl JobError {
         Self { message: error.to_string(), cause }
     }
 
-    /// The same about a file.
+    /// The same about a file; one that is no regular file is unusable input.
     pub fn at(path: &Path, error: std::io::Error) -> Self {
+        if error.kind() == std::io::ErrorKind::InvalidInput {
+            return Self::input(format!("{}: {error}", path.display()));
+        }
         Self::io(error).reworded(|words| format!("{}: {words}", path.display()))
     }
 

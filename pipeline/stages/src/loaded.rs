@@ -7,7 +7,6 @@ use crate::runner::graph::Graph;
 use crate::splits::{self, Splits};
 use crate::study::Study;
 use std::collections::BTreeMap;
-use std::fs;
 use std::ops::Range;
 use std::path::Path;
 
@@ -41,7 +40,8 @@ pub fn load(path: &Path) -> Result<Loaded, Error> {
 /// # Errors
 /// A missing file, or one that is not text.
 pub fn read(path: &Path) -> Result<String, Error> {
-    let text = fs::read(path).map_err(|e| Error::Input(format!("{}: {}", path.display(), io_reason(&e))))?;
+    let text =
+        sastrugi_store::file::read(path).map_err(|e| Error::Input(format!("{}: {}", path.display(), io_reason(&e))))?;
     String::from_utf8(text).map_err(|_| Error::Usage(format!("{}: the study is not UTF-8 text", path.display())))
 }
 

@@ -74,7 +74,7 @@ fn check_output(folder: &Path, output: &Path) -> Result<(), Error> {
 fn date_of(folder: &Path) -> Result<String, Error> {
     let path = folder.join("study.toml");
     let refuse = |why: &dyn std::fmt::Display| Error::Input(format!("{}: {why}", path.display()));
-    let text = std::fs::read_to_string(&path).map_err(|e| refuse(&e))?;
+    let text = sastrugi_store::file::read_text(&path).map_err(|e| refuse(&e))?;
     let study = Study::parse(&text, folder, &registry::section_names()).map_err(|e| refuse(&e))?;
     Ok(study.head.date)
 }

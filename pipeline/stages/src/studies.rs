@@ -65,6 +65,7 @@ pub fn run(loaded: &Loaded, request: &RunRequest<'_>, progress: &dyn Progress) -
     let graph = &loaded.graph;
     let chosen = (0..graph.len()).filter(|&p| request.part.is_none_or(|part| part.owns(graph.key(p))));
     let needed = graph.closure(chosen);
+    check_memory(loaded, &cache, &needed, request.limits)?;
     let execution = execute(graph, &cache, &needed, request.limits, progress)?;
     write_timings(&cache, &execution)?;
     let made = execution.done.iter().any(|&p| is_worth_a_release(&graph.node(p).item.stage, request.purpose));
@@ -90,6 +91,25 @@ pub fn run(loaded: &Loaded, request: &RunRequest<'_>, progress: &dyn Progress) -
     cache.drop_orphans(graph)?;
     let computed = execution.seconds.len() - execution.failures.iter().filter(|f| f.skipped_for.is_none()).count();
     Ok(RunSummary { output: request.output.to_owned(), items: needed.len(), computed, failures: execution.failures })
+}
+
+/// Refuses a run with an item that needs more memory by itself than there may be, before anything is computed.
+fn check_memory(loaded: &Loaded, cache: &Cache, needed: &[usize], limits: Limits) -> Result<(), Error> {
+    let graph = &loaded.graph;
+    let missing =
+        needed.iter().map(|&p| graph.node(p)).zip(needed).filter(|(n, p)| !cache.holds(&n.item, graph.key(**p)));
+    let largest = missing.map(|(node, _)| (node.job.memory_bytes(), &node.item)).max_by_key(|(bytes, _)| *bytes);
+    match largest {
+        Some((bytes, item)) if bytes > limits.memory_bytes && !limits.beyond => {
+            let gib = |bytes: u64| bytes as f64 / f64::from(1u32 << 30);
+            Err(Error::Usage(format!(
+                "`--memory {}`: {item} needs about {:.2} GiB by itself; give at least that much, or make the item smaller",
+                gib(limits.memory_bytes),
+                gib(bytes)
+            )))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Files are only copied: with nothing else there is no release to make.

@@ -157,7 +157,7 @@ fn recompute_all(
 /// The manifest in a folder with all that its text holds, known to this program or not.
 fn manifest_in(folder: &Path) -> Result<Value, Error> {
     let path = folder.join(MANIFEST);
-    let text = fs::read(&path).map_err(|e| Error::at(&path, e))?;
+    let text = sastrugi_store::file::read(&path).map_err(|e| Error::at(&path, e))?;
     serde_json::from_slice(&text).map_err(|e| Error::Input(format!("{}: {e}", path.display())))
 }
 

@@ -12,7 +12,6 @@
 
 use crate::dem::{DemError, Refusal};
 use crate::transect::fields;
-use std::fs;
 use std::path::Path;
 
 #[cfg(test)]
@@ -26,7 +25,7 @@ const NAMES: [&str; 4] = ["x", "y", "z", "sigma"];
 /// # Errors
 /// A file that is missing, or holds no such text (the message names line and column).
 pub fn read(path: &Path) -> Result<Vec<[f64; 4]>, DemError> {
-    let bytes = fs::read(path).map_err(|e| DemError::reading(path, e))?;
+    let bytes = crate::file::read(path).map_err(|e| DemError::reading(path, e))?;
     parse(&bytes).map_err(|refusal| refusal.about(path))
 }
 

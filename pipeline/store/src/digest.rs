@@ -5,7 +5,6 @@
 
 use sastrugi_numeric::Grid;
 use sha2::{Digest, Sha256};
-use std::fs::File;
 use std::io::{self, Read, Write};
 use std::path::Path;
 
@@ -145,7 +144,7 @@ pub fn of_text(text: &str) -> String {
 /// # Errors
 /// The file cannot be read.
 pub fn of_file(path: &Path) -> io::Result<(u64, String)> {
-    copy(&mut File::open(path)?, &mut io::sink())
+    copy(&mut crate::file::open(path)?, &mut io::sink())
 }
 
 /// Copies a stream and returns its length and SHA-256.

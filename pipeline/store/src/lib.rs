@@ -1,4 +1,4 @@
-//! Files: DEM formats, point clouds, masks, transects, altimetry, GeoJSON, pictures, atomic writes, Parquet tables, MCAP recordings, and the release folder
+//! Files: DEM formats, point clouds, masks, transects, altimetry, GeoJSON, pictures, opening and atomic writes, Parquet tables, MCAP recordings, and the release folder
 //! with its checksums.
 //!
 //! The only room that names `arrow`, `parquet`, `mcap`, `foxglove`, `prost`, `geotiff-*`, `tiff`, `png`, `las` and `tar`. Nothing
@@ -14,6 +14,7 @@ pub mod atomic;
 pub mod csv;
 pub mod dem;
 pub mod digest;
+pub mod file;
 pub mod geojson;
 pub mod mask;
 pub mod mcap;

@@ -14,7 +14,6 @@ mod tests;
 use crate::dem::{self, DemError};
 use crate::geojson;
 use sastrugi_numeric::{Geometry, Grid};
-use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Why a mask was not read.
@@ -64,7 +63,7 @@ pub fn read(path: &Path, geometry: &Geometry) -> Result<Vec<bool>, MaskError> {
 /// As [`read`].
 pub fn read_with(path: &Path, geometry: &Geometry, options: &MaskOptions) -> Result<Vec<bool>, MaskError> {
     let unusable = |reason: String| MaskError::Unusable { path: path.to_owned(), reason };
-    let bytes = fs::read(path).map_err(|e| DemError::reading(path, e))?;
+    let bytes = crate::file::read(path).map_err(|e| DemError::reading(path, e))?;
     let mut keep = if looks_like_json(&bytes) {
         geojson::polygons::parse(&bytes).map(|found| polygons::inside(&found, geometry)).map_err(unusable)?
     } else {
@@ -97,7 +96,7 @@ pub enum Obstacles {
 /// A file that is missing or neither; a raster without a place and with another shape.
 pub fn read_obstacles(path: &Path, geometry: &Geometry) -> Result<Obstacles, MaskError> {
     let unusable = |reason: String| MaskError::Unusable { path: path.to_owned(), reason };
-    let bytes = fs::read(path).map_err(|e| DemError::reading(path, e))?;
+    let bytes = crate::file::read(path).map_err(|e| DemError::reading(path, e))?;
     if looks_like_json(&bytes) {
         return geojson::polygons::parse(&bytes).map(Obstacles::Polygons).map_err(unusable);
     }

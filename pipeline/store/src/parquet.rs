@@ -505,7 +505,7 @@ impl<T: ArrowPrimitiveType> Lists<T> {
 }
 
 fn open(path: &Path, table: &Table) -> Result<ParquetRecordBatchReaderBuilder<File>, TableError> {
-    let file = File::open(path).map_err(|e| TableError::io(path, e))?;
+    let file = crate::file::open(path).map_err(|e| TableError::io(path, e))?;
     let builder = decoding(path, || ParquetRecordBatchReaderBuilder::try_new(file))?;
     let found = builder.schema();
     for (column, expected) in schema(table).fields().iter().enumerate() {

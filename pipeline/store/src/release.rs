@@ -16,7 +16,6 @@ use crate::parquet::{self, TableError};
 use sastrugi_schemas::Record;
 use sastrugi_schemas::manifest::{Artifact, FORMAT, Manifest, PROGRAM};
 use std::collections::BTreeSet;
-use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -117,7 +116,7 @@ impl Release {
     /// [`ReleaseError::NotARelease`] when the folder has no manifest of ours.
     pub fn open(folder: &Path) -> Result<Self, ReleaseError> {
         let path = folder.join(MANIFEST);
-        let text = fs::read(&path).map_err(|e| match e.kind() {
+        let text = crate::file::read(&path).map_err(|e| match e.kind() {
             io::ErrorKind::NotFound | io::ErrorKind::NotADirectory => {
                 ReleaseError::not_a_release(folder, format!("there is no {MANIFEST} in it"))
             }

@@ -12,7 +12,6 @@
 //! Memory: the text and 8 bytes a height.
 
 use crate::dem::{DemError, NO_DATA, Refusal};
-use std::fs;
 use std::path::Path;
 
 #[cfg(test)]
@@ -50,7 +49,7 @@ pub struct Transects {
 /// True for a file that may hold transects: by its name's ending, unless it is an ESRI ASCII grid.
 pub fn looks_like(path: &Path) -> bool {
     let ending = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
-    ENDINGS.contains(&ending.as_str()) && !fs::read(path).is_ok_and(|bytes| crate::dem::is_grid_text(&bytes))
+    ENDINGS.contains(&ending.as_str()) && !crate::file::read(path).is_ok_and(|bytes| crate::dem::is_grid_text(&bytes))
 }
 
 /// Reads transects.
@@ -59,7 +58,7 @@ pub fn looks_like(path: &Path) -> bool {
 /// A file that is missing, or holds no such text (the message names line and column); [`DemError::Unfit`] when the spacing
 /// is neither in the file nor given, or given otherwise than the file says.
 pub fn read(path: &Path, options: &TransectOptions) -> Result<Transects, DemError> {
-    let bytes = fs::read(path).map_err(|e| DemError::reading(path, e))?;
+    let bytes = crate::file::read(path).map_err(|e| DemError::reading(path, e))?;
     let columns = Columns::parse(&bytes).map_err(|refusal| refusal.about(path))?;
     columns.transects(options).map_err(|trouble| match trouble {
         Trouble::File(reason) => Refusal::new(reason).about(path),

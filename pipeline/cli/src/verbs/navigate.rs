@@ -1,6 +1,6 @@
 //! `navigate`.
 
-use super::study::{MEMORY_GIB, finish_run, limits};
+use super::study::{finish_run, limits};
 use crate::Verdict;
 use crate::args::{Common, Navigate, Place};
 use crate::failure::{Code, Failure};
@@ -31,7 +31,7 @@ pub fn navigate(args: &Navigate, common: &Common) -> Verdict {
     if is_route_file(output) {
         return route_alone(&request, output, common);
     }
-    let place = traverse::Place { output, work: work.as_deref(), replace: args.replace, limits: limits(MEMORY_GIB)? };
+    let place = traverse::Place { output, work: work.as_deref(), replace: args.replace, limits: limits(None)? };
     finish_run(common, |teller| Ok(release(&request, &args.date, &place, teller)?))
 }
 

@@ -18,15 +18,19 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// Working memory of the items at once where no option sets it, GiB.
-pub(super) const MEMORY_GIB: f64 = 4.0;
+const MEMORY_GIB: f64 = 4.0;
 /// Most lines of a plan for people.
 const PLAN_LINES: usize = 40;
 
-pub(super) fn limits(memory_gib: f64) -> Result<Limits, Failure> {
+/// Limits of a run; those without `memory_gib` are only on what runs at once.
+pub(super) fn limits(memory_gib: Option<f64>) -> Result<Limits, Failure> {
+    let beyond = memory_gib.is_none();
+    let memory_gib = memory_gib.unwrap_or(MEMORY_GIB);
     if !(memory_gib.is_finite() && memory_gib > 0.0) {
         return Err(Failure::usage(format!("`--memory {memory_gib}`: it must be above 0")));
     }
-    Ok(Limits { workers: rayon::current_num_threads(), memory_bytes: (memory_gib * 1024.0 * 1024.0 * 1024.0) as u64 })
+    let memory_bytes = (memory_gib * 1024.0 * 1024.0 * 1024.0) as u64;
+    Ok(Limits { workers: rayon::current_num_threads(), memory_bytes, beyond })
 }
 
 /// `run`.
@@ -58,7 +62,7 @@ pub fn traverse(args: &Traverse, common: &Common) -> Verdict {
     parameters::assign(&mut roughness, &args.set_roughness)?;
     let request = drive::Request { dem: &args.dem, seed: args.seed, roughness, missions, parameters, date: &args.date };
     let Place { output, work } = &args.place;
-    let place = drive::Place { output, work: work.as_deref(), replace: args.replace, limits: limits(MEMORY_GIB)? };
+    let place = drive::Place { output, work: work.as_deref(), replace: args.replace, limits: limits(None)? };
     finish_run(common, |teller| Ok(drive::traverse(&request, &place, teller)?))
 }
 
@@ -113,6 +117,9 @@ pub fn plan(args: &Plan, common: &Common) -> Verdict {
         seconds(total_seconds),
         bytes(total_bytes)
     );
+    if let Some(largest) = plan.stale.iter().max_by_key(|s| s.memory_bytes) {
+        text.push_str(&format!(", up to {} of memory for {}", bytes(largest.memory_bytes as f64), largest.item));
+    }
     let shown = plan.stale.iter().take(PLAN_LINES);
     let rows: Vec<Vec<String>> =
         shown.map(|s| vec![format!("  {}", s.item), seconds(s.seconds), s.reason.clone()]).collect();
@@ -129,7 +136,7 @@ pub fn plan(args: &Plan, common: &Common) -> Verdict {
 pub fn verify(args: &Verify, common: &Common) -> Verdict {
     let recompute = args.recompute.as_deref().map(parse_recompute).transpose()?;
     let teller = Teller::new(common.quiet);
-    let found = verification::verify(&args.release, recompute, limits(MEMORY_GIB)?, &teller);
+    let found = verification::verify(&args.release, recompute, limits(None)?, &teller);
     teller.close();
     let verification = found?;
     let mut text = format!("{} files, {} checked", verification.files, bytes(verification.bytes as f64));

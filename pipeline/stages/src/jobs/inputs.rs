@@ -99,7 +99,7 @@ impl Sources {
         let one = |(k, source): (usize, &Source)| {
             let from = work.parent(&source.item, &source.file)?;
             let name = format!("{}.{}", kept(k), original::extension(&source.file));
-            let bytes = std::fs::read(&from).map_err(|e| JobError::at(&from, e))?;
+            let bytes = sastrugi_store::file::read(&from).map_err(|e| JobError::at(&from, e))?;
             atomic::write(&work.output(&name), &bytes).map_err(|e| JobError::at(&work.folder.0.join(&name), e))?;
             Ok(Product::internal(&name))
         };

@@ -149,7 +149,7 @@ impl Job for Original {
 fn copy(input: &InputFile, work: &Work<'_>, name: &str) -> Result<(), JobError> {
     let refused = |e| JobError::at(&work.folder.0.join(name), e);
     let unreadable = |e: std::io::Error| JobError::input(format!("{}: {e}", input.path.display()));
-    let mut from = std::fs::File::open(&input.path).map_err(unreadable)?;
+    let mut from = sastrugi_store::file::open(&input.path).map_err(unreadable)?;
     let mut to = atomic::AtomicFile::create(&work.output(name)).map_err(refused)?;
     let (_, sha256) = digest::copy(&mut from, &mut to).map_err(refused)?;
     if sha256 != input.sha256 {

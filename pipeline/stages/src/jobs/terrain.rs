@@ -136,8 +136,9 @@ impl Job for TerrainJob {
     }
 
     fn memory_bytes(&self) -> u64 {
-        let exports = self.exports.memory_bytes(self.generator.geometry().len() as u64);
-        self.generator.memory_bytes() + 8 * self.inputs.cells() + exports
+        let cells = self.generator.geometry().len() as u64;
+        let after = dem::writing_bytes(cells).max(self.exports.memory_bytes(cells));
+        self.generator.memory_bytes() + 8 * self.inputs.cells() + after
     }
 
     fn estimate(&self) -> Estimate {

@@ -54,7 +54,7 @@ pub struct Described {
 /// # Errors
 /// A file that is missing or is no description.
 pub fn read_description(path: &Path) -> Result<ImageDescription, JobError> {
-    let text = std::fs::read(path).map_err(|e| JobError::input(format!("{}: {e}", path.display())))?;
+    let text = sastrugi_store::file::read(path).map_err(|e| JobError::input(format!("{}: {e}", path.display())))?;
     let wrong = |e: String| JobError::input(format!("{}: {e}", path.display()));
     let value = serde_json::from_slice(&text).map_err(|e| wrong(e.to_string()))?;
     let description: ImageDescription = read_parameters(&value).map_err(|e| wrong(e.to_string()))?;

@@ -43,7 +43,7 @@ impl Place {
         if !path.is_file() {
             return Ok(Self::of(heights, heights));
         }
-        let bytes = std::fs::read(path).map_err(|e| JobError::at(path, e))?;
+        let bytes = sastrugi_store::file::read(path).map_err(|e| JobError::at(path, e))?;
         serde_json::from_slice(&bytes).map_err(JobError::new)
     }
 

@@ -17,8 +17,10 @@ use std::time::Instant;
 pub struct Limits {
     /// Items at once.
     pub workers: usize,
-    /// Sum of the working memory of the items at once, bytes; an item that needs more runs alone.
+    /// Sum of the working memory of the items at once, bytes.
     pub memory_bytes: u64,
+    /// Whether an item that needs more by itself may run alone; else nothing is run.
+    pub beyond: bool,
 }
 
 /// An item without a result.

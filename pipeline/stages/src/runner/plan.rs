@@ -16,6 +16,8 @@ pub struct Stale {
     pub seconds: f64,
     /// Estimated bytes.
     pub bytes: f64,
+    /// Peak working memory, bytes; seldom below the true one.
+    pub memory_bytes: u64,
 }
 
 /// What a run would do.
@@ -40,7 +42,8 @@ pub fn plan(graph: &Graph, cache: &Cache) -> PlanSummary {
             false => "new".to_owned(),
         };
         let estimate = node.job.estimate();
-        stale.push(Stale { item: node.item.to_string(), reason, seconds: estimate.seconds, bytes: estimate.bytes });
+        let (item, memory_bytes) = (node.item.to_string(), node.job.memory_bytes());
+        stale.push(Stale { item, reason, seconds: estimate.seconds, bytes: estimate.bytes, memory_bytes });
     }
     PlanSummary { items: graph.len(), ready: graph.len() - stale.len(), stale }
 }

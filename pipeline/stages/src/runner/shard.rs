@@ -188,7 +188,7 @@ pub fn join(folders: &[PathBuf]) -> Result<Joined, Error> {
     let shards = folders.iter().map(|f| read(f)).collect::<Result<Vec<_>, Error>>()?;
     check_set(folders, &shards)?;
     let Some(first) = shards.first() else { return Err(Error::Usage("no shards are named".to_owned())) };
-    let study = fs::read_to_string(folders[0].join(STUDY))
+    let study = sastrugi_store::file::read_text(&folders[0].join(STUDY))
         .map_err(|e| Error::Input(format!("{}: {e}", folders[0].display())))?;
     if sastrugi_store::digest::of_text(&study) != first.study_sha256 {
         return Err(Error::Input(format!("{}: its study.toml was changed", folders[0].display())));
@@ -218,7 +218,7 @@ fn is_intact(record: &Record, folder: &Path) -> bool {
 
 fn read(folder: &Path) -> Result<Description, Error> {
     let path = folder.join(DESCRIPTION);
-    let bytes = fs::read(&path)
+    let bytes = sastrugi_store::file::read(&path)
         .map_err(|_| Error::Input(format!("{}: no shard (it has no {DESCRIPTION})", folder.display())))?;
     let description: Description =
         serde_json::from_slice(&bytes).map_err(|e| Error::Input(format!("{}: {e}", path.display())))?;

@@ -6,6 +6,7 @@ use crate::study::text::{StudyText, value_to_json};
 use sastrugi_mobility::registry::CUSTOM;
 use sastrugi_schemas::Kind;
 use serde_json::{Map, Value};
+use std::path::Path;
 
 /// Sets `name=value` pairs (dotted names reach into tables); the value is TOML, a bare word is text.
 ///
@@ -31,7 +32,8 @@ pub fn assign_vehicle(params: &mut Value, vehicle: &str) -> Result<(), Error> {
     if !vehicle.ends_with(".toml") {
         return place(params, "vehicle", Value::from(vehicle));
     }
-    let text = std::fs::read_to_string(vehicle).map_err(|e| Error::Input(format!("{vehicle}: {e}")))?;
+    let text =
+        sastrugi_store::file::read_text(Path::new(vehicle)).map_err(|e| Error::Input(format!("{vehicle}: {e}")))?;
     let parsed = StudyText::parse(&text).and_then(|text| text.to_json());
     let file = parsed.map_err(|e| Error::Usage(format!("{vehicle}: {e}")))?;
     match file.get("parameters") {
@@ -86,8 +88,8 @@ pub fn to_toml(value: &Value) -> Result<toml_edit::Value, Error> {
 ///
 /// # Errors
 /// A file that is missing, or not valid TOML.
-pub fn read_file(path: &std::path::Path) -> Result<Value, Error> {
-    let text = std::fs::read_to_string(path).map_err(|e| Error::Input(format!("{}: {e}", path.display())))?;
+pub fn read_file(path: &Path) -> Result<Value, Error> {
+    let text = sastrugi_store::file::read_text(path).map_err(|e| Error::Input(format!("{}: {e}", path.display())))?;
     let name = path.display().to_string();
     StudyText::parse(&text).and_then(|t| t.to_json()).map_err(|error| Error::Study { name, text, error })
 }

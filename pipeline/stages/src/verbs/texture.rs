@@ -146,7 +146,7 @@ fn fill(request: &Request<'_>, path: &Path, fit: &FitFile) -> Result<Value, Erro
 /// A missing file, or one that is no fit.
 pub fn read_fit(path: &Path) -> Result<FitFile, Error> {
     let name = path.display();
-    let bytes = std::fs::read(path).map_err(|e| Error::Input(format!("{name}: {e}")))?;
+    let bytes = sastrugi_store::file::read(path).map_err(|e| Error::Input(format!("{name}: {e}")))?;
     let fit: FitFile = serde_json::from_slice(&bytes).map_err(|e| Error::Input(format!("{name}: no fit file: {e}")))?;
     if fit.model.is_empty() || fit.parameters.is_empty() {
         return Err(Error::Input(format!("{name}: no fit file: it needs `model` and `parameters`")));

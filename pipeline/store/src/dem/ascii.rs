@@ -6,7 +6,6 @@ use super::crs::Crs;
 use super::raster::{Dem, DemInfo, Format, NO_DATA, Refusal};
 use sastrugi_numeric::{Geometry, Grid};
 use std::fmt::Write;
-use std::fs;
 use std::path::Path;
 
 /// Sizes of the usual global grids in arc seconds that no grid in metres has by chance (as degrees they have no short
@@ -130,7 +129,7 @@ pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Dem, Refusal> {
         return Err(Refusal::new(format!("claims {rows} rows of {cols} columns in {} bytes", bytes.len())));
     }
     let (values, integers) = read_values(words, cells, header.nodata)?;
-    let projection = fs::read_to_string(path.with_extension("prj")).ok();
+    let projection = crate::file::read_text(&path.with_extension("prj")).ok();
     let (crs, notes) = projection.as_deref().and_then(named_crs).unwrap_or_else(|| guess_crs(&geometry));
     let dtype = if integers { "int32" } else { "float32" };
     let info = DemInfo {

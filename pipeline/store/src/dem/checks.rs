@@ -38,8 +38,8 @@ pub(super) fn cell_count(rows: u64, cols: u64) -> Result<usize, Refusal> {
 }
 
 /// A height that equals the number for no data would be read as no data.
-pub(super) fn free_of_no_data_value(grid: &Grid) -> Result<(), Refusal> {
-    if grid.values.contains(&NO_DATA) {
+pub(super) fn free_of_no_data_value<T: Copy + Into<f64>>(grid: &Grid<T>) -> Result<(), Refusal> {
+    if grid.values.iter().any(|z| (*z).into() == NO_DATA) {
         return Err(Refusal::new(format!("a height of {NO_DATA} m cannot be told from no data")));
     }
     Ok(())

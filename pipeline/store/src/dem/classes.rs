@@ -6,7 +6,6 @@ use super::{geotiff, tiff_writer};
 use crate::atomic::Target;
 use sastrugi_numeric::Grid;
 use sastrugi_schemas::RoughnessClass;
-use std::fs;
 use std::path::Path;
 
 /// Writes a class map: 8-bit GeoTIFF, no data 255.
@@ -23,7 +22,7 @@ pub fn write_classes<'a>(target: impl Into<Target<'a>>, grid: &Grid<u8>, crs: &C
 /// # Errors
 /// As [`super::read`]; also when the raster is not of 8-bit classes.
 pub fn read_classes(path: &Path) -> Result<Grid<u8>, DemError> {
-    let bytes = fs::read(path).map_err(|e| DemError::reading(path, e))?;
+    let bytes = crate::file::read(path).map_err(|e| DemError::reading(path, e))?;
     let dem = geotiff::parse(bytes, &ReadOptions::default()).map_err(|refusal| refusal.about(path))?;
     if dem.info.dtype != "uint8" {
         return Err(Refusal::new(format!("holds {} values, not classes", dem.info.dtype)).about(path));

@@ -122,7 +122,7 @@ impl Raster<BufReader<File>> {
     /// many rows of them.
     pub fn open(path: &Path, options: &ReadOptions, rows_of_blocks: usize) -> Result<Self, DemError> {
         let reading = |e| DemError::reading(path, e);
-        let file = File::open(path).map_err(reading)?;
+        let file = crate::file::open(path).map_err(reading)?;
         let size = file.metadata().map_err(reading)?.len();
         let plain = unreferenced(BufReader::new(file));
         let raster = if plain.is_some() {

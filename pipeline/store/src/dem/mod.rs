@@ -97,7 +97,7 @@ pub fn read_gridded(path: &Path, options: &ReadOptions, settings: &GridSettings)
 
 /// A file behind its first bytes, and these.
 fn opened(path: &Path) -> io::Result<(File, Vec<u8>)> {
-    let mut file = File::open(path)?;
+    let mut file = crate::file::open(path)?;
     let mut first = Vec::new();
     file.by_ref().take(FIRST_BYTES).read_to_end(&mut first)?;
     Ok((file, first))
@@ -149,6 +149,11 @@ pub fn write<'a>(
     let (bytes, notes) = render(target.path, grid, crs, options).map_err(|refusal| refusal.unfit(target.path))?;
     save(target, &bytes)?;
     Ok(notes)
+}
+
+/// Most memory that [`write()`] takes for a GeoTIFF beside its grid, bytes.
+pub fn writing_bytes(cells: u64) -> u64 {
+    tiff_writer::MEMORY_PER_CELL * cells
 }
 
 /// The bytes that [`write()`] would put into a file of that name, and sentences on what the format lost.

@@ -110,6 +110,7 @@ impl DemError {
         match source.kind() {
             io::ErrorKind::NotFound => Self::Missing { path: path.to_owned() },
             io::ErrorKind::IsADirectory => Refusal::new("is a folder, not a raster").about(path),
+            io::ErrorKind::InvalidInput => Refusal::new(source.to_string()).about(path),
             _ => Self::Io { path: path.to_owned(), source },
         }
     }

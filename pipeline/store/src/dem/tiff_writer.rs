@@ -25,6 +25,9 @@ const HEADER: usize = 8;
 const SUBFILE: u16 = 254;
 const WHOLE: u32 = 0;
 const REDUCED: u32 = 1;
+/// Most bytes that writing takes for a cell: it in single precision, and it and its share of the overviews where deflate gains nothing, in tiles
+/// and in the file.
+pub(super) const MEMORY_PER_CELL: u64 = 16;
 /// Level of deflate: the usual compromise.
 const LEVEL: u32 = 6;
 const COMPRESSION_NONE: u16 = 1;
@@ -38,43 +41,39 @@ const PREDICTOR_FLOAT: u16 = 3;
 const SAMPLE_UNSIGNED: u16 = 1;
 const SAMPLE_FLOAT: u16 = 3;
 const RASTER_PIXEL_IS_AREA: u16 = 1;
-/// Heights as float32.
+/// Heights as float32. Beside the grid it takes [`MEMORY_PER_CELL`] bytes a cell.
 pub(super) fn heights(grid: &Grid, crs: &Crs, options: &WriteOptions) -> Result<Vec<u8>, Refusal> {
     let compression = options.compression;
-    let rounded = grid.as_stored();
-    free_of_no_data_value(&rounded)?;
     check_single_precision(grid.values.iter().copied())?;
-    let encode = |tile: Vec<f32>| match compression {
-        Compression::None => Ok(tile.iter().flat_map(|v| v.to_le_bytes()).collect()),
-        Compression::Deflate => deflated(&float_predicted(&tile)),
-        Compression::Zstd => zstandard(&float_predicted(&tile)),
+    let mut level = grid.to_f32();
+    free_of_no_data_value(&level)?;
+    let encode = |mut tile: Vec<f32>| {
+        tile.iter_mut().filter(|v| v.is_nan()).for_each(|v| *v = NO_DATA as f32);
+        match compression {
+            Compression::None => Ok(tile.iter().flat_map(|v| v.to_le_bytes()).collect()),
+            Compression::Deflate => deflated(&float_predicted(&tile)),
+            Compression::Zstd => zstandard(&float_predicted(&tile)),
+        }
     };
     let (code, predictor) = match compression {
         Compression::None => (COMPRESSION_NONE, PREDICTOR_NONE),
         Compression::Deflate => (COMPRESSION_DEFLATE, PREDICTOR_FLOAT),
         Compression::Zstd => (COMPRESSION_ZSTD, PREDICTOR_FLOAT),
     };
-    let tags =
-        |subfile| [sample_tags(code, predictor, 32, SAMPLE_FLOAT), vec![Tag::long(SUBFILE, &[subfile])]].concat();
-    let image = |subfile, level: &Grid| image(tags(subfile), &single_precision(level), NO_DATA as f32, encode);
-    let mut whole = image(WHOLE, &rounded)?;
+    let image = |subfile, level: &Grid<f32>| {
+        let tags = [sample_tags(code, predictor, 32, SAMPLE_FLOAT), vec![Tag::long(SUBFILE, &[subfile])]].concat();
+        image(tags, level, NO_DATA as f32, encode)
+    };
+    let mut whole = image(WHOLE, &level)?;
     whole.tags.push(Tag::ascii(band::TAG, &options.values.metadata()));
     whole.tags.extend(georeference(&grid.geometry, crs)?);
+    let mut images = vec![whole];
     let less = if matches!(options.values, Values::Codes { .. }) { thinned } else { halved };
-    let levels = if options.cloud_optimised { overviews(&rounded, less) } else { vec![] };
-    let reduced = levels.iter().map(|level| image(REDUCED, level));
-    assemble(std::iter::once(Ok(whole)).chain(reduced).collect::<Result<_, _>>()?)
-}
-
-fn single_precision(grid: &Grid) -> Grid<f32> {
-    let stored = |v: &f64| if v.is_nan() { NO_DATA } else { *v } as f32;
-    Grid::new(grid.geometry, grid.values.iter().map(stored).collect())
-}
-
-/// Levels after the whole one, down to one tile.
-fn overviews(grid: &Grid, less: fn(&Grid) -> Grid) -> Vec<Grid> {
-    let half = |level: &Grid| (level.rows().max(level.cols()) > TILE).then(|| less(level).as_stored());
-    std::iter::successors(half(grid), half).collect()
+    while options.cloud_optimised && level.rows().max(level.cols()) > TILE {
+        level = less(&level);
+        images.push(image(REDUCED, &level)?);
+    }
+    assemble(images)
 }
 
 /// Cells of the level after.
@@ -83,23 +82,24 @@ fn doubled(g: Geometry) -> Geometry {
 }
 
 /// The level after of codes: the north-western one of 2 x 2.
-fn thinned(grid: &Grid) -> Grid {
+fn thinned(grid: &Grid<f32>) -> Grid<f32> {
     let geometry = doubled(grid.geometry);
     let code = |at: usize| grid.at(2 * (at / geometry.cols), 2 * (at % geometry.cols));
     Grid::new(geometry, (0..geometry.len()).map(code).collect())
 }
 
 /// The level after: half as many cells, each the mean of the finite ones among 2 x 2.
-fn halved(grid: &Grid) -> Grid {
+fn halved(grid: &Grid<f32>) -> Grid<f32> {
     let g = grid.geometry;
     let geometry = doubled(g);
     let mean = |at: usize| {
         let (row, col) = (2 * (at / geometry.cols), 2 * (at % geometry.cols));
         let beside = (row..(row + 2).min(g.rows)).flat_map(|r| (col..(col + 2).min(g.cols)).map(move |c| (r, c)));
-        let finite: Vec<f64> = beside.map(|(r, c)| grid.values[r * g.cols + c]).filter(|v| v.is_finite()).collect();
-        finite.iter().sum::<f64>() / finite.len() as f64
+        let finite = beside.map(|(r, c)| f64::from(grid.values[r * g.cols + c])).filter(|v| v.is_finite());
+        let (count, sum) = finite.fold((0.0, -0.0), |(count, sum), v| (count + 1.0, sum + v));
+        (sum / count) as f32
     };
-    Grid::new(geometry, (0..geometry.rows * geometry.cols).map(mean).collect())
+    Grid::new(geometry, (0..geometry.len()).into_par_iter().map(mean).collect())
 }
 
 /// Classes as 8-bit codes.
@@ -300,7 +300,8 @@ fn assemble(mut images: Vec<Image>) -> Result<Vec<u8>, Refusal> {
         let next = if number + 1 < images.len() { out.len() + image.directory() } else { 0 };
         image.write_directory(&mut out, next);
     }
-    for tile in images.iter().rev().flat_map(|image| &image.tiles) {
+    // Each is forgotten once it is in the file.
+    for tile in images.into_iter().rev().flat_map(|image| image.tiles) {
         out.extend(tile);
         out.resize(out.len().next_multiple_of(2), 0);
     }

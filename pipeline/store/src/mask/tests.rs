@@ -5,6 +5,7 @@ use crate::geojson::polygons::Polygon;
 use proptest::prelude::*;
 use sha2::{Digest, Sha256};
 use std::collections::BTreeSet;
+use std::fs;
 
 fn mask_of(name: &str, bytes: &[u8], geometry: &Geometry, options: &MaskOptions) -> Result<Vec<bool>, MaskError> {
     let folder = tempfile::tempdir().unwrap();

@@ -276,7 +276,7 @@ fn write(target: Target<'_>, (bytes, summary): (Vec<u8>, McapSummary)) -> Result
 pub fn bag_files(folder: &Path) -> Result<Vec<PathBuf>, McapError> {
     let unusable = |reason: String| McapError::Unusable { path: folder.to_owned(), reason };
     let path = folder.join(BAG);
-    let text = std::fs::read_to_string(&path).map_err(|source| match source.kind() {
+    let text = crate::file::read_text(&path).map_err(|source| match source.kind() {
         io::ErrorKind::NotFound => unusable(format!("the folder is no bag, it has no {BAG}; name an .mcap file")),
         _ => McapError::Io { path, source },
     })?;
@@ -308,7 +308,7 @@ pub fn describe_bag(folder: &Path) -> Result<serde_json::Value, McapError> {
 /// # Errors
 /// [`McapError::Unusable`] for a file without a readable summary, [`McapError::Io`] for one that cannot be read.
 pub fn describe_file(path: &Path) -> Result<serde_json::Value, McapError> {
-    let bytes = std::fs::read(path).map_err(|source| McapError::Io { path: path.to_owned(), source })?;
+    let bytes = crate::file::read(path).map_err(|source| McapError::Io { path: path.to_owned(), source })?;
     let unusable = |reason: String| McapError::Unusable { path: path.to_owned(), reason };
     let summary =
         mcap::Summary::read(&bytes).map_err(|e| unusable(format!("no MCAP file, or not a whole one: {e}")))?;

@@ -104,7 +104,7 @@ pub struct Incoming {
 }
 
 fn copy(source: &Path, target: &Path) -> Result<(u64, String), ReleaseError> {
-    let mut from = File::open(source).map_err(ReleaseError::io(source))?;
+    let mut from = crate::file::open(source).map_err(ReleaseError::io(source))?;
     let mut to = File::create(target).map_err(ReleaseError::io(target))?;
     digest::copy(&mut from, &mut to).map_err(ReleaseError::io(target))
 }

@@ -5,7 +5,6 @@
 use super::{MANIFEST, Release, ReleaseError, SUMS};
 use crate::atomic::AtomicFile;
 use crate::digest::Hashed;
-use std::fs::File;
 use std::io::{Read, Write};
 use std::path::Path;
 
@@ -53,7 +52,7 @@ fn append(
     time_s: u64,
     target: &Path,
 ) -> Result<(u64, String), ReleaseError> {
-    let file = File::open(source).map_err(ReleaseError::io(source))?;
+    let file = crate::file::open(source).map_err(ReleaseError::io(source))?;
     let length = file.metadata().map_err(ReleaseError::io(source))?.len();
     let mut header = tar::Header::new_gnu();
     header.set_entry_type(tar::EntryType::Regular);

@@ -1,7 +1,7 @@
 use super::*;
 use sastrugi_schemas::manifest::{FailedItem, Origin};
 use sastrugi_schemas::tables::{CovarianceRow, PsdRow};
-use std::fs::OpenOptions;
+use std::fs::{self, OpenOptions};
 use std::io::{Read, Seek, SeekFrom, Write};
 
 fn head() -> Head {

@@ -116,7 +116,7 @@ pub fn verify(folder: &Path) -> Result<VerifyReport, ReleaseError> {
 }
 
 fn read_if_there(path: &Path) -> Result<Option<Vec<u8>>, ReleaseError> {
-    match fs::read(path) {
+    match crate::file::read(path) {
         Ok(bytes) => Ok(Some(bytes)),
         Err(e) if matches!(e.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => Ok(None),
         Err(e) => Err(ReleaseError::io(path)(e)),

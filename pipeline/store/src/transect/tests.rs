@@ -1,5 +1,6 @@
 use super::*;
 use proptest::prelude::*;
+use std::fs;
 
 fn of(text: &str, options: &TransectOptions) -> Result<Transects, DemError> {
     let folder = tempfile::tempdir().unwrap();

@@ -90,7 +90,7 @@ impl Cloud {
     /// Calls `f` with every point, in the order of the file.
     pub fn for_each(&self, mut f: impl FnMut(Point)) -> Result<(), Refusal> {
         let declared = &self.declared;
-        let mut source = BufReader::new(File::open(&self.path).map_err(|e| unreadable(&e))?);
+        let mut source = BufReader::new(crate::file::open(&self.path).map_err(|e| unreadable(&e))?);
         if DeclaredSize::read(&mut source)? != *declared {
             return Err(Refusal::new("changed while it was read"));
         }

@@ -63,7 +63,7 @@ pub struct Gridded {
 /// [`DemError::Unfit`] for settings out of range; otherwise as [`super::read`]: a file that is damaged, holds no usable point,
 /// lies in degrees, or covers more than [`MAX_CELLS`] cells.
 pub fn read(path: &Path, settings: &GridSettings) -> Result<Gridded, DemError> {
-    let file = File::open(path).map_err(|e| DemError::reading(path, e))?;
+    let file = crate::file::open(path).map_err(|e| DemError::reading(path, e))?;
     read_open(path, file, settings)
 }
 

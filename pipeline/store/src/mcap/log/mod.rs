@@ -11,7 +11,6 @@ use mcap::records::Record;
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use sastrugi_schemas::log::{ImuStream, Log, PoseStream, TimedForce, TimedPose, TransformStream};
 use std::collections::BTreeMap;
-use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
@@ -83,7 +82,7 @@ pub fn read_log(path: &Path) -> Result<Log, McapError> {
 fn read_file(path: &Path, gathered: &mut Gathered) -> Result<(), McapError> {
     let unusable = |reason: String| McapError::Unusable { path: path.to_owned(), reason };
     let io = |source| McapError::Io { path: path.to_owned(), source };
-    let mut file = File::open(path).map_err(io)?;
+    let mut file = crate::file::open(path).map_err(io)?;
     let options = LinearReaderOptions::default()
         .with_validate_chunk_crcs(true)
         .with_validate_data_section_crc(true)

@@ -1,0 +1,99 @@
+//! What a generator allocates lies within what it says.
+
+use peak_alloc::PeakAlloc;
+use sastrugi_numeric::{Geometry, Grid, Streams};
+use sastrugi_terrain::{Input, prepare};
+use serde_json::{Value, json};
+
+#[global_allocator]
+static ALLOCATED: PeakAlloc = PeakAlloc;
+
+/// What any generator may take beyond the statement, bytes: tables, and stacks of the pool.
+const SMALL: f64 = 4e6;
+/// A statement may be so many times too large; where craters and rocks decide, it is made for the worst tile, of which a surface may have none.
+const SLACK: f64 = 4.0;
+const SLACK_OF_FEATURES: f64 = 16.0;
+
+/// Bytes at the height of making a surface, and as stated.
+fn measured(kind: &str, params: &Value, inputs: &[Input], threads: usize) -> [f64; 2] {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+    pool.install(|| {
+        let generator = prepare(kind, params).unwrap();
+        let before = ALLOCATED.current_usage();
+        ALLOCATED.reset_peak_usage();
+        let made = generator.generate_checked(&Streams::for_seed(1, "terrain"), inputs).unwrap();
+        let peak = ALLOCATED.peak_usage() - before;
+        drop(made);
+        [peak as f64, generator.memory_bytes() as f64]
+    })
+}
+
+/// A DEM of that many posts a side, 5 m apart.
+fn dem(side: usize) -> Input {
+    let mut geometry = Geometry::square(side, side, 5.0);
+    geometry.origin = [0.0; 2];
+    let height = |k: usize| {
+        let (row, col) = ((k / side) as f64, (k % side) as f64);
+        0.3 * row + 0.1 * col + ((k * 7919) % 101) as f64 / 101.0
+    };
+    Input::Grid(Grid::new(geometry, (0..side * side).map(height).collect()))
+}
+
+/// Kinds with parameters of some size.
+fn cases() -> Vec<(&'static str, Value, Vec<Input>)> {
+    let plain = [
+        "weierstrass_mandelbrot",
+        "multifractal",
+        "cascade",
+        "spheroids",
+        "mavs_perlin",
+        "mavs_gaussian",
+        "mavs_variable",
+        "van_deusen",
+        "ornstein_uhlenbeck",
+        "gap",
+        "pothole",
+        "mavs_profile",
+    ];
+    let sized =
+        |kind: &'static str| [[1000, 1000], [300, 2500]].map(|size| (kind, json!({ "size_px": size }), Vec::new()));
+    let mut all: Vec<_> = plain.into_iter().flat_map(sized).collect();
+    let processes = json!([
+        { "kind": "texture" }, { "kind": "primary_craters" }, { "kind": "rocks", "coverage": 0.118 }, { "kind": "albedo" }
+    ]);
+    for cell_m in [0.02, 0.64] {
+        let params = json!({
+            "size_px": [1000, 1000], "cell_m": cell_m, "basic_spacing_m": 0.01, "processes": processes,
+        });
+        all.push(("planetary", params, Vec::new()));
+    }
+    let elaborate = json!({
+        "dem": "d", "size_px": [1000, 1000], "cell_m": 0.08, "basic_spacing_m": 0.01, "origin_m": [100.0, 100.0],
+        "processes": [{ "kind": "rocks", "coverage": 0.118 }],
+    });
+    all.push(("elaborate", elaborate, vec![dem(100)]));
+    let compose = json!({
+        "size_px": [1000, 1000], "cell_m": 0.05,
+        "processes": [
+            { "kind": "multifractal" }, { "operation": "add", "kind": "gap" }
+        ],
+    });
+    all.push(("compose", compose, Vec::new()));
+    all
+}
+
+#[test]
+fn val_generators_take_the_memory_that_they_state() {
+    let mut wrong = Vec::new();
+    for (kind, params, inputs) in cases() {
+        for threads in [1, 4] {
+            let [peak, stated] = measured(kind, &params, &inputs, threads);
+            println!("{kind} {params} {threads} threads: {:.1} MB, stated {:.1} MB", 1e-6 * peak, 1e-6 * stated);
+            let slack = if params.to_string().contains("rocks") { SLACK_OF_FEATURES } else { SLACK };
+            if peak > stated + SMALL || stated > slack * peak + SMALL {
+                wrong.push((kind, threads, peak, stated));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:?}");
+}
