@@ -95,10 +95,19 @@ fn val_lone_patches_are_made_by_themselves() {
     let again = Server::start(folder.path(), &["world.toml", "--library", "tiles"], &[]);
     assert_eq!((patch(&again, 100, "&flip=none") == alone, patch(&again, 103, "").len()), (true, 1 << 16));
     assert_eq!(made(&again), 0);
-    // A tile itself is made as one.
+    // A tile itself is made as one, and its parts are taken from it.
     patch(&again, 1024, "");
-    patch(&again, 1024, "&field=albedo");
-    assert_eq!(made(&again), 1);
+    let part = "/v1/collections/world/patch?origin=20.6,20.6&size=100,100&resolution_m=0.02&format=raw";
+    assert_eq!((again.get(part).status, made(&again)), (200, 1));
+    // Larger windows are always made in tiles: 3 x 3 of them.
+    let large = "/v1/collections/world/patch?origin=71.68,71.68&size=514,514&resolution_m=0.02&format=raw";
+    assert_eq!((again.get(large).status, made(&again)), (200, 10));
+    // What is refused for its work is refused before and after ground around it was asked for.
+    let coarse = "/v1/collections/world/patch?origin=0,0&size=200,200&resolution_m=40.96&format=raw";
+    let refused = || (again.get(coarse).status, again.get(coarse).json()["detail"].clone());
+    let before = refused();
+    assert_eq!((before.0, again.get(&format!("{coarse}&feature_min_m=1000")).status), (413, 200));
+    assert_eq!(refused(), before);
 }
 
 /// A pixel of a map tile is the ground at the middle of its cell, without features narrower than two pixels, at every level.

@@ -199,7 +199,7 @@ impl Client {
         };
         let (rows, cols, cell, south_west) = read()
             .filter(whole)
-            .ok_or_else(|| ClientError::Answer("the answer is not a patch; is this a terrain server?".to_owned()))?;
+            .ok_or_else(|| ClientError::Answer("the response is not a patch; is this a terrain server?".to_owned()))?;
         let origin = south_west.map(|at| at - 0.5 * cell);
         let values = body.chunks_exact(4).map(|v| f32::from_le_bytes([v[0], v[1], v[2], v[3]])).collect();
         Ok(Grid::new(Geometry { rows, cols, cell: [cell; 2], origin }, values))
@@ -240,7 +240,7 @@ impl Client {
                 return Ok((answer.headers().clone(), body));
             }
             let problem: Option<serde_json::Value> = serde_json::from_slice(&body).ok();
-            let detail = problem.as_ref().and_then(|p| p["detail"].as_str()).unwrap_or("no reason is given");
+            let detail = problem.as_ref().and_then(|p| p["detail"].as_str()).unwrap_or("no reason given");
             return Err(ClientError::Refused { status, detail: detail.to_owned() });
         }
     }

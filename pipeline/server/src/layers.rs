@@ -38,6 +38,8 @@ pub const ALL: [Layer; 7] = [
 
 /// Step of the heights of [`Layer::Elevation`], m: below the roughness of the ground between two samples 1 cm apart.
 pub const STEP_M: f64 = 5e-5;
+/// Heights that it spans, m: 2^24 steps.
+pub const ELEVATION_SPAN_M: f64 = 16_777_216.0 * STEP_M;
 
 /// What a layer is drawn with.
 #[derive(Clone, Copy, Debug)]
@@ -83,7 +85,7 @@ impl Layer {
     pub fn summary(self) -> &'static str {
         match self {
             Self::Relief => "hillshade, tinted by height and albedo",
-            Self::Hillshade => "brightness under one light",
+            Self::Hillshade => "hillshade from one light source",
             Self::Class => "share of the ground that rocks cover",
             Self::Albedo => "albedo, black 0 to white 0.5",
             Self::Terrarium => "height = 256 R + G + B / 256 - 32768 m",

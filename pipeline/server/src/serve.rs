@@ -14,6 +14,7 @@ use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::server::graceful::GracefulShutdown;
 use hyper_util::service::TowerToHyperService;
 use sastrugi_stages::Error;
+use std::io::ErrorKind;
 use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
@@ -71,7 +72,10 @@ impl From<LibraryError> for Error {
                 Self::Usage(error.to_string())
             }
             LibraryError::Io { path, source } => {
-                let words = format!("{}: the tile library cannot be used: {source}", path.display());
+                let words = format!(
+                    "{}: cannot use the tile library: {source}; choose another folder with --library",
+                    path.display()
+                );
                 match Self::at(&path, source) {
                     Self::Retry(_) => Self::Retry(words),
                     _ => Self::Failed(words),
@@ -124,7 +128,9 @@ fn origin(text: &str) -> Result<HeaderValue, Error> {
     let plain = |b: u8| b.is_ascii_alphanumeric() || b".:-_[]".contains(&b);
     let is_origin = text == "*" || (!host.is_empty() && host.bytes().all(plain));
     HeaderValue::from_str(text).ok().filter(|_| is_origin).ok_or_else(|| {
-        Error::Usage(format!("`--cors {text}`: it must be an origin without a path, as https://example.org, or `*`"))
+        Error::Usage(format!(
+            "`--cors {text}`: it must be an origin without a path, for example https://example.org, or `*`"
+        ))
     })
 }
 
@@ -140,7 +146,13 @@ fn host_of(origin: &HeaderValue) -> Option<String> {
 }
 
 async fn listen(listen: SocketAddr) -> Result<(TcpListener, SocketAddr), Error> {
-    let failed = |e: std::io::Error| Error::Retry(format!("{listen}: {e}; choose another address with --listen"));
+    let failed = |e: std::io::Error| {
+        let words = format!("{listen}: {e}; choose another address with --listen");
+        match e.kind() {
+            ErrorKind::AddrNotAvailable | ErrorKind::PermissionDenied => Error::Usage(words),
+            _ => Error::Retry(words),
+        }
+    };
     let listener = TcpListener::bind(listen).await.map_err(failed)?;
     let address = listener.local_addr().map_err(failed)?;
     Ok((listener, address))
@@ -160,7 +172,7 @@ async fn accept(listener: TcpListener, service: &Arc<Service>, origins: &[Header
             Ok(accepted) => accepted,
             Err(error) => {
                 // As when there are too many open files: some will be closed.
-                tracing::warn!(%error, "a connection could not be taken");
+                tracing::warn!(%error, "a connection could not be accepted");
                 tokio::time::sleep(Duration::from_millis(50)).await;
                 continue;
             }
@@ -192,7 +204,7 @@ async fn accept(listener: TcpListener, service: &Arc<Service>, origins: &[Header
     }
     // Who comes now is refused at once.
     drop(listener);
-    tracing::info!("the server finishes the requests that are open");
+    tracing::info!("shutting down; open requests are finished");
     let _ = tokio::time::timeout(FAREWELL, graceful.shutdown()).await;
 }
 

@@ -45,19 +45,16 @@ pub fn interrupted() -> Option<Interrupt> {
 pub fn serve(args: &Serve, common: &Common) -> Verdict {
     let listen: SocketAddr = args.listen.parse().map_err(|_| {
         Failure::usage(format!(
-            "`--listen {}`: it must be an address and a port, for example 127.0.0.1:8080",
+            "`--listen {}`: it must be an IP address and a port, for example 127.0.0.1:8080",
             args.listen
         ))
     })?;
     let token = std::env::var(TOKEN).ok().filter(|token| !token.is_empty());
     start_log(args, common);
     if !listen.ip().is_loopback() {
-        let open = if token.is_none() {
-            format!(", and no {TOKEN} is set: anyone who reaches it may use it")
-        } else {
-            String::new()
-        };
-        warn(&format!("sastrugi: warning: {listen} can be reached from other computers{open}"));
+        let open =
+            if token.is_none() { format!("; without {TOKEN} anyone on the network can use it") } else { String::new() };
+        warn(&format!("sastrugi: warning: {listen} is reachable from other computers{open}"));
     }
     let workers = std::thread::available_parallelism().map_or(1, usize::from);
     let workers = common.threads.map_or(workers, usize::from);
@@ -86,7 +83,7 @@ pub fn serve(args: &Serve, common: &Common) -> Verdict {
     };
     if settings.library.folder.is_some() && settings.library.disk_bytes == 0 {
         return Err(Failure::usage(
-            "`--library-bytes 0` leaves no room for the tiles of --library; give it more, or leave --library out",
+            "`--library-bytes 0` leaves no room for the tiles of --library; raise it, or omit --library",
         ));
     }
     let stop = RUNNING.get_or_init(Stop::default);

@@ -87,7 +87,7 @@ impl Collection {
             "id": self.id,
             "title": self.title(),
             "kind": match self.ground { Ground::World(_) => "world", Ground::Raster(_) => "raster" },
-            "source": self.source.file_name().unwrap_or(self.source.as_os_str()).to_string_lossy(),
+            "source": self.source.file_name().unwrap_or_default().to_string_lossy(),
             "release": self.drives.as_ref().map(|d| d.release.manifest().name.clone()),
             "bounds_m": self.grid().bounds_m(),
             "cell_m": cell_m,

@@ -113,7 +113,7 @@ impl Raster {
             if same {
                 Ok(Some(single(&grid)))
             } else {
-                Err(format!("{}: its grid is not that of the heights", file.path.display()))
+                Err(format!("{}: its grid differs from that of the heights", file.path.display()))
             }
         };
         let [albedo, rock, rock_potential] = MAPS.map(map);
@@ -148,14 +148,18 @@ impl Raster {
     }
 }
 
-/// The values of a file that is as its release sealed it.
+/// The values of a file that is as its release sealed it. Clients learn its name, the log where it lies.
 fn sealed(file: &SealedFile) -> Result<Grid, String> {
-    let path = file.path.display();
-    let (_, sha256) = digest::of_file(&file.path).map_err(|e| format!("{path}: {e}"))?;
+    let name = file.path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let refused = |error: &dyn std::fmt::Display| {
+        tracing::warn!(path = %file.path.display(), %error, "a file of a release cannot be served");
+        format!("{name}: the file cannot be read")
+    };
+    let (_, sha256) = digest::of_file(&file.path).map_err(|e| refused(&e))?;
     if sha256 != file.sha256 {
-        return Err(format!("{path}: the file has changed since its release was sealed; `sastrugi verify` says more"));
+        return Err(format!("{name}: the file has changed since its release was sealed; run `sastrugi verify`"));
     }
-    Ok(dem::read(&file.path).map_err(|e| e.to_string())?.grid)
+    Ok(dem::read(&file.path).map_err(|e| refused(&e))?.grid)
 }
 
 fn single(grid: &Grid) -> Vec<f32> {

@@ -6,6 +6,7 @@
 
 use crate::grid::{TILE, TileGrid, TileIndex};
 use crate::http::Problem;
+use crate::layers::ELEVATION_SPAN_M;
 use crate::library::{Library, Priority, TileKey, Unavailable};
 use crate::samples::Samples;
 use quick_cache::sync::Cache;
@@ -31,7 +32,7 @@ const LATTICE_MAX: f64 = (1u64 << 52) as f64;
 const ZOOM_MAX: u32 = 40;
 /// Most sets of processes whose grounds are kept.
 const GROUNDS: usize = 32;
-/// Samples of a window that is made by itself.
+/// Most samples of a window that is always made by itself.
 const FEW: usize = 16;
 /// Tiles of one request that are asked of the library at once.
 const AT_ONCE: usize = 16;
@@ -41,6 +42,8 @@ const ALONE_MAX: usize = TILE + 2;
 const ALONE_GAIN: f64 = 2.0;
 /// Samples along the side of a look at the whole map, for its range of heights.
 const LOOK: usize = 64;
+/// A world whose range, which nine tenths of its heights lie in, is no larger a share of what `elevation` spans is shown whole.
+const RANGE_SHARE: f64 = 0.75;
 /// A distance of samples is that of a lattice when it differs by no more than this part of it.
 const SAME: f64 = 1e-9;
 /// A place this near to a lattice point, in spacings, is that point.
@@ -69,7 +72,7 @@ pub enum Piece {
 }
 
 impl Piece {
-    /// The cheaper of the two for a window that stands alone.
+    /// Few samples by themselves; others as is cheaper.
     pub fn of([rows, cols]: [usize; 2]) -> Self {
         if rows * cols <= FEW { Self::Alone } else { Self::Either }
     }
@@ -134,8 +137,13 @@ impl World {
         [part(0.05), part(0.95)]
     }
 
-    /// Height in the middle of the window of its file; that in the middle of its range where there is no ground.
+    /// Height that `elevation` is centred on: the middle of the range of a world that fits; else that in the middle of the window of its file, where
+    /// there is ground.
     fn middle(&self) -> f64 {
+        let [low, high] = self.range_m;
+        if high - low <= RANGE_SHARE * ELEVATION_SPAN_M {
+            return 0.5 * (low + high);
+        }
         let [west, south, east, north] = self.home_m();
         let zoom = self.zoom_below(self.cell_m());
         let at = self.to_lattice([0.5 * (west + east), 0.5 * (south + north)]);
@@ -143,7 +151,7 @@ impl World {
         let window = Window { zoom, west, south, cols: 1, rows: 1, centred: false };
         let request = Request { window, feature_min_m: 0.0, cancel: None };
         let height = self.whole.patch_for(&request).map_or(f64::NAN, |patch| patch.heights[0]);
-        if height.is_finite() { height } else { 0.5 * (self.range_m[0] + self.range_m[1]) }
+        if height.is_finite() { height } else { 0.5 * (low + high) }
     }
 
     /// Some heights of a world without end.
@@ -201,7 +209,7 @@ impl World {
         self.range_m
     }
 
-    /// Height in the middle of the window of its file, m.
+    /// Height that map tiles of fine heights are centred on, m.
     pub fn middle_height_m(&self) -> f64 {
         self.middle_m
     }
@@ -230,8 +238,11 @@ impl World {
         let count = self.served.processes().len();
         if let Some(n) = numbers.iter().find(|n| !(1..=count).contains(*n)) {
             return Err(Problem::bad_request(format!(
-                "`phenomena`: there is no process {n}; this world has 1 to {count}: {}",
-                self.kinds().collect::<Vec<_>>().join(", ")
+                "`phenomena`: there is no process {n}; {}",
+                match count {
+                    0 => "this world has none: leave the parameter out, or empty".to_owned(),
+                    _ => format!("this world has 1 to {count}: {}", self.kinds().collect::<Vec<_>>().join(", ")),
+                }
             )));
         }
         numbers.sort_unstable();
@@ -247,7 +258,9 @@ impl World {
     pub fn snippet(&self, origin_m: [f64; 2], size_px: [usize; 2], cell_m: f64) -> Result<String, Problem> {
         let failed = |e: Error| Problem::internal(e.to_string());
         let mut parameters = self.served.parameters.clone();
-        let Value::Object(map) = &mut parameters else { return Err(Problem::internal("parameters are a table")) };
+        let Value::Object(map) = &mut parameters else {
+            return Err(Problem::internal("the parameters are not a table"));
+        };
         map.remove("size_m");
         map.insert("size_px".to_owned(), json!(size_px));
         map.insert("cell_m".to_owned(), json!(cell_m));
@@ -255,15 +268,12 @@ impl World {
         let kind = self.served.kind();
         if kind != planetary::KIND {
             return Err(Problem::bad_request(format!(
-                "study sections are for worlds of kind `{}`; for this one, copy its file into the study",
+                "study sections are for worlds of kind `{}`; copy the parameters of this file into a [[terrain]] instead",
                 planetary::KIND
             )));
         }
-        sastrugi_terrain::prepare(kind, &parameters).map_err(|e| {
-            Problem::bad_request(format!(
-                "no study can make this patch, because its samples lie between those of the lattice: {e}"
-            ))
-        })?;
+        sastrugi_terrain::prepare(kind, &parameters)
+            .map_err(|e| Problem::bad_request(format!("a study cannot generate this patch: {e}")))?;
         let (head, seed) = seed_lines(&self.served.streams.label(), self.id());
         sastrugi_stages::verbs::served::section(&head, seed, kind, &parameters).map_err(failed)
     }
@@ -358,9 +368,10 @@ fn seed_lines(label: &str, id: &str) -> (String, Option<u64>) {
     let words: Vec<&str> = label.split('/').collect();
     match words.as_slice() {
         ["seed", seed, ..] => (format!("id = \"{id}\"\n"), seed.parse().ok()),
-        ["item", seed, _, item, ..] => {
-            (format!("# The same draws need `seed = {seed}` in [study], and this id.\nid = \"{item}\"\n"), None)
-        }
+        ["item", seed, _, item, ..] => (
+            format!("# To get the same ground, set `seed = {seed}` in [study] and keep this id.\nid = \"{item}\"\n"),
+            None,
+        ),
         _ => (format!("id = \"{id}\"\n"), None),
     }
 }
@@ -457,11 +468,11 @@ impl World {
         let detail = if tiles > 1.0 {
             format!(
                 "this takes about {wanted_s:.0} s of processor time; the limit is {limit_s:.0} s. Request a smaller area{}",
-                advice.map_or_else(String::new, |advice| format!(", or {advice}"))
+                advice.map_or_else(String::new, |advice| format!(", or set {advice}"))
             )
         } else {
             format!(
-                "samples this far apart see so many craters and rocks that a tile of them takes about {wanted_s:.0} s of processor time; the limit is \
+                "at this spacing a tile covers so many craters and rocks that it takes about {wanted_s:.0} s of processor time; the limit is \
                  {limit_s:.0} s. {}",
                 advice.map_or_else(|| "Request a finer resolution".to_owned(), |advice| format!("Set {advice}"))
             )
@@ -514,17 +525,17 @@ impl World {
         self.window(maker, tile_window(zoom, [col, row]), selection).await
     }
 
-    /// Whether a window is better made by itself than in its tiles: it is cheaper, and no other window has asked for one of them before. Clients
-    /// that ask here and there get their samples soon; those that go on to what lies beside them find tiles.
-    fn stands_alone(
+    /// The keys of the tiles of a window that is better made by itself: that is cheaper, and no other window has asked for one of them before.
+    /// Clients that ask here and there get their samples soon; those that go on to what lies beside them find tiles.
+    fn alone(
         &self,
         library: &Library,
         window: &Window,
         tiles: &[[i64; 2]],
         selection: &Selection,
-    ) -> Result<bool, Problem> {
+    ) -> Result<Option<Vec<TileKey>>, Problem> {
         if window.cols.max(window.rows) > ALONE_MAX {
-            return Ok(false);
+            return Ok(None);
         }
         let ground = self.ground(&selection.phenomena)?;
         let expected_s = |window: Window| {
@@ -533,11 +544,12 @@ impl World {
         let own_s = expected_s(*window);
         let tiles_s: f64 = tiles.iter().map(|tile| expected_s(tile_window(window.zoom, *tile))).sum();
         if own_s > TILE_SECONDS || ALONE_GAIN * own_s > tiles_s {
-            return Ok(false);
+            return Ok(None);
         }
         let keys: Vec<TileKey> =
             tiles.iter().map(|tile| self.key(&tile_window(window.zoom, *tile), selection)).collect();
-        Ok(library.has(&self.key(window, selection)) || library.are_new(&keys))
+        let alone = library.has(&self.key(window, selection)) || !library.knows_any(&keys);
+        Ok(alone.then_some(keys))
     }
 
     /// Samples `step_m` apart, the south-west one at `origin_m`: lattice points where they stand on them, bilinear between the points of the next
@@ -558,7 +570,7 @@ impl World {
         let own_m = self.step_m(zoom);
         if step_m > 2.0 * own_m {
             return Err(Problem::bad_request(format!(
-                "`resolution_m` is {step_m}; from {} m on the DEM itself has all the detail: use it, or request a finer resolution",
+                "`resolution_m` is {step_m}; at {} m or coarser use the DEM itself, or request a finer resolution",
                 2.0 * own_m
             )));
         }
@@ -590,7 +602,7 @@ impl World {
         [0, 1].map(|axis| on[axis] + self.offset_m[axis])
     }
 
-    /// Samples at lattice points, from the tiles that they lie in.
+    /// Samples at lattice points, from the tiles that they lie in or by themselves.
     async fn lattice(
         self: &Arc<Self>,
         maker: &Maker,
@@ -606,15 +618,18 @@ impl World {
         }
         let [rows, cols] = shape;
         let window = Window { zoom, west: first[0], south: first[1], cols, rows, centred: false };
-        let alone = async || self.window(maker, window, selection).await.map(|samples| Samples::clone(&samples));
         if piece == Piece::Alone {
-            return alone().await;
+            return self.window(maker, window, selection).await.map(|samples| Samples::clone(&samples));
         }
         let places = Self::tiles_of(first, shape);
         // The same request is refused or not, however it is made.
         self.check_work(zoom, places.len() as u64, selection, maker.seconds_max)?;
-        if piece == Piece::Either && self.stands_alone(&maker.library, &window, &places, selection)? {
-            return alone().await;
+        if piece == Piece::Either
+            && let Some(tiles) = self.alone(&maker.library, &window, &places, selection)?
+        {
+            let samples = self.window(maker, window, selection).await?;
+            maker.library.remember(&tiles);
+            return Ok(Samples::clone(&samples));
         }
         let mut places = places.into_iter();
         let (mut tiles, mut made) = (JoinSet::new(), None::<Samples>);
@@ -628,7 +643,7 @@ impl World {
             let tile = tile?;
             made.get_or_insert_with(|| tile.void_like(shape)).lay(&tile, first, place);
         }
-        made.ok_or_else(|| Problem::bad_request("`size`: there is no sample; ask for one at least"))
+        made.ok_or_else(|| Problem::bad_request("`size` must be at least 1,1"))
     }
 }
 

@@ -106,7 +106,7 @@ impl HttpBody for Held {
 
     fn poll_frame(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<Option<Result<Frame<Bytes>, axum::Error>>> {
         if Instant::now() > self.until {
-            return Poll::Ready(Some(Err(axum::Error::new("the client took its answer too slowly"))));
+            return Poll::Ready(Some(Err(axum::Error::new("the client read too slowly"))));
         }
         if self.rest.is_empty() {
             match ready!(Pin::new(&mut self.body).poll_frame(cx)) {
@@ -151,7 +151,7 @@ fn send(service: &Arc<Service>, response: Response, seat: Option<Seat>) -> Respo
     let behind = response.extensions().get::<Behind>().map_or_else(|| response.body().size_hint().lower(), |b| b.0);
     let bytes = Some(behind).filter(|bytes| *bytes > PIECE as u64).unwrap_or(0);
     let Some(load) = service.sending.add(bytes, service.limits.sending) else {
-        return Problem::unavailable("too many bytes are on their way to clients; try again in 2 s").into_response();
+        return Problem::unavailable("too many response bytes are in flight; try again in 2 s").into_response();
     };
     let (rest, until) = (Bytes::new(), Instant::now() + SENDING);
     response.map(|body| Body::new(Held { body, rest, until, _seat: seat, _load: load }))
@@ -161,19 +161,23 @@ fn admit(service: &Arc<Service>, request: &Request) -> Result<Option<Seat>, Prob
     let length = request.uri().to_string().len();
     let most = service.limits.address;
     if length > most {
-        return Err(Problem::uri_too_long(format!("the address has {length} bytes; at most {most} are read")));
+        return Err(Problem::uri_too_long(format!("the URL has {length} bytes; the limit is {most}")));
     }
     check_host(service, request)?;
     let announced = request.headers().get(header::CONTENT_LENGTH).and_then(|value| value.to_str().ok());
     if announced.and_then(|text| text.parse::<u64>().ok()).is_some_and(|bytes| bytes > BODY_BYTES as u64) {
-        return Err(Problem::too_large("the body is too long", "body_bytes_max", BODY_BYTES as u64));
+        return Err(Problem::too_large(
+            format!("the body exceeds {BODY_BYTES} bytes"),
+            "body_bytes_max",
+            BODY_BYTES as u64,
+        ));
     }
     let path = request.uri().path();
     if let Some(token) = &service.token
         && (path.starts_with("/v1") || path == "/metrics")
         && !shows(request, token)
     {
-        return Err(Problem::unauthorized("this server asks for a token: send `Authorization: Bearer ...`"));
+        return Err(Problem::unauthorized("the token is missing or wrong; send `Authorization: Bearer TOKEN`"));
     }
     let Some(Peer(peer)) = request.extensions().get::<Peer>() else { return Ok(None) };
     let client = peer.ip();
@@ -236,7 +240,7 @@ fn same(a: &str, b: &str) -> bool {
 pub async fn tag_encodings(request: Request, next: Next) -> Response {
     let mut response = next.run(request).await;
     if response.status() == StatusCode::NOT_ACCEPTABLE {
-        return Problem::not_acceptable("`Accept-Encoding` takes none of gzip, zstd and identity").into_response();
+        return Problem::not_acceptable("`Accept-Encoding` must allow gzip, zstd or identity").into_response();
     }
     let headers = response.headers_mut();
     let encoding = headers.get(header::CONTENT_ENCODING).and_then(|v| v.to_str().ok()).map(str::to_owned);

@@ -146,9 +146,7 @@ impl Area {
     fn of(service: &Service, order: &Order) -> Result<Self, Problem> {
         let collection = service.collection(&order.collection)?;
         let Ground::World(world) = &collection.ground else {
-            return Err(Problem::bad_request(
-                "jobs are for worlds; a raster is read, and needs no generation in advance",
-            ));
+            return Err(Problem::bad_request("jobs are for worlds; rasters need no generation in advance"));
         };
         let [west, south, east, north] = order.bounds_m;
         if !order.bounds_m.iter().all(|v| v.abs() <= FARTHEST_M) {
@@ -164,7 +162,7 @@ impl Area {
         let step_m = order.resolution_m.unwrap_or(world.cell_m());
         let zoom = world.zoom_of(step_m).ok_or_else(|| {
             Problem::bad_request(format!(
-                "`resolution_m` is {step_m}; it must be {} m times 1, 2, 4, 8 ...",
+                "`resolution_m` is {step_m}; it must be {} m times a power of 2",
                 world.spacing_m()
             ))
         })?;
@@ -179,7 +177,7 @@ impl Area {
         let most = service.limits.job_tiles;
         if tiles > most {
             return Err(Problem::too_large(
-                format!("the area has {tiles} tiles; a job makes at most {most}"),
+                format!("the area has {tiles} tiles; the limit for a job is {most}"),
                 "tiles_max",
                 most,
             ));
@@ -274,7 +272,7 @@ pub async fn cancel(
     if job.end(Progress::Cancelled) {
         Ok(Json(job.describe()))
     } else {
-        Err(Problem::conflict("the job has ended; only one that is running can be cancelled"))
+        Err(Problem::conflict("the job has ended; only running jobs can be cancelled"))
     }
 }
 

@@ -149,7 +149,7 @@ pub fn check_matrix_set(collection: &Collection, set: &str) -> Result<(), Proble
     if set == id {
         return Ok(());
     }
-    Err(Problem::not_found(format!("the tiles of \"{id}\" lie in the tile matrix set \"{id}\"")))
+    Err(Problem::not_found(format!("\"{id}\" has one tile matrix set, \"{id}\"")))
 }
 
 /// `GET /v1/collections/{id}/styles/{layer}/map/tiles`

@@ -40,7 +40,7 @@ fn selection() -> Vec<Value> {
     let numbers = json!({ "type": "string", "pattern": "^([1-9][0-9]?(,[1-9][0-9]?)*)?$" });
     vec![
         query("phenomena", numbers, "Numbers of the processes that act; all when absent"),
-        query("feature_min_m", number(0.0, 1e9), "Craters and rocks that are not wider are left out, m"),
+        query("feature_min_m", number(0.0, 1e9), "Omit craters and rocks up to this width, m"),
     ]
 }
 
@@ -53,8 +53,8 @@ fn sun() -> Vec<Value> {
 
 fn window() -> Vec<Value> {
     vec![
-        query("origin", text(PLACE, "0,0"), "Place of the south-west sample, m; give it or `center`"),
-        query("center", text(PLACE, "0,0"), "Place of the centre, m, moved to the nearest sample"),
+        query("origin", text(PLACE, "0,0"), "Position of the south-west sample, m; give it or `center`"),
+        query("center", text(PLACE, "0,0"), "Position of the centre, snapped to the nearest sample, m"),
         query("size", text("[1-9][0-9]{0,3},[1-9][0-9]{0,3}", "64,64"), "Columns and rows; give it or `size_m`"),
         query(
             "size_m",
@@ -76,8 +76,12 @@ fn patch() -> Vec<Value> {
         query("format", words(&FORMATS), "GeoTIFF (COG), NumPy, float32 little-endian, or 16-bit PNG"),
         query("rotate", words(&["0", "90", "180", "270"]), "Counterclockwise, degrees"),
         query("flip", words(&["none", "horizontal", "vertical"]), "Mirror"),
-        query("downsample", json!({ "type": "integer", "minimum": 0, "maximum": 12 }), "One sample for 2^m x 2^m"),
-        query("method", words(&["point", "mean"]), "How blocks are thinned"),
+        query(
+            "downsample",
+            json!({ "type": "integer", "minimum": 0, "maximum": 12 }),
+            "Exponent m: one sample per block of 2^m x 2^m",
+        ),
+        query("method", words(&["point", "mean"]), "How blocks are reduced"),
     ]);
     all.extend(sun());
     all.extend(selection());
@@ -86,7 +90,7 @@ fn patch() -> Vec<Value> {
 
 fn tile() -> Vec<Value> {
     let mut all = sun();
-    all.push(query("exaggeration", number(0.1, 100.0), "Factor on slopes"));
+    all.push(query("exaggeration", number(0.1, 100.0), "Vertical exaggeration"));
     all.push(selection().remove(0));
     all
 }
@@ -134,7 +138,7 @@ fn operations() -> Vec<Operation> {
         operation("/v1/openapi.json", "This description", vec![], &[OPENAPI]),
         operation("/v1/library", "What the tile library has done", vec![], JSON),
         operation("/v1/collections", "Worlds and rasters", vec![], JSON),
-        operation("/v1/collections/{id}", "One of them", vec![], JSON),
+        operation("/v1/collections/{id}", "One collection", vec![], JSON),
         operation("/v1/collections/{id}/patch", "Samples of a window", patch(), media),
         operation(
             "/v1/collections/{id}/study",
@@ -162,9 +166,12 @@ fn operations() -> Vec<Operation> {
             &["image/png"],
         ),
         operation("/v1/tileMatrixSets", "Tile matrix sets", vec![], JSON),
-        operation("/v1/tileMatrixSets/{id}", "One of them", vec![], JSON),
+        operation("/v1/tileMatrixSets/{id}", "One tile matrix set", vec![], JSON),
         operation("/v1/jobs", "Jobs", vec![], JSON),
-        Operation { method: "post", ..operation("/v1/jobs", "Order the tiles of an area in advance", vec![], JSON) },
+        Operation {
+            method: "post",
+            ..operation("/v1/jobs", "Start generating the tiles of an area in advance", vec![], JSON)
+        },
         operation("/v1/jobs/{id}", "One job", vec![], JSON),
         Operation { method: "delete", ..operation("/v1/jobs/{id}", "Cancel a job", vec![], JSON) },
         operation(
@@ -197,7 +204,7 @@ fn document(service: &Service) -> Value {
         let mut parameters = in_path(o.path, &ids);
         parameters.extend(o.parameters);
         let content: Map<String, Value> = o.media.iter().map(|m| ((*m).to_owned(), json!({}))).collect();
-        let (done, what) = if o.method == "post" { ("202", "Taken") } else { ("200", "Done") };
+        let (done, what) = if o.method == "post" { ("202", "Accepted") } else { ("200", "OK") };
         let mut responses = json!({ done: { "description": what, "content": content } });
         for (status, what) in problems(o.method) {
             responses[status] = problem(what);
@@ -208,7 +215,7 @@ fn document(service: &Service) -> Value {
         }
         if is_tile || o.path.ends_with("/patch") {
             responses["206"] = json!({ "description": "The range that was asked for" });
-            responses["304"] = json!({ "description": "The client has it" });
+            responses["304"] = json!({ "description": "Not modified" });
             responses["416"] = problem("The range lies beyond the end");
         }
         let mut entry = json!({ "summary": o.summary, "parameters": parameters, "responses": responses });
@@ -246,12 +253,12 @@ fn problems(method: &str) -> Vec<(&'static str, &'static str)> {
         ("400", "A parameter is missing, unknown or out of range"),
         ("401", "The token is missing or wrong"),
         ("404", "There is no such thing, or no data"),
-        ("405", "Another method"),
+        ("405", "Method not allowed"),
         ("406", "No encoding that the client takes"),
-        ("413", "More than a limit"),
+        ("413", "A limit is exceeded"),
         ("414", "The address is too long"),
-        ("421", "The request is meant for another host"),
-        ("422", "There is nothing right to answer"),
+        ("421", "Host not allowed"),
+        ("422", "Beyond the end of the world"),
         ("429", "Too many requests of one client are in progress"),
         ("500", "Internal error"),
         ("503", "The server is busy"),

@@ -64,13 +64,13 @@ impl Window {
         let shape = match (query.pair("size")?, query.pair("size_m")?) {
             (Some(size), None) => size,
             (None, Some(size_m)) => size_m.map(|m| (m / step_m).round()),
-            _ => return Err(Problem::bad_request("give `size` in samples or `size_m` in metres, one of the two")),
+            _ => return Err(Problem::bad_request("give either `size` (samples) or `size_m` (metres)")),
         };
         if shape.iter().any(|n| !(*n >= 1.0 && n.fract() == 0.0)) {
             return Err(Problem::bad_request(if query.text("size").is_some() {
                 "`size` must be two whole numbers of at least 1, columns and rows".to_owned()
             } else {
-                format!("`size_m` is smaller than half a sample; samples are {step_m} m apart")
+                format!("`size_m` must be at least one sample spacing, {step_m} m")
             }));
         }
         if shape[0] * shape[1] > most as f64 {
@@ -91,9 +91,7 @@ impl Window {
                 settled(collection, [center[0] - half[0], center[1] - half[1]], step_m)
             }
             _ => {
-                return Err(Problem::bad_request(
-                    "give `origin`, the place of the south-west sample, or `center`, one of the two",
-                ));
+                return Err(Problem::bad_request("give either `origin` (the south-west sample) or `center`"));
             }
         };
         Ok(Self { origin_m, shape: [rows, cols], step_m })
@@ -215,7 +213,7 @@ impl Treatment {
         let parameters = RenderParameters { sun: self.sun, ..RenderParameters::default() };
         let scene = Scene { heights: &heights, albedo: albedo.as_ref() };
         let made = render(&scene, &parameters, &Streams::for_seed(0, "image"))
-            .map_err(|e| Problem::unprocessable(format!("there is no image: {e}")))?;
+            .map_err(|e| Problem::unprocessable(format!("the image cannot be rendered: {e}")))?;
         Ok(made.image().values.iter().map(|v| *v as f32).collect())
     }
 
@@ -260,9 +258,9 @@ impl Treatment {
     fn kind(&self) -> Values {
         let figures = |description: &'static str| Values::Figures { unit: "1".into(), description: description.into() };
         match self.field {
-            "albedo" => figures("share of the light that the ground gives back"),
+            "albedo" => figures("albedo, share of the light that is reflected"),
             "class" => figures("share of the cell that rocks cover"),
-            "rock_potential" => figures("share of the ground that all rocks may cover"),
+            "rock_potential" => figures("potential rock cover, share of the ground"),
             "image" => figures("brightness, I/F"),
             _ => Values::default(),
         }
@@ -303,6 +301,7 @@ pub async fn patch(
     let what = format!("patch {} {window:?} {treatment:?} {selection:?}", collection.digest());
     let make = async {
         let room = service.rooms.take(window.shape[0] * window.shape[1]).await;
+        let room = room.map_err(|e| Problem::internal(e.to_string()))?;
         let samples = ground(&service, &collection, &window, &selection).await?;
         let crs = match &collection.ground {
             Ground::World(_) => Crs::default(),
@@ -329,7 +328,7 @@ async fn ground(
     if samples.is_void() {
         let [west, south, east, north] = collection.grid().bounds_m();
         return Err(Problem::not_found(format!(
-            "there is no data in this window; \"{}\" lies between x = {west} and {east} m, y = {south} and {north} m, and may have holes there",
+            "there is no data in this window; \"{}\" lies between x = {west:.2} and {east:.2} m, y = {south:.2} and {north:.2} m, and may have voids there",
             collection.id
         )));
     }
@@ -341,7 +340,7 @@ pub async fn snippet(State(service): State<Arc<Service>>, On(collection): On, pa
     let query = pairs.checked(&[&["origin", "center", "size", "size_m", "resolution_m"]])?;
     let Ground::World(world) = &collection.ground else {
         let id = &collection.id;
-        return Err(Problem::bad_request(format!("\"{id}\" is a raster; its release holds the study that made it")));
+        return Err(Problem::bad_request(format!("\"{id}\" comes from a release; use the study.toml of the release")));
     };
     let window = Window::of(&query, &collection, service.limits.samples)?;
     let [rows, cols] = window.shape;

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use tokio::sync::{AcquireError, OwnedSemaphorePermit, Semaphore};
 
 /// Most bytes that a sample of a patch takes while the patch is put together: four fields of it and, where it lies between lattice points, of the
 /// four around it, and three copies for turns and files.
@@ -29,11 +29,14 @@ impl Default for Rooms {
 
 impl Rooms {
     /// Waits in line for the memory that the samples of a patch take, which is given back when the permit is dropped. A patch that would need more
-    /// than there is waits for all of it. `None` only after the rooms are closed.
-    pub async fn take(&self, samples: usize) -> Option<OwnedSemaphorePermit> {
+    /// than there is waits for all of it.
+    ///
+    /// # Errors
+    /// None: a room is never closed.
+    pub async fn take(&self, samples: usize) -> Result<OwnedSemaphorePermit, AcquireError> {
         let units = (samples * SAMPLE_BYTES).div_ceil(UNIT).min(UNITS);
         let line = if units > SMALL_UNITS { &self.large } else { &self.small };
-        Arc::clone(line).acquire_many_owned(units as u32).await.ok()
+        Arc::clone(line).acquire_many_owned(units as u32).await
     }
 }
 
@@ -47,9 +50,10 @@ impl Sending {
         self.0.load(Ordering::Relaxed)
     }
 
-    /// Adds an answer, unless more than `most` bytes would be on their way; one answer alone may have any length.
+    /// Adds an answer, unless more than `most` bytes would be on their way; one answer alone may have any length, and one that does not count always
+    /// goes.
     pub fn add(&self, bytes: u64, most: u64) -> Option<Load> {
-        let more = |sending: u64| (sending == 0 || sending + bytes <= most).then_some(sending + bytes);
+        let more = |sending: u64| (bytes == 0 || sending == 0 || sending + bytes <= most).then_some(sending + bytes);
         self.0.fetch_update(Ordering::Relaxed, Ordering::Relaxed, more).ok()?;
         Some(Load { sending: self.clone(), bytes })
     }
@@ -76,9 +80,11 @@ mod tests {
     const LARGEST: usize = 1 << 22;
 
     /// The permit, if there is room now.
-    fn now(taking: Pin<&mut impl Future<Output = Option<OwnedSemaphorePermit>>>) -> Option<OwnedSemaphorePermit> {
+    fn now(
+        taking: Pin<&mut impl Future<Output = Result<OwnedSemaphorePermit, AcquireError>>>,
+    ) -> Option<OwnedSemaphorePermit> {
         match taking.poll(&mut Context::from_waker(Waker::noop())) {
-            Poll::Ready(permit) => permit,
+            Poll::Ready(permit) => permit.ok(),
             Poll::Pending => None,
         }
     }
@@ -104,7 +110,7 @@ mod tests {
     fn val_answers_on_their_way_are_bounded() {
         let sending = Sending::default();
         let alone = sending.add(200, 100).unwrap();
-        assert!(sending.add(1, 100).is_none() && sending.bytes() == 200);
+        assert!(sending.add(1, 100).is_none() && sending.add(0, 100).is_some() && sending.bytes() == 200);
         drop(alone);
         let (first, second) = (sending.add(60, 100), sending.add(40, 100));
         assert!(first.is_some() && second.is_some() && sending.add(1, 100).is_none());

@@ -7,7 +7,7 @@ use super::service::{Service, selection};
 use super::{Base, On, Pairs, Plain, Problem, Query, Segments};
 use crate::collections::{Collection, Ground};
 use crate::grid::{TileIndex, WINDOW_TILE, WINDOW_ZOOM, of_web_mercator};
-use crate::layers::{Layer, STEP_M, Style};
+use crate::layers::{ELEVATION_SPAN_M, Layer, STEP_M, Style};
 use axum::Json;
 use axum::extract::State;
 use axum::http::HeaderMap;
@@ -15,8 +15,6 @@ use axum::response::Response;
 use serde_json::{Value, json};
 use std::sync::Arc;
 
-/// Steps of [`Layer::Elevation`].
-const STEPS: f64 = 16_777_216.0;
 /// The parameters that tiles take.
 pub const KNOWN: [&str; 4] = ["sun_azimuth_deg", "sun_elevation_deg", "exaggeration", "phenomena"];
 
@@ -125,7 +123,7 @@ fn heights(collection: &Collection) -> ([f64; 2], f64) {
 
 /// Height of step 0 of [`Layer::Elevation`] for a height in the middle of its range: whole metres.
 fn offset_m(middle_m: f64) -> f64 {
-    (middle_m - 0.5 * STEPS * STEP_M).round()
+    (middle_m - 0.5 * ELEVATION_SPAN_M).round()
 }
 
 /// `GET /v1/collections/{id}/xyz/{layer}/tilejson.json`

@@ -21,6 +21,8 @@ const MARKER_TEXT: &str = "{\"program\":\"sastrugi\",\"library\":1}\n";
 /// Tells backup programs that everything here can be made again.
 const CACHE_TAG: &str = "CACHEDIR.TAG";
 const CACHE_TAG_TEXT: &str = "Signature: 8a477f597d28d172789f06886806bc55\n";
+/// Bytes of a block of the file system.
+const BLOCK: u64 = 4096;
 /// Held by the process that makes room.
 const LOCK: &str = "lock";
 const ENDING: &str = "tile";
@@ -54,7 +56,8 @@ impl Disk {
             let path = path.to_owned();
             move |source| LibraryError::Io { path, source }
         };
-        if folder.is_file() {
+        // A link that leads nowhere is none either.
+        if folder.symlink_metadata().is_ok() && !folder.is_dir() {
             return Err(LibraryError::NoFolder(folder.to_owned()));
         }
         fs::create_dir_all(folder).map_err(at(folder))?;
@@ -115,7 +118,7 @@ impl Disk {
             self.damaged.fetch_add(1, Ordering::Relaxed);
             tracing::warn!(record = %path.display(), "damaged record; it will be regenerated");
             if fs::remove_file(&path).is_ok() {
-                self.forget(bytes.len() as u64);
+                self.forget(on_disk(bytes.len() as u64));
             }
             return None;
         }
@@ -126,12 +129,12 @@ impl Disk {
     /// Keeps a tile. A record that cannot be written is left out: the tile is made again when it is asked for.
     pub fn write(&self, key: &TileKey, tile: &Samples) {
         let bytes = record::encode(&key.text, tile);
-        if bytes.len() as u64 > self.limit {
+        if on_disk(bytes.len() as u64) > self.limit {
             return;
         }
         match atomic::write(&self.path(key), &bytes) {
             Ok(()) => {
-                let written = bytes.len() as u64;
+                let written = on_disk(bytes.len() as u64);
                 self.bytes.fetch_add(written, Ordering::Relaxed);
                 self.own.fetch_add(written, Ordering::Relaxed);
                 self.make_room();
@@ -140,7 +143,7 @@ impl Disk {
                 self.unwritten.fetch_add(1, Ordering::Relaxed);
                 let folder = self.folder.display();
                 self.warned.call_once(
-                    || tracing::warn!(%folder, %error, "tiles cannot be written to the library; they are served without it"),
+                    || tracing::warn!(%folder, %error, "tiles cannot be written to the library; serving continues without it"),
                 );
             }
         }
@@ -191,6 +194,11 @@ impl Disk {
     }
 }
 
+/// Bytes that a file takes on disk, in the usual blocks.
+fn on_disk(length: u64) -> u64 {
+    length.next_multiple_of(BLOCK)
+}
+
 /// Brings the time of a record up to date.
 fn touch(path: &Path) {
     let now = SystemTime::now();
@@ -214,7 +222,7 @@ fn records(folder: &Path) -> Vec<Record> {
         let path = entry.path();
         let is_record = path.extension().is_some_and(|e| e == ENDING);
         let meta = entry.metadata().ok().filter(|m| is_record && m.is_file())?;
-        Some(Record { path, bytes: meta.len(), used: meta.modified().ok()? })
+        Some(Record { path, bytes: on_disk(meta.len()), used: meta.modified().ok()? })
     };
     entries.filter_map(record).collect()
 }

@@ -67,10 +67,10 @@ pub struct Settings {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Unavailable {
     /// As many wait as may wait.
-    #[error("too many tiles wait to be made")]
+    #[error("too many tiles are queued")]
     Busy,
     /// Making it failed.
-    #[error("the tile could not be made: {0}")]
+    #[error("the tile could not be generated: {0}")]
     Failed(String),
 }
 
@@ -78,16 +78,16 @@ pub enum Unavailable {
 #[derive(Debug, thiserror::Error)]
 pub enum LibraryError {
     /// The folder holds other things.
-    #[error("{}: not a library of tiles, and not empty; choose another folder with --library", .0.display())]
+    #[error("{}: not empty, and not a tile library; choose another folder with --library", .0.display())]
     Occupied(PathBuf),
     /// The folder is of another version of the program.
-    #[error("{}: a tile library of another version of sastrugi; choose another folder with --library, or remove this one", .0.display())]
+    #[error("{}: a tile library from another version of sastrugi; choose another folder with --library, or delete this one", .0.display())]
     Version(PathBuf),
     /// There is a file of that name.
-    #[error("{}: this is a file; --library takes a folder", .0.display())]
+    #[error("{}: not a folder; --library takes one", .0.display())]
     NoFolder(PathBuf),
     /// The file system failed.
-    #[error("{}: the tile library cannot be used: {source}", path.display())]
+    #[error("{}: cannot use the tile library: {source}; choose another folder with --library", path.display())]
     Io {
         /// The folder or file.
         path: PathBuf,
@@ -146,14 +146,14 @@ impl Statistics {
             ("memory_hits", "Tiles answered from memory", true, self.memory_hits),
             ("disk_hits", "Tiles read from disk", true, self.disk_hits),
             ("made", "Tiles generated", true, self.made),
-            ("cancelled", "Tiles given up because nobody waited any longer", true, self.cancelled),
+            ("cancelled", "Tiles cancelled, with no client waiting", true, self.cancelled),
             ("failed", "Tiles that could not be generated", true, self.failed),
             ("damaged", "Damaged records", true, self.damaged),
             ("evicted", "Records removed to make room", true, self.evicted),
             ("unwritten", "Records that could not be written", true, self.unwritten),
             ("disk_bytes", "Bytes of records", false, self.disk_bytes),
             ("memory_bytes", "Bytes of tiles in memory", false, self.memory_bytes),
-            ("queued", "Tiles that wait", false, self.queued),
+            ("queued", "Tiles queued", false, self.queued),
             ("running", "Tiles being generated or read", false, self.running),
         ]
         .map(figure)
@@ -216,7 +216,7 @@ where
 pub struct Library {
     memory: Cache<[u8; 32], Arc<Samples>, Bytes>,
     disk: Option<Disk>,
-    /// Tiles that somebody asked about, see [`Library::are_new`].
+    /// Tiles that somebody asked for a part of, see [`Library::remember`].
     asked: Cache<[u8; 32], ()>,
     flights: Mutex<HashMap<[u8; 32], Flight>>,
     flown: AtomicU64,
@@ -268,7 +268,7 @@ impl Library {
         drop(waiter);
         match made {
             Ok(Some(made)) => made,
-            _ => Err(Unavailable::Failed("its worker ended".to_owned())),
+            _ => Err(Unavailable::Failed("its worker thread ended".to_owned())),
         }
     }
 
@@ -279,11 +279,14 @@ impl Library {
             || self.disk.as_ref().is_some_and(|disk| disk.has(key))
     }
 
-    /// Whether none of these tiles is kept, on its way, or was asked about before; now they were.
-    pub fn are_new(&self, keys: &[TileKey]) -> bool {
-        let known = keys.iter().filter(|key| self.asked.peek(&key.digest).is_some() || self.has(key)).count();
+    /// Whether one of these tiles is kept, on its way, or remembered.
+    pub fn knows_any(&self, keys: &[TileKey]) -> bool {
+        keys.iter().any(|key| self.asked.peek(&key.digest).is_some()) || keys.iter().any(|key| self.has(key))
+    }
+
+    /// Remembers that somebody asked for a part of these tiles.
+    pub fn remember(&self, keys: &[TileKey]) {
         keys.iter().for_each(|key| self.asked.insert(key.digest, ()));
-        known == 0
     }
 
     /// Joins the flight of a key, or starts it.
@@ -411,7 +414,7 @@ impl Trip {
             // What a stopped making gives is not a tile, whatever it is.
             Ok(_) if self.cancel.load(Ordering::Relaxed) => {
                 count(&library.counts.cancelled);
-                Err(Unavailable::Failed("nobody waited for it".to_owned()))
+                Err(Unavailable::Failed("no client was waiting".to_owned()))
             }
             Ok(Some(tile)) => Ok(Arc::new(tile)),
             _ => {

@@ -125,7 +125,7 @@ impl Pool {
             let shared = Arc::clone(&shared);
             let started = std::thread::Builder::new().name(format!("{name}-{number}")).spawn(move || shared.work());
             if let Err(error) = started {
-                tracing::warn!(%error, "a worker could not be started");
+                tracing::warn!(%error, "a worker thread could not be started");
             }
         }
         Self { shared, limit }

@@ -153,10 +153,12 @@ pub fn served(path: &Path) -> Result<Served, Error> {
         let rasters = rasters(&release)?;
         return Ok(Served::Release(Box::new(release), rasters));
     }
+    if !path.exists() {
+        return Err(Error::Input(format!("{}: no such file or folder", path.display())));
+    }
     if !path.to_string_lossy().to_ascii_lowercase().ends_with(".toml") {
         return Err(Error::Usage(format!(
-            "{}: neither a TOML file of a world or a study, nor the folder of a release; a DEM is served as it stands in a release, or with finer \
-             detail by a TOML file with `kind = \"{}\"` and `dem = \"...\"`",
+            "{}: not a world or study (.toml), nor the folder of a release; to serve a DEM, write a TOML file with `kind = \"{}\"` and `dem = \"...\"`",
             path.display(),
             elaborate::KIND
         )));
@@ -166,7 +168,7 @@ pub fn served(path: &Path) -> Result<Served, Error> {
     let worlds = if is_study { worlds_of_study(path, &text)? } else { vec![world_of_file(path)?] };
     if worlds.is_empty() {
         return Err(Error::Usage(format!(
-            "{}: it has no [[terrain]] of kind `{}`, the kind whose patches are made on demand; run the study and serve its release",
+            "{}: no [[terrain]] of kind `{}`; run the study and serve its release",
             path.display(),
             planetary::KIND
         )));
@@ -193,8 +195,7 @@ fn world_of_file(path: &Path) -> Result<ServedWorld, Error> {
         }
         kind => {
             let (world, dem) = (planetary::KIND, elaborate::KIND);
-            let message =
-                format!("{spec}: `kind` is `{kind}`; only patches of `{world}` and `{dem}` are made on demand");
+            let message = format!("{spec}: `kind` is `{kind}`; only `{world}` and `{dem}` can be served");
             return Err(Error::Usage(message));
         }
     };
