@@ -13,7 +13,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Once;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::{Duration, SystemTime};
+use std::time::{Duration, Instant, SystemTime};
 
 /// Says what the folder is.
 const MARKER: &str = "sastrugi-library.json";
@@ -21,6 +21,8 @@ const MARKER_TEXT: &str = "{\"program\":\"sastrugi\",\"library\":1}\n";
 /// Tells backup programs that everything here can be made again.
 const CACHE_TAG: &str = "CACHEDIR.TAG";
 const CACHE_TAG_TEXT: &str = "Signature: 8a477f597d28d172789f06886806bc55\n";
+/// How long a process waits for another that makes room.
+const PATIENCE: Duration = Duration::from_secs(1);
 /// Bytes of a block of the file system.
 const BLOCK: u64 = 4096;
 /// Held by the process that makes room.
@@ -155,20 +157,23 @@ impl Disk {
         let _ = self.bytes.fetch_update(Ordering::Relaxed, Ordering::Relaxed, less);
     }
 
-    /// Removes the records that were not used for longest, down to nine tenths of the limit, once they pass it. One process at a time does it.
-    /// After every sixteenth of the limit that this process has written it looks at the folder, to which others may write too.
+    /// Whether the limit is passed, or this process has written a sixteenth of it since it last looked at the folder, to which others may write too.
+    fn is_due(&self) -> bool {
+        self.bytes.load(Ordering::Relaxed) > self.limit || self.own.load(Ordering::Relaxed) > self.limit / 16
+    }
+
+    /// Removes the records that were not used for longest, down to nine tenths of the limit, once they pass it. One process at a time does it, and the
+    /// others wait for it: what they wrote meanwhile would not be counted.
     fn make_room(&self) {
-        let is_due = self.own.load(Ordering::Relaxed) > self.limit / 16;
-        if self.bytes.load(Ordering::Relaxed) <= self.limit && !is_due {
+        if !self.is_due() {
             return;
         }
         let Ok(lock) = File::options().create(true).truncate(false).write(true).open(self.folder.join(LOCK)) else {
             return;
         };
-        match lock.try_lock() {
-            // Without locks on this file system two may make room at once, which removes more than need be.
-            Ok(()) | Err(TryLockError::Error(_)) => {}
-            Err(TryLockError::WouldBlock) => return,
+        // Another thread may have made room meanwhile.
+        if !is_locked(&lock) || !self.is_due() {
+            return;
         }
         self.own.store(0, Ordering::Relaxed);
         let mut all = records(&self.folder);
@@ -191,6 +196,19 @@ impl Disk {
     /// Damaged, evicted and unwritten records, and bytes.
     pub fn counts(&self) -> [u64; 4] {
         [&self.damaged, &self.evicted, &self.unwritten, &self.bytes].map(|n| n.load(Ordering::Relaxed))
+    }
+}
+
+/// Locks a file that others hold for a moment; false where one holds it for longer, as a process that was stopped.
+fn is_locked(file: &File) -> bool {
+    let start = Instant::now();
+    loop {
+        match file.try_lock() {
+            // Without locks on this file system two may make room at once, which removes more than need be.
+            Ok(()) | Err(TryLockError::Error(_)) => return true,
+            Err(TryLockError::WouldBlock) if start.elapsed() > PATIENCE => return false,
+            Err(TryLockError::WouldBlock) => std::thread::sleep(PATIENCE / 500),
+        }
     }
 }
 
