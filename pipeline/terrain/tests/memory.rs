@@ -16,12 +16,12 @@ const SLACK_OF_FEATURES: f64 = 16.0;
 
 /// Bytes at the height of making a surface, and as stated.
 fn measured(kind: &str, params: &Value, inputs: &[Input], threads: usize) -> [f64; 2] {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool of threads");
     pool.install(|| {
-        let generator = prepare(kind, params).unwrap();
+        let generator = prepare(kind, params).expect("the parameters are valid");
         let before = ALLOCATED.current_usage();
         ALLOCATED.reset_peak_usage();
-        let made = generator.generate_checked(&Streams::for_seed(1, "terrain"), inputs).unwrap();
+        let made = generator.generate_checked(&Streams::for_seed(1, "terrain"), inputs).expect("a surface");
         let peak = ALLOCATED.peak_usage() - before;
         drop(made);
         [peak as f64, generator.memory_bytes() as f64]
