@@ -103,7 +103,7 @@ fn check_memory(loaded: &Loaded, cache: &Cache, needed: &[usize], limits: Limits
         Some((bytes, item)) if bytes > limits.memory_bytes && !limits.beyond => {
             let gib = |bytes: u64| bytes as f64 / f64::from(1u32 << 30);
             Err(Error::Usage(format!(
-                "`--memory {}`: {item} needs about {:.2} GiB by itself; give at least that much, or make the item smaller",
+                "`--memory {:.3}`: {item} needs about {:.2} GiB by itself; give at least that much, or make the item smaller",
                 gib(limits.memory_bytes),
                 gib(bytes)
             )))

@@ -2,7 +2,7 @@
 
 use peak_alloc::PeakAlloc;
 use sastrugi_numeric::{Geometry, Grid, Streams};
-use sastrugi_terrain::{Input, prepare};
+use sastrugi_terrain::{Input, kinds, prepare};
 use serde_json::{Value, json};
 
 #[global_allocator]
@@ -41,23 +41,11 @@ fn dem(side: usize) -> Input {
 
 /// Kinds with parameters of some size.
 fn cases() -> Vec<(&'static str, Value, Vec<Input>)> {
-    let plain = [
-        "weierstrass_mandelbrot",
-        "multifractal",
-        "cascade",
-        "spheroids",
-        "mavs_perlin",
-        "mavs_gaussian",
-        "mavs_variable",
-        "van_deusen",
-        "ornstein_uhlenbeck",
-        "gap",
-        "pothole",
-        "mavs_profile",
-    ];
+    // The others take parameters, below.
+    let plain = kinds().into_iter().map(|k| k.kind).filter(|k| !["planetary", "elaborate", "compose"].contains(k));
     let sized =
         |kind: &'static str| [[1000, 1000], [300, 2500]].map(|size| (kind, json!({ "size_px": size }), Vec::new()));
-    let mut all: Vec<_> = plain.into_iter().flat_map(sized).collect();
+    let mut all: Vec<_> = plain.flat_map(sized).collect();
     let processes = json!([
         { "kind": "texture" }, { "kind": "primary_craters" }, { "kind": "rocks", "coverage": 0.118 }, { "kind": "albedo" }
     ]);
