@@ -33,7 +33,7 @@ impl Data {
             return Err(ReportError::NotARelease { path: folder.to_owned() });
         }
         let toml = release.text(STUDY)?.unwrap_or_default();
-        let manifest: Option<Manifest> = release.json(MANIFEST)?;
+        let manifest = manifest_in(folder)?;
         let contents = manifest.iter().flat_map(|m| &m.artifacts).filter_map(content).collect();
         let (version, failed) =
             manifest.map_or_else(|| (env!("CARGO_PKG_VERSION").into(), Vec::new()), |m| (m.version, m.failed));
@@ -96,6 +96,15 @@ impl Data {
         }
         Ok(data)
     }
+}
+
+/// The manifest, checked; none before a release is sealed.
+fn manifest_in(folder: &Path) -> Result<Option<Manifest>, ReportError> {
+    if !folder.join(MANIFEST).is_file() {
+        return Ok(None);
+    }
+    let sealed = sastrugi_store::release::Release::open(folder).map_err(|e| read_error(MANIFEST, e))?;
+    Ok(Some(sealed.manifest().clone()))
 }
 
 /// Path and hash of a file whose content is hashed.

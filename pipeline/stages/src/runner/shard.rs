@@ -52,8 +52,13 @@ impl Part {
 
     /// True for a key of this part.
     pub fn owns(self, key: &str) -> bool {
-        let digits = key.get(..15).unwrap_or_default();
-        u64::from_str_radix(digits, 16).is_ok_and(|n| n % u64::from(self.count) == u64::from(self.index - 1))
+        self.owner(key) == Some(self.index)
+    }
+
+    /// The part, of as many as there are, that a key belongs to.
+    fn owner(self, key: &str) -> Option<u32> {
+        let n = u64::from_str_radix(key.get(..15)?, 16).ok()?;
+        Some((n % u64::from(self.count)) as u32 + 1)
     }
 }
 
@@ -198,7 +203,7 @@ pub fn join(folders: &[PathBuf]) -> Result<Joined, Error> {
     let by_part: BTreeMap<u32, &PathBuf> = shards.iter().map(|s| s.part.index).zip(folders).collect();
     let mut results = Vec::new();
     for (item, key) in &first.items {
-        let owner = (1..=first.part.count).find(|&index| Part { index, ..first.part }.owns(key));
+        let owner = first.part.owner(key);
         let folder = owner.and_then(|o| by_part.get(&o)).map(|f| item_folder(f, item));
         let result = folder.filter(|f| load_record(f).is_some_and(|r| r.key == *key && is_intact(&r, f)));
         if result.is_none() && !failures.contains_key(item) {

@@ -1,7 +1,7 @@
 //! Logs of any origin: poses, transforms, inertial measurements and events out of an MCAP file.
 //!
 //! Read are our own messages and Foxglove's (protobuf), and those of ROS 2 (CDR); see [`decode`]. The file is streamed, with
-//! its chunks' checksums; memory holds one chunk's window and what is kept. A file that breaks off is read up to there.
+//! its chunks' checksums; memory holds one record and what is kept. A file that breaks off is read up to there.
 
 mod foxglove;
 mod ros2;
@@ -14,8 +14,14 @@ use std::collections::BTreeMap;
 use std::io::Read;
 use std::path::Path;
 
-/// Longest record outside of chunks, bytes: more than any message that is read here, less than harm.
-const RECORD_MAX: usize = 1 << 30;
+/// Longest record of any file, bytes: more than any message that is read here, less than harm.
+const RECORD_MAX: u64 = 1 << 30;
+/// Longest record of a small file, bytes.
+const RECORD_MAX_SMALL: u64 = 1 << 26;
+/// Bytes of a record per byte of file beyond that: messages do not compress better.
+const EXPANSION_MAX: u64 = 1 << 10;
+/// Bytes that are read at once: a record takes memory only as far as the file has it.
+const READ_BYTES: usize = 1 << 20;
 
 /// What one message says.
 enum Said {
@@ -83,15 +89,17 @@ fn read_file(path: &Path, gathered: &mut Gathered) -> Result<(), McapError> {
     let unusable = |reason: String| McapError::Unusable { path: path.to_owned(), reason };
     let io = |source| McapError::Io { path: path.to_owned(), source };
     let mut file = crate::file::open(path).map_err(io)?;
+    let file_bytes = file.metadata().map_err(io)?.len();
+    let record_max = file_bytes.saturating_mul(EXPANSION_MAX).clamp(RECORD_MAX_SMALL, RECORD_MAX);
     let options = LinearReaderOptions::default()
         .with_validate_chunk_crcs(true)
         .with_validate_data_section_crc(true)
-        .with_record_length_limit(RECORD_MAX);
+        .with_record_length_limit(record_max as usize);
     let mut reader = LinearReader::new_with_options(options);
     while let Some(event) = reader.next_event() {
         match event {
             Ok(LinearReadEvent::ReadRequest(wanted)) => {
-                let read = file.read(reader.insert(wanted)).map_err(io)?;
+                let read = file.read(reader.insert(wanted.min(READ_BYTES))).map_err(io)?;
                 reader.notify_read(read);
             }
             Ok(LinearReadEvent::Record { data, opcode }) => {
