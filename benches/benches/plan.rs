@@ -27,6 +27,6 @@ fn plan(bencher: Bencher, terrains: usize) {
     let output = folder.path().join("release");
     bencher.counter(ItemsCount::new(ITEMS_PER_TERRAIN * terrains)).bench(|| {
         let loaded = load_text(&text, "study", Path::new("")).unwrap_or_else(|e| panic!("{e}"));
-        plan_of(&loaded, &output, None).unwrap_or_else(|e| panic!("{e}")).stale.len()
+        plan_of(&loaded, &output, None, None).unwrap_or_else(|e| panic!("{e}")).stale.len()
     });
 }

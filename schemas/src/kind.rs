@@ -21,6 +21,18 @@ pub struct Kind {
     pub parameters: Value,
 }
 
+impl Kind {
+    /// Values of the parameters as a whole, nested as they are: of a vehicle or a surface.
+    pub fn values(&self) -> Option<&Value> {
+        self.parameters.get("default")
+    }
+
+    /// Source of each of these values, nested as they are.
+    pub fn sources(&self) -> Option<&Value> {
+        self.parameters.get("x-sources")
+    }
+}
+
 /// A parameter that was refused.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{}{message}", if key.is_empty() { String::new() } else { format!("`{key}` ") })]
@@ -35,6 +47,16 @@ impl ParameterError {
     /// An error at `key`.
     pub fn new(key: impl Into<String>, message: impl Into<String>) -> Self {
         Self { key: key.into(), message: message.into() }
+    }
+
+    /// The last word of the key.
+    fn name(&self) -> &str {
+        self.key.rsplit('.').next().unwrap_or_default()
+    }
+
+    /// True when it says that a required key is not there.
+    pub fn is_missing(&self, key: &str) -> bool {
+        self.message == format!("missing field `{key}`")
     }
 
     /// The same error seen from one level up.
@@ -97,6 +119,41 @@ pub fn read_parameters<T: DeserializeOwned>(value: &Value) -> Result<T, Paramete
     })
 }
 
+/// Reads parameters as [`read_parameters`] does, with every value of the wrong type refused and not the first alone.
+///
+/// # Errors
+/// The keys that do not fit, at least one.
+pub fn read_all<T: DeserializeOwned>(mut value: Value) -> Result<T, Vec<ParameterError>> {
+    let mut refused = Vec::new();
+    loop {
+        match read_parameters(&value) {
+            Ok(read) if refused.is_empty() => return Ok(read),
+            Ok(_) => return Err(refused),
+            Err(error) => {
+                // Other elements of a list would move to other positions: the list goes as a whole.
+                let words = error.key.split('.').filter(|word| !word.is_empty());
+                let path: Vec<String> =
+                    words.take_while(|word| word.parse::<usize>().is_err()).map(str::to_owned).collect();
+                // A required key that was taken out for its type is not missing.
+                let known = refused.iter().any(|e: &ParameterError| error.is_missing(e.name()));
+                if !known {
+                    refused.push(error);
+                }
+                if known || !remove(&mut value, &path) {
+                    return Err(refused);
+                }
+            }
+        }
+    }
+}
+
+/// Takes out what lies at a path of names; false when nothing lies there.
+pub fn remove(value: &mut Value, path: &[String]) -> bool {
+    let Some((last, parents)) = path.split_last() else { return false };
+    let parent = parents.iter().try_fold(value, |at, word| at.as_object_mut()?.get_mut(word));
+    parent.and_then(Value::as_object_mut).is_some_and(|map| map.remove(last).is_some())
+}
+
 /// The path with a dot before every name and index, as the keys of a study are written.
 fn dotted(path: &serde_path_to_error::Path) -> String {
     use serde_path_to_error::Segment;
@@ -127,6 +184,28 @@ mod tests {
         assert_eq!(key(json!({"layers": [[1.0, 2.0], [1.0, "x"]]})), "layers.1.1");
         assert_eq!(key(json!({"layers": 5})), "layers");
         assert_eq!(key(json!({})), "");
+    }
+
+    #[derive(Debug, Deserialize)]
+    struct Item {
+        #[serde(rename = "id")]
+        _id: String,
+        #[serde(default, rename = "count")]
+        _count: u32,
+        #[serde(default, rename = "window")]
+        _window: Vec<f64>,
+    }
+
+    #[test]
+    fn val_all_wrong_values_are_told() {
+        let keys = |value: Value| -> Vec<String> {
+            read_all::<Item>(value).err().unwrap_or_default().into_iter().map(|e| e.key).collect()
+        };
+        assert_eq!(keys(json!({"id": "a", "count": 3, "window": [1.0]})), Vec::<String>::new());
+        assert_eq!(keys(json!({"id": "a", "count": -1, "window": ["x", 2.0, "y"]})), ["count", "window.0"]);
+        assert_eq!(keys(json!({"id": 5, "count": "x"})), ["count", "id"]);
+        assert_eq!(keys(json!({"count": 1})), [""]);
+        assert_eq!(keys(json!([])), [""]);
     }
 
     #[test]

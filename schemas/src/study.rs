@@ -36,10 +36,10 @@ pub struct StudyHead {
     /// Licence of the release as an SPDX expression; it must be one that the licences of its DEMs permit.
     #[serde(default = "default_license")]
     pub license: String,
-    /// People or groups that made the study; people as `Family, Given` where citations shall tell the parts of their names apart.
+    /// People and organisations that made the study; write people as `Family, Given` so that citations can tell the parts of a name apart.
     #[serde(default)]
     pub creators: Vec<String>,
-    /// Those of the creators that are no people.
+    /// Those of `creators` that are organisations.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub organizations: Vec<String>,
     /// Start of every mission's clock in MCAP files, ns since 1970-01-01 UTC.
@@ -54,10 +54,53 @@ pub struct StudyHead {
     /// Whether groups share their random draws.
     #[serde(default)]
     pub pairing: Pairing,
-    /// Shares of the parts `train`, `validation` and `test` among the terrains of every group, as `[0.7, 0.15, 0.15]`; they add
-    /// up to 1. Terrains without a group take no part where others have one.
+    /// Shares of the parts `train`, `validation` and `test` among the terrains of every group, as `[0.7, 0.15, 0.15]`, or of `train` and `test`, as
+    /// `[0.8, 0.2]`; they add up to 1. Terrains without a group take no part where others have one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub split: Option<[f64; 3]>,
+    pub split: Option<Shares>,
+}
+
+/// Shares of the parts of a dataset.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged, expecting = "expected the shares of two or three parts, as [0.8, 0.2] or [0.7, 0.15, 0.15]")]
+pub enum Shares {
+    /// `train`, `validation`, `test`.
+    Three([f64; 3]),
+    /// `train`, `test`.
+    Two([f64; 2]),
+}
+
+impl Shares {
+    /// Shares of `train`, `validation` and `test`.
+    pub fn by_part(self) -> [f64; 3] {
+        match self {
+            Self::Three(shares) => shares,
+            Self::Two([train, test]) => [train, 0.0, test],
+        }
+    }
+}
+
+impl Default for StudyHead {
+    fn default() -> Self {
+        Self {
+            name: "study".to_owned(),
+            title: String::new(),
+            description: String::new(),
+            seed: 0,
+            date: "2000-01-01".to_owned(),
+            version: None,
+            url: None,
+            doi: None,
+            license: default_license(),
+            creators: Vec::new(),
+            organizations: Vec::new(),
+            epoch_ns: default_epoch_ns(),
+            mcap: McapFlavour::default(),
+            geotiff: GeoTiff::default(),
+            pairing: Pairing::default(),
+            split: None,
+        }
+    }
 }
 
 fn default_license() -> String {
@@ -141,7 +184,7 @@ pub struct DemItem {
     pub citation: Option<String>,
 }
 
-/// `[[terrain]]` around a generator's parameters.
+/// `[[terrain]]`: a generated terrain, or as many as `count` and `sweep` say.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TerrainItem {
@@ -201,7 +244,7 @@ impl Simulator {
     }
 }
 
-/// `[[fit]]` around the fit's parameters.
+/// `[[fit]]`: the covariance of a measured DEM, detrended by a moving average.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FitItem {
@@ -257,7 +300,7 @@ impl Files {
     }
 }
 
-/// `[[texture]]` around a synthesis method's parameters.
+/// `[[texture]]`: a synthetic surface with a given covariance, alone or on a base.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TextureItem {
@@ -279,6 +322,9 @@ pub struct TextureItem {
     /// off; the texture stands alone when absent.
     #[serde(default)]
     pub onto: Option<Onto>,
+    /// Factor on the heights of the texture, above 0: 2 doubles their standard deviation. Not with `methods` or `fill`.
+    #[serde(default = "one")]
+    pub amplitude: f64,
     /// Factor of the texture on its base: the id of a raster of factors, or a table by the base's slope.
     #[serde(default)]
     pub modulate: Option<Modulate>,
@@ -297,6 +343,10 @@ pub struct TextureItem {
     /// One item (or one set of replicates) per value of a parameter: `sweep.<parameter> = [...]`.
     #[serde(default)]
     pub sweep: BTreeMap<String, Vec<serde_json::Value>>,
+}
+
+fn one() -> f64 {
+    1.0
 }
 
 /// Base of a texture.
@@ -366,7 +416,7 @@ fn default_method() -> String {
     "fft_ma".to_owned()
 }
 
-/// `[[missions]]` around the rules for drawing missions.
+/// `[[missions]]`: starts and goals on terrains, and the lines between them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MissionsItem {
@@ -400,7 +450,7 @@ pub enum MissionKind {
     Trail,
 }
 
-/// `[[route]]` around the parameters of a search.
+/// `[[route]]`: planned paths over terrains.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RouteItem {
@@ -435,7 +485,7 @@ pub struct RouteItem {
     pub sweep: BTreeMap<String, Vec<serde_json::Value>>,
 }
 
-/// `[[navigate]]` around the parameters of a team.
+/// `[[navigate]]`: a team in formation along planned routes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NavigateItem {
@@ -454,7 +504,7 @@ pub struct NavigateItem {
     pub sweep: BTreeMap<String, Vec<serde_json::Value>>,
 }
 
-/// `[[rover]]` around the parameters of a navigator and its trial.
+/// `[[rover]]`: rovers that find their own way by what they sense.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RoverItem {
@@ -482,7 +532,7 @@ pub struct RoverItem {
     pub sweep: BTreeMap<String, Vec<serde_json::Value>>,
 }
 
-/// `[[image]]` around the parameters of an image.
+/// `[[image]]`: a rendered image of a surface under a sun and a camera.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ImageItem {
@@ -554,7 +604,7 @@ impl Perturb {
     }
 }
 
-/// `[[photoclinometry]]` around the settings of an inversion.
+/// `[[photoclinometry]]`: heights recovered from images.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PhotoclinometryItem {
@@ -583,7 +633,7 @@ pub struct PhotoclinometryItem {
     pub sweep: BTreeMap<String, Vec<serde_json::Value>>,
 }
 
-/// `[[traverse]]` around the parameters of a run.
+/// `[[traverse]]`: a vehicle that drives missions.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TraverseItem {

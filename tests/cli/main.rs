@@ -11,4 +11,5 @@ mod minus;
 mod navigate;
 mod pack;
 mod sources;
+mod study;
 mod verbs;

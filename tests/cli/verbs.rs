@@ -489,25 +489,46 @@ fn val_schema_tells_of_topics() {
     assert!(call.code == 2 && call.stderr.contains("`sastrugi schema topics`"), "{} {}", call.code, call.stderr);
 }
 
-/// `schemas/published` holds what users rely on: the study's JSON Schema, the tables' columns, the topics. To refresh after a change of
+/// `schemas/published` holds what users rely on: the study's JSON Schema, the tables' columns, the topics; `docs/study.md` the same of the study to read. To refresh after a change of
 /// the contract: `SASTRUGI_REFRESH=1 cargo test --release -p sastrugi-tests --test cli published`.
 #[test]
 fn gold_published_schemas_are_current() {
     let folder = area();
-    let published = sastrugi_fixtures::workspace_root().join("schemas/published");
+    let root = sastrugi_fixtures::workspace_root();
     for (file, arguments) in [
-        ("study.schema.json", ["schema", "study"]),
-        ("tables.json", ["schema", "tables"]),
-        ("topics.json", ["schema", "topics"]),
+        ("schemas/published/study.schema.json", ["schema", "study", "--json"]),
+        ("schemas/published/tables.json", ["schema", "tables", "--json"]),
+        ("schemas/published/topics.json", ["schema", "topics", "--json"]),
+        ("docs/study.md", ["schema", "study", "--markdown"]),
     ] {
-        let mut all = arguments.to_vec();
-        all.push("--json");
-        let now = ok(folder.path(), &all);
+        let now = ok(folder.path(), &arguments);
         if std::env::var_os("SASTRUGI_REFRESH").is_some() {
-            write(&published, file, &now);
+            write(&root, file, &now);
         }
-        let kept = std::fs::read_to_string(published.join(file)).unwrap();
+        let kept = std::fs::read_to_string(root.join(file)).unwrap();
         assert!(now == kept, "{file} is stale; refresh it and say why in the commit message");
+    }
+}
+
+/// Of every key, the page on studies says what it holds, what it means, and what it may be.
+#[test]
+fn val_the_page_on_studies_is_complete() {
+    let page = std::fs::read_to_string(sastrugi_fixtures::workspace_root().join("docs/study.md")).unwrap();
+    let keys = page.lines().filter(|line| line.starts_with("| `") && line.matches(" |").count() >= 5);
+    let mut count = 0;
+    for line in keys {
+        let cells: Vec<&str> = line.split(" | ").map(|cell| cell.trim_matches(['|', ' '])).collect();
+        let [key, holds, _, example, meaning] = cells[..] else { panic!("{line}") };
+        assert!(meaning.ends_with('.') || meaning.ends_with(')'), "{line}");
+        if !key.contains(" = ") && !key.ends_with("]`") {
+            assert!(!holds.is_empty(), "{line}");
+            assert!(holds == "table" || holds == "list of tables" || !example.is_empty(), "no example: {line}");
+            count += 1;
+        }
+    }
+    assert!(count > 700, "{count} keys");
+    for section in ["study", "dem", "terrain", "fit", "texture", "image", "missions", "traverse", "route", "rover"] {
+        assert!(page.contains(&format!("\n## {section}\n")), "{section}");
     }
 }
 

@@ -347,7 +347,7 @@ fn val_a_vehicle_of_ones_own() {
     assert_eq!(outcomes("husky_a200"), outcomes(mine.to_str().unwrap()));
     write(folder.path(), "mine.toml", "[chassis]\nmass_kg = 1\n");
     let (code, said) = drive(folder.path(), &dem, &["--vehicle", mine.to_str().unwrap()]);
-    assert!(code == 2 && said.contains("no table [parameters]"), "{code} {said}");
+    assert!(code == 2 && said.contains("stand in the table `parameters`"), "{code} {said}");
 }
 
 /// A mission across cells without data ends there; the others arrive.

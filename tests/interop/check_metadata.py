@@ -216,6 +216,8 @@ def check_card(release):
     for key in ["pretty_name", "license", "tags", "configs"]:
         expect(card.get(key), f"README.md: its head has no {key}")
     there = {str(path.relative_to(release)) for path in (release / "tables").glob("*/*.parquet")}
+    defaults = [config["config_name"] for config in card["configs"] if config.get("default")]
+    expect(len(defaults) == 1, f"the card has the default configurations {defaults}")
     for config in card["configs"]:
         found = {path for path in there if fnmatch.fnmatch(path, config["data_files"])}
         name = config["config_name"]

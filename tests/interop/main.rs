@@ -48,6 +48,28 @@ fn val_readers_agree_with_a_release() {
     assert_eq!(call.code, 0, "{}{}", call.stdout, call.stderr);
 }
 
+/// Every shipped study, and every one that `init` writes, fits the schema that editors use; a key or value that is wrong does not.
+#[test]
+fn val_studies_fit_their_schema() {
+    let Some(python) = sastrugi_tests::python("schema", "./test") else { return };
+    let folder = area();
+    let root = sastrugi_fixtures::workspace_root();
+    let shipped = std::fs::read_dir(root.join("fixtures/studies")).unwrap().map(|entry| entry.unwrap().path());
+    let mut studies: Vec<PathBuf> = shipped.filter(|path| path.extension().is_some_and(|e| e == "toml")).collect();
+    for kind in ["terrain", "texture", "traverse", "navigate", "rover", "photoclinometry"] {
+        let file = format!("{kind}.toml");
+        let call = sastrugi_in(folder.path(), &["init", kind, "-o", &file]);
+        assert_eq!(call.code, 0, "{kind}: {}", call.stderr);
+        studies.push(folder.path().join(file));
+    }
+    let schema = folder.path().join("study.schema.json");
+    let paths: Vec<&Path> = std::iter::once(&schema).chain(&studies).map(PathBuf::as_path).collect();
+    let call = check(&python, "check_schema.py", &paths);
+    assert_eq!(call.code, 0, "{}{}", call.stdout, call.stderr);
+    let counts: Value = serde_json::from_str(&call.stdout).unwrap();
+    assert!(counts["studies"].as_u64() >= Some(17) && counts["broken"].as_u64() >= Some(150), "{counts}");
+}
+
 /// The page on rovers: efficiencies, intraclass correlations and distance budgets come out of the rows again, every query runs.
 #[test]
 fn val_rover_pages_follow_from_their_rows() {

@@ -45,5 +45,5 @@ pub use equivalence::MeanDifference;
 pub use incidence::{Ending, Incidence};
 pub use intraclass::Intraclass;
 pub use multiple::holm;
-pub use permutation::{Arrangements, Permutation};
+pub use permutation::{Arrangements, Permutation, least_p_apart, least_p_in_blocks};
 pub use summary::BoxPlot;

@@ -154,6 +154,22 @@ fn normal_test(labels: &[usize], scores: &[f64], blocks: &[usize]) -> Option<Per
     fits.then_some(Permutation { observed, p, arrangements: Arrangements::Normal, least_p: 0.0 })
 }
 
+/// The least p that the two-sided test of groups with so many values could have, whatever the values: groups apart, all in one block.
+pub fn least_p_apart(sizes: &[usize]) -> f64 {
+    least_p(&labels_of(sizes), &[sizes.iter().sum()])
+}
+
+/// The same of `blocks` blocks with one value of each of `groups` groups.
+pub fn least_p_in_blocks(groups: usize, blocks: usize) -> f64 {
+    let labels: Vec<usize> = (0..blocks).flat_map(|_| 0..groups).collect();
+    least_p(&labels, &vec![groups; blocks])
+}
+
+fn least_p(labels: &[usize], blocks: &[usize]) -> f64 {
+    let extreme = if have_mirror_images(labels, blocks) { 2.0 } else { 1.0 };
+    (extreme / number_of_arrangements(labels, blocks)).min(1.0)
+}
+
 /// True when labels in each block, turned from the largest to the least, are the same labels.
 fn have_mirror_images(labels: &[usize], blocks: &[usize]) -> bool {
     let mut sorted = labels.to_vec();

@@ -4,6 +4,7 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 use sastrugi_schemas::study::Simulator;
+use sastrugi_stages::starting::STARTING;
 use sastrugi_store::dem::points::Statistic;
 use std::path::{Path, PathBuf};
 
@@ -40,13 +41,18 @@ pub struct Common {
 /// Verbs.
 #[derive(Debug, Subcommand)]
 pub enum Verb {
+    /// Write a small commented study to start from, and the schema that lets editors check it.
+    #[command(after_help = init_help())]
+    Init(Init),
     /// Run a study to a release; goes on where an earlier run stopped.
     #[command(
         after_help = "Examples:\n  sastrugi run study.toml -o release\n  sastrugi run study.toml -o part1 --shard 1/3"
     )]
     Run(Run),
     /// Say what a run would do, how much it is, and why each stale item is stale.
-    #[command(after_help = "Example:\n  sastrugi plan study.toml -o release")]
+    #[command(
+        after_help = "Examples:\n  sastrugi plan study.toml -o release\n  sastrugi plan study.toml -o part1 --shard 1/3"
+    )]
     Plan(Plan),
     /// Join shards to a release, equal byte by byte to an unsharded run.
     #[command(after_help = "Example:\n  sastrugi merge part1 part2 part3 -o release")]
@@ -190,7 +196,9 @@ pub enum Verb {
     #[command(after_help = "Examples:\n  sastrugi kinds\n  sastrugi kinds multifractal")]
     Kinds(Kinds),
     /// Print the JSON Schema of study files, or the columns of a table.
-    #[command(after_help = "Examples:\n  sastrugi schema\n  sastrugi schema missions\n  sastrugi schema /wheels")]
+    #[command(
+        after_help = "Examples:\n  sastrugi schema > study.schema.json\n  sastrugi schema --markdown\n  sastrugi schema missions\n  sastrugi schema /wheels"
+    )]
     Schema(Schema),
     /// Print shell completions.
     #[command(
@@ -239,6 +247,22 @@ pub struct Place {
     pub work: Option<PathBuf>,
 }
 
+/// `init`.
+#[derive(Debug, Args)]
+pub struct Init {
+    /// What the study is for.
+    #[arg(default_value = STARTING[0].name, value_parser = PossibleValuesParser::new(STARTING.map(|s| s.name)))]
+    pub kind: String,
+    /// Study file to write; it must not exist.
+    #[arg(short, long, value_name = "FILE", default_value = "study.toml")]
+    pub output: PathBuf,
+}
+
+fn init_help() -> String {
+    let kinds: Vec<String> = STARTING.iter().map(|s| format!("  {:<16} {}", s.name, s.summary)).collect();
+    format!("Kinds:\n{}\n\nExamples:\n  sastrugi init\n  sastrugi init texture -o snow.toml", kinds.join("\n"))
+}
+
 /// `run`.
 #[derive(Debug, Args)]
 pub struct Run {
@@ -266,6 +290,9 @@ pub struct Plan {
     /// Where.
     #[command(flatten)]
     pub place: Place,
+    /// Plan one of N shards (I = 1..N), with what its items need.
+    #[arg(long, value_name = "I/N")]
+    pub shard: Option<String>,
 }
 
 /// `merge`.
@@ -512,12 +539,12 @@ pub struct Texture {
     /// `--onto` (a measured background), else `surface`.
     #[arg(long, value_name = "surface|residual")]
     pub covariance: Option<String>,
-    /// Raster of factors, 0 or above, by which the texture is multiplied on its base.
-    #[arg(long, value_name = "RASTER")]
-    pub amplitude: Option<PathBuf>,
+    /// Factor on the heights of the texture, above 0: one number, or with `--onto` a raster of factors, 0 or above.
+    #[arg(long, value_name = "FACTOR|RASTER")]
+    pub amplitude: Option<String>,
     /// Fill the holes of this DEM with texture that fits what is around them; makes no other texture. `--cell` is for a DEM that
     /// states none.
-    #[arg(long, value_name = "DEM", conflicts_with_all = ["onto", "size", "tile", "phase", "method", "covariance", "set"])]
+    #[arg(long, value_name = "DEM", conflicts_with_all = ["onto", "size", "tile", "phase", "method", "covariance", "amplitude", "set"])]
     pub fill: Option<PathBuf>,
     /// Any other parameter of the method (see `kinds`), `name=value`.
     #[arg(long = "set", value_name = "K=V")]
@@ -960,6 +987,9 @@ pub struct Kinds {
 pub struct Schema {
     /// `study` (default), `tables`, `topics`, or the name of a table or topic.
     pub name: Option<String>,
+    /// Print the reference of study files as Markdown.
+    #[arg(long)]
+    pub markdown: bool,
 }
 
 /// `completions`.

@@ -1,9 +1,12 @@
 //! The `sastrugi` command: reads arguments, calls the stages, prints, and ends with a documented exit code.
 
 mod args;
+mod examples;
 mod failure;
 mod output;
+mod parameters;
 mod progress;
+mod reference;
 mod signals;
 mod verbs;
 

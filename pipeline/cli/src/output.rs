@@ -3,6 +3,7 @@
 use crate::failure::Failure;
 use miette::{GraphicalReportHandler, GraphicalTheme, LabeledSpan, MietteDiagnostic, NamedSource, Report};
 use sastrugi_stages::Error;
+use sastrugi_stages::study::{Refusals, StudyError};
 use serde_json::Value;
 use std::io::{IsTerminal, Write};
 use std::ops::Range;
@@ -10,6 +11,9 @@ use std::process::ExitCode;
 
 /// A place farther right is told by its number: the drawing of a line that long helps nobody, and `miette` counts columns in 16 bits.
 const COLUMNS_SHOWN: usize = 1000;
+
+/// Reasons of a refusal that are drawn; a file of another kind would have thousands.
+const REFUSALS_SHOWN: usize = 20;
 
 /// Prints JSON when asked for, else the text.
 ///
@@ -39,13 +43,24 @@ pub fn warn(line: &str) {
 pub fn report(failure: Failure) -> ExitCode {
     let code = failure.code();
     match failure.0 {
-        Error::Study { name, text, error } => print_study_error(&name, &text, &error),
+        Error::Study { name, text, refusals } => print_refusals(&name, &text, &refusals),
         Error::Usage(m) | Error::Input(m) | Error::Failed(m) | Error::Retry(m) => warn(&format!("sastrugi: {m}")),
     }
     code.into()
 }
 
-fn print_study_error(name: &str, text: &str, error: &sastrugi_stages::study::StudyError) {
+/// What is wrong in a study, each place drawn.
+fn print_refusals(name: &str, text: &str, refusals: &Refusals) {
+    let Refusals(errors) = refusals;
+    let number = if errors.len() == 1 { String::new() } else { format!(" for {} reasons", errors.len()) };
+    let drawn: Vec<String> = errors.iter().take(REFUSALS_SHOWN).map(|error| drawn(name, text, error)).collect();
+    warn(&format!("sastrugi: the study is refused{number}\n{}", drawn.join("\n")));
+    if errors.len() > REFUSALS_SHOWN {
+        warn(&format!("... and {} more", errors.len() - REFUSALS_SHOWN));
+    }
+}
+
+fn drawn(name: &str, text: &str, error: &StudyError) -> String {
     let mut diagnostic = MietteDiagnostic::new(error.message.clone());
     match error.span.clone() {
         Some(span) if is_narrow(text, &span) => diagnostic = diagnostic.with_label(LabeledSpan::underline(span)),
@@ -65,8 +80,8 @@ fn print_study_error(name: &str, text: &str, error: &sastrugi_stages::study::Stu
     let mut rendered = String::new();
     let handler = GraphicalReportHandler::new_themed(theme).with_width(100);
     match handler.render_report(&mut rendered, report.as_ref()) {
-        Ok(()) => warn(&format!("sastrugi: the study is refused\n{}", rendered.trim_end_matches('\n'))),
-        Err(_) => warn(&format!("sastrugi: {name}: {}", error.message)),
+        Ok(()) => rendered.trim_end_matches('\n').to_owned(),
+        Err(_) => format!("{name}: {}", error.message),
     }
 }
 

@@ -70,6 +70,13 @@ pub fn vehicle(kind: &str, changes: &Map<String, Value>) -> Result<Vehicle, Para
     Vehicle::new(kind, parameters).map_err(|e| e.within("vehicle_changes"))
 }
 
+/// Doubts about a vehicle that [`vehicle`] accepts, a sentence each: numbers that do not fit each other.
+pub fn doubts(kind: &str, changes: &Map<String, Value>) -> Vec<String> {
+    let base = vehicle(kind, &Map::new()).ok();
+    let base = base.as_ref().map(Vehicle::parameters);
+    vehicle(kind, changes).map(|changed| crate::vehicle::doubts(changed.parameters(), base)).unwrap_or_default()
+}
+
 /// One number of a run: what it is, its value as JSON, and where it comes from.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Number {
@@ -241,8 +248,8 @@ mod tests {
     fn val_kinds_show_values_and_sources() {
         let kinds = kinds();
         let husky = kinds.iter().find(|k| k.kind == "husky_a200").unwrap();
-        assert_eq!(husky.parameters["default"]["wheels"]["radius_m"], 0.1651);
-        assert!(husky.parameters["x-sources"]["wheels"]["radius_m"].is_string());
+        assert_eq!(husky.values().unwrap()["wheels"]["radius_m"], 0.1651);
+        assert!(husky.sources().unwrap()["wheels"]["radius_m"].is_string());
         assert!(vehicle("husky", &Map::new()).unwrap_err().message.contains("`husky_a200`"));
     }
 }

@@ -3,13 +3,13 @@
 use crate::job::ItemRef;
 use crate::operations::drawn::{Drawn, Routes};
 use crate::runner::graph::{Graph, InputFile, Node};
-use crate::study::{Entry, Study, StudyError};
+use crate::study::{Entry, Refusals, Study, StudyError, UNKNOWN_SECTION};
 use sastrugi_imaging::Sun;
 use sastrugi_numeric::{Geometry, Streams};
 use sastrugi_schemas::fit::Source;
 use sastrugi_schemas::study::Pairing;
 use serde_json::Value;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
 /// Suffixes that files of the release add to an id.
@@ -32,10 +32,48 @@ const RESERVED: [&str; 11] = [
 pub enum BuildError {
     /// The study is wrong.
     #[error(transparent)]
-    Study(#[from] StudyError),
+    Study(#[from] Refusals),
     /// An input file is missing or cannot be read.
     #[error("{0}")]
     Input(String),
+}
+
+impl From<StudyError> for BuildError {
+    fn from(error: StudyError) -> Self {
+        Self::Study(error.into())
+    }
+}
+
+/// What was refused so far.
+#[derive(Default)]
+struct Refused {
+    errors: Vec<StudyError>,
+    /// Input files.
+    inputs: Vec<String>,
+    /// Ids of refused tables: that they are not in the graph is no error of whoever names them.
+    ids: BTreeSet<String>,
+    /// True when a refused table has no id that can be read.
+    nameless: bool,
+}
+
+impl Refused {
+    fn add(&mut self, error: BuildError) {
+        match error {
+            BuildError::Study(Refusals(errors)) => self.errors.extend(errors),
+            BuildError::Input(message) => self.inputs.push(message),
+        }
+    }
+
+    fn table(&mut self, id: Option<&str>) {
+        self.nameless |= id.is_none();
+        self.ids.extend(id.map(str::to_owned));
+    }
+
+    /// True for an id of a refused table, or of what belongs to it (`<id>-0001`, `<id>.albedo`).
+    fn holds(&self, id: &str) -> bool {
+        let ends = id.match_indices(['-', '.']).map(|(at, _)| at).chain([id.len()]);
+        self.nameless || ends.into_iter().any(|end| self.ids.contains(&id[..end]))
+    }
 }
 
 /// The file of every item that makes a heightfield.
@@ -46,8 +84,10 @@ pub const HEIGHTS: &str = "heights.tif";
 pub struct Heightfield {
     /// The item that makes it; its file is [`HEIGHTS`].
     pub item: ItemRef,
-    /// Label for statistics.
+    /// Label for statistics; of a DEM or texture its id, where the study gives none.
     pub group: Option<String>,
+    /// True when the study gives the label.
+    pub is_grouped: bool,
     /// What differs from other heightfields of the group.
     pub variant: Option<String>,
     /// Position among the replicates of its item, from 0; measured DEMs have none.
@@ -108,7 +148,10 @@ pub struct Builder<'a> {
     pub inputs: Vec<InputPlace>,
     /// The items so far.
     pub graph: Graph,
+    /// What makes no sense though it is allowed, for the user to know before the run.
+    pub doubts: Vec<String>,
     ids: BTreeMap<String, Origin>,
+    refused: Refused,
 }
 
 /// The table of a study that an id comes from: its section, and its place in it.
@@ -124,8 +167,8 @@ pub struct InputPlace {
 }
 
 impl<'a> Builder<'a> {
-    /// Begins the graph of a study.
-    pub fn new(study: &'a Study) -> Self {
+    /// Begins the graph of a study of which this is refused already.
+    pub fn new(study: &'a Study, errors: Vec<StudyError>) -> Self {
         Self {
             study,
             heightfields: BTreeMap::new(),
@@ -136,8 +179,61 @@ impl<'a> Builder<'a> {
             images: BTreeMap::new(),
             inputs: Vec::new(),
             graph: Graph::default(),
+            doubts: Vec::new(),
             ids: BTreeMap::new(),
+            refused: Refused {
+                // A section whose name is misspelt may hold what others name.
+                nameless: errors.iter().any(|e| e.message.starts_with(UNKNOWN_SECTION) && e.help.is_some()),
+                errors,
+                ..Refused::default()
+            },
         }
+    }
+
+    /// Adds the items of a section, table by table. What is wrong with one is kept for [`Self::check`] and keeps none of the others from
+    /// being read.
+    ///
+    /// # Errors
+    /// A section that is not an array of tables.
+    pub fn each(
+        &mut self,
+        section: &'static str,
+        mut add: impl FnMut(&mut Self, &Entry<'_>) -> Result<(), BuildError>,
+    ) -> Result<(), BuildError> {
+        for entry in self.study.entries(section)? {
+            if let Err(error) = add(self, &entry) {
+                self.refused.table(entry.id());
+                self.refused.add(error);
+            }
+        }
+        Ok(())
+    }
+
+    /// Keeps what is wrong with a section as a whole.
+    pub fn refuse(&mut self, error: BuildError) {
+        self.refused.table(None);
+        self.refused.add(error);
+    }
+
+    /// True when something was refused.
+    pub fn has_refused(&self) -> bool {
+        !self.refused.errors.is_empty() || !self.refused.inputs.is_empty()
+    }
+
+    /// All that was refused, at once.
+    ///
+    /// # Errors
+    /// When anything was.
+    pub fn check(&mut self) -> Result<(), BuildError> {
+        let refused = std::mem::take(&mut self.refused);
+        let is_own = |error: &StudyError| error.missing_id.as_ref().is_none_or(|id| !refused.holds(id));
+        let mut errors: Vec<StudyError> = refused.errors.iter().filter(|error| is_own(error)).cloned().collect();
+        let inputs = refused.inputs;
+        if errors.is_empty() && !inputs.is_empty() {
+            return Err(BuildError::Input(inputs.join("; ")));
+        }
+        errors.extend(inputs.into_iter().map(|message| StudyError::at(None, message)));
+        Ok(Refusals::none(errors)?)
     }
 
     /// Takes an id; ids are unique in a study, across sections.
@@ -239,9 +335,8 @@ pub fn unknown_id<'s>(entry: &Entry<'_>, key: &str, id: &str, known: impl Iterat
     let known: Vec<&str> = known.map(String::as_str).collect();
     let nearest = crate::study::keys::nearest(id, known.iter().copied()).map(|n| format!("did you mean \"{n}\"?"));
     let list = if known.is_empty() { "there are none".to_owned() } else { format!("there are {}", known.join(", ")) };
-    entry
-        .error(key, format!("`{key}` names \"{id}\", which no item before it has"))
-        .with_help(Some(nearest.unwrap_or(list)))
+    let error = entry.error(key, format!("`{key}` names \"{id}\", which no item before it has"));
+    StudyError { missing_id: Some(id.to_owned()), ..error.with_help(Some(nearest.unwrap_or(list))) }
 }
 
 /// Word of the random streams that replicate `replicate` (from 0) shares with that of other items when they are paired.

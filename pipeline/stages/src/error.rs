@@ -5,7 +5,7 @@ use crate::job::{Cause, JobError};
 use crate::machine::{Fault, fault};
 use crate::runner::cache::CacheError;
 use crate::runner::execute::Stopped;
-use crate::study::StudyError;
+use crate::study::Refusals;
 use sastrugi_schemas::ParameterError;
 use sastrugi_store::release::ReleaseError;
 use sastrugi_texture::FitError;
@@ -15,14 +15,14 @@ use std::path::Path;
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// The study's text is wrong.
-    #[error("{name}: {error}")]
+    #[error("{name}: {refusals}")]
     Study {
         /// Name of the file.
         name: String,
         /// Its text.
         text: String,
         /// What is wrong, and where.
-        error: StudyError,
+        refusals: Refusals,
     },
     /// The call is wrong.
     #[error("{0}")]
@@ -122,7 +122,7 @@ impl From<ParameterError> for Error {
 /// Joins an error of the graph to the text that it is about.
 pub fn of_build(name: &str, text: &str, error: BuildError) -> Error {
     match error {
-        BuildError::Study(error) => Error::Study { name: name.to_owned(), text: text.to_owned(), error },
+        BuildError::Study(refusals) => Error::Study { name: name.to_owned(), text: text.to_owned(), refusals },
         BuildError::Input(message) => Error::Input(message),
     }
 }

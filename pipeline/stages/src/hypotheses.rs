@@ -1,39 +1,53 @@
 //! `[[hypothesis]]`: claims that are part of the study, and so of its hash, before anything runs. No item comes of them and no key
 //! holds them; the report tests them.
 
-use crate::builder::{BuildError, Builder};
+use crate::builder::{BuildError, Builder, Heightfield};
 use crate::jobs::traverse;
 use crate::study::keys::nearest;
 use crate::study::{Entry, StudyError};
 use sastrugi_schemas::ParameterError;
-use sastrugi_schemas::study::{HypothesisItem, TraverseItem};
+use sastrugi_schemas::study::{HypothesisItem, HypothesisTest, TraverseItem};
+use sastrugi_statistics::{holm, least_p_apart, least_p_in_blocks};
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 
+/// Number of terrains of a group that is enough for any claim.
+const UNITS_ENOUGH: usize = 100;
 /// Name of the section.
 pub const SECTION: &str = "hypothesis";
 
 /// Checks the hypotheses of a study against the groups that are driven in it.
 ///
 /// # Errors
-/// The first one that no test can be made of.
+/// A section that is not an array of tables.
 pub fn check(builder: &mut Builder<'_>) -> Result<(), BuildError> {
+    // Groups of a study that is refused so far may be those of what was refused.
+    let groups_are_known = !builder.has_refused();
     let mut families = BTreeMap::new();
-    for entry in builder.study.entries(SECTION)? {
-        let (item, rest): (HypothesisItem, Value) = entry.read()?;
-        entry.check_keys::<HypothesisItem>(&rest, &json!({}))?;
-        builder.claim(&entry, SECTION, &item.id)?;
-        item.check().map_err(|e| entry.refuse(e))?;
-        let known = groups(builder);
-        let unknown = item.groups.iter().enumerate().find(|(_, group)| !known.contains(group.as_str()));
-        if let Some((k, group)) = unknown {
-            let error = entry.error(&format!("groups.{k}"), format!("no missions are driven in a group \"{group}\""));
-            return Err(suggesting(error, group, &known).into());
-        }
-        check_run(builder, &entry, &item)?;
-        check_level(&mut families, &entry, &item)?;
+    builder.each(SECTION, |builder, entry| check_table(builder, entry, &mut families, groups_are_known))
+}
+
+fn check_table(
+    builder: &mut Builder<'_>,
+    entry: &Entry<'_>,
+    families: &mut BTreeMap<String, f64>,
+    groups_are_known: bool,
+) -> Result<(), BuildError> {
+    let (item, rest): (HypothesisItem, Value) = entry.read()?;
+    entry.check_keys::<HypothesisItem>(&rest, &json!({}))?;
+    builder.claim(entry, SECTION, &item.id)?;
+    item.check().map_err(|e| entry.refuse(e))?;
+    check_level(families, entry, &item)?;
+    if !groups_are_known {
+        return Ok(());
     }
-    Ok(())
+    let known = groups(builder);
+    let unknown = item.groups.iter().enumerate().find(|(_, group)| !known.contains(group.as_str()));
+    if let Some((k, group)) = unknown {
+        let error = entry.error(&format!("groups.{k}"), format!("no missions are driven in a group \"{group}\""));
+        return Err(suggesting(error, group, &known).into());
+    }
+    check_run(builder, entry, &item)
 }
 
 fn suggesting(error: StudyError, group: &str, known: &BTreeSet<&str>) -> StudyError {
@@ -85,6 +99,124 @@ fn check_run(builder: &Builder<'_>, entry: &Entry<'_>, item: &HypothesisItem) ->
         _ => return Ok(()),
     };
     Err(entry.refuse(ParameterError::new("traverse", message)).into())
+}
+
+/// Claims that no data of so many terrains could support, after Holm's adjustment over their family, as the report tests them.
+pub fn doubts(builder: &Builder<'_>) -> Vec<String> {
+    // Each was checked when it was added.
+    let entries = builder.study.entries(SECTION).unwrap_or_default();
+    let claims: Vec<HypothesisItem> =
+        entries.iter().filter_map(|entry| entry.read::<HypothesisItem>().ok()).map(|(item, _)| item).collect();
+    let units: Vec<Option<Units>> = claims.iter().map(|claim| Units::of(builder, claim)).collect();
+    let least: Vec<f64> = claims.iter().zip(&units).map(|(claim, units)| least_p(claim, units.as_ref())).collect();
+    let adjusted = |least: &[f64], k: usize| {
+        let family: Vec<usize> = (0..claims.len()).filter(|&other| claims[other].family == claims[k].family).collect();
+        let all = holm(&family.iter().map(|&other| least[other]).collect::<Vec<_>>());
+        family.iter().zip(all).find(|(other, _)| **other == k).map_or(f64::NAN, |(_, p)| p)
+    };
+    let doubt = |(k, claim): (usize, &HypothesisItem)| {
+        let (units, p) = (units[k].as_ref()?, adjusted(&least, k));
+        if p.is_nan() || p <= claim.alpha {
+            return None;
+        }
+        let enough = (2..UNITS_ENOUGH).find(|&n| {
+            let mut more = least.clone();
+            more[k] = units.with(n).least_p();
+            adjusted(&more, k) <= claim.alpha
+        });
+        let over_family = if p > least[k] { " over its family" } else { "" };
+        let advice = enough.map(|n| format!("; use at least {n} {} per group", units.name())).unwrap_or_default();
+        Some(format!(
+            "hypothesis \"{}\" cannot be supported at level {}: with {} the smallest possible p is {p:.2}{over_family}{advice}",
+            claim.id, claim.alpha, units
+        ))
+    };
+    claims.iter().enumerate().filter_map(doubt).collect()
+}
+
+/// What counts once in the test of a claim.
+#[derive(Clone)]
+enum Units {
+    /// Terrains of each group.
+    Apart(Vec<usize>),
+    /// Blocks of terrains that share their draws, and the number of groups.
+    Blocks(usize, usize),
+}
+
+impl Units {
+    /// As far as the claim names groups whose terrains are driven, in runs without a sweep; values of swept terrains are variants.
+    fn of(builder: &Builder<'_>, claim: &HypothesisItem) -> Option<Self> {
+        let runs = builder.study.entries(traverse::STAGE).ok()?;
+        let runs = runs.iter().filter_map(|entry| entry.read::<TraverseItem>().ok()).map(|(run, _)| run);
+        let named = |run: &TraverseItem| claim.traverse.as_ref().is_none_or(|name| *name == run.id);
+        let runs: Vec<TraverseItem> = runs.filter(|run| run.sweep.is_empty() && named(run)).collect();
+        let lines = || runs.iter().filter_map(|run| builder.missions.get(&run.missions)).flat_map(|drawn| &drawn.lines);
+        let of_group = |group: &String| -> BTreeMap<&str, Option<u64>> {
+            let of =
+                |field: &Heightfield| field.variant.is_none() && field.group.as_ref().unwrap_or(&field.kind) == group;
+            let fields = &builder.heightfields;
+            let chosen = lines().filter(|one| fields.get(&one.heightfield).is_some_and(of));
+            chosen.map(|one| (one.heightfield.as_str(), one.shared)).collect()
+        };
+        let groups: Vec<BTreeMap<&str, Option<u64>>> = claim.groups.iter().map(of_group).collect();
+        if groups.iter().any(BTreeMap::is_empty) {
+            return None;
+        }
+        let shared = |group: &BTreeMap<&str, Option<u64>>| group.values().copied().collect::<Option<BTreeSet<u64>>>();
+        let blocks = groups
+            .iter()
+            .map(shared)
+            .collect::<Option<Vec<_>>>()
+            .and_then(|all| all.into_iter().reduce(|common, other| common.intersection(&other).copied().collect()));
+        match blocks {
+            Some(blocks) if !blocks.is_empty() => Some(Self::Blocks(groups.len(), blocks.len())),
+            _ => Some(Self::Apart(groups.iter().map(BTreeMap::len).collect())),
+        }
+    }
+
+    /// The least p of their test.
+    fn least_p(&self) -> f64 {
+        match self {
+            Self::Apart(sizes) => least_p_apart(sizes),
+            Self::Blocks(groups, blocks) => least_p_in_blocks(*groups, *blocks),
+        }
+    }
+
+    /// The same with so many of each group.
+    fn with(&self, count: usize) -> Self {
+        match self {
+            Self::Apart(sizes) => Self::Apart(vec![count; sizes.len()]),
+            Self::Blocks(groups, _) => Self::Blocks(*groups, count),
+        }
+    }
+
+    fn name(&self) -> &'static str {
+        match self {
+            Self::Apart(_) => "terrains",
+            Self::Blocks(..) => "paired terrains",
+        }
+    }
+}
+
+impl std::fmt::Display for Units {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Apart(sizes) => {
+                let sizes: Vec<String> = sizes.iter().map(ToString::to_string).collect();
+                let (last, first) = sizes.split_last().map_or(("", &[][..]), |(last, first)| (last.as_str(), first));
+                write!(f, "{} and {last} terrains", first.join(", "))
+            }
+            Self::Blocks(_, blocks) => write!(f, "{blocks} paired terrains"),
+        }
+    }
+}
+
+/// Of equivalence there is no least p, as none of groups that are not driven.
+fn least_p(claim: &HypothesisItem, units: Option<&Units>) -> f64 {
+    match (claim.test, units) {
+        (HypothesisTest::Equivalence, _) | (_, None) => 0.0,
+        (_, Some(units)) => units.least_p(),
+    }
 }
 
 /// Refuses another level than that of the family: it is shared.

@@ -16,6 +16,7 @@ mod revision;
 pub mod runner;
 pub mod schema;
 pub mod splits;
+pub mod starting;
 pub mod studies;
 pub mod study;
 pub mod verbs;

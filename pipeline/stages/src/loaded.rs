@@ -2,10 +2,11 @@
 
 use crate::builder::{BuildError, Builder, Heightfield, InputPlace, Origin};
 use crate::error::{Error, of_build};
+use crate::hypotheses;
 use crate::registry::{self, SECTIONS};
 use crate::runner::graph::Graph;
 use crate::splits::{self, Splits};
-use crate::study::Study;
+use crate::study::{Study, StudyError};
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::Path;
@@ -22,6 +23,8 @@ pub struct Loaded {
     pub splits: Splits,
     /// The table that each id comes from.
     pub origins: BTreeMap<String, Origin>,
+    /// What makes no sense though it is allowed, a sentence each.
+    pub doubts: Vec<String>,
     /// Its heightfields by id.
     pub(crate) heightfields: BTreeMap<String, Heightfield>,
 }
@@ -54,12 +57,9 @@ fn io_reason(error: &std::io::Error) -> String {
 /// # Errors
 /// As [`load`].
 pub fn load_text(text: &str, name: &str, folder: &Path) -> Result<Loaded, Error> {
-    let study = Study::parse(text, folder, &registry::section_names()).map_err(|error| Error::Study {
-        name: name.to_owned(),
-        text: text.to_owned(),
-        error,
-    })?;
-    let plan = build(&study).map_err(|error| of_build(name, text, error))?;
+    let refused = |error: BuildError| of_build(name, text, error);
+    let (study, errors) = Study::read(text, folder, &registry::section_names()).map_err(|e| refused(e.into()))?;
+    let plan = build(&study, errors).map_err(refused)?;
     if plan.graph.is_empty() {
         return Err(Error::Usage(format!("{name}: the study has no items; add [[terrain]], [[dem]] ...")));
     }
@@ -70,6 +70,7 @@ pub fn load_text(text: &str, name: &str, folder: &Path) -> Result<Loaded, Error>
         released,
         splits: plan.splits,
         origins: plan.origins,
+        doubts: plan.doubts,
         heightfields: plan.heightfields,
     })
 }
@@ -100,6 +101,8 @@ struct Plan {
     splits: Splits,
     /// The table that each id comes from.
     origins: BTreeMap<String, Origin>,
+    /// What makes no sense though it is allowed.
+    doubts: Vec<String>,
     /// Heightfields by id.
     heightfields: BTreeMap<String, Heightfield>,
 }
@@ -107,13 +110,19 @@ struct Plan {
 /// Builds the graph of a study. Input files are hashed, nothing else is read.
 ///
 /// # Errors
-/// The first thing that is wrong with the study, or an input file that cannot be read.
-fn build(study: &Study) -> Result<Plan, BuildError> {
-    let mut builder = Builder::new(study);
+/// All that is wrong with the study, `errors` among it, or input files that cannot be read.
+fn build(study: &Study, errors: Vec<StudyError>) -> Result<Plan, BuildError> {
+    let mut builder = Builder::new(study, errors);
     for section in &SECTIONS {
-        (section.add)(&mut builder)?;
+        if let Err(error) = (section.add)(&mut builder) {
+            builder.refuse(error);
+        }
     }
+    builder.check()?;
     let splits = splits::draw(study, &builder.heightfields, &builder.graph)?;
     let origins = builder.origins().clone();
-    Ok(Plan { graph: builder.graph, inputs: builder.inputs, splits, origins, heightfields: builder.heightfields })
+    let mut doubts = std::mem::take(&mut builder.doubts);
+    doubts.extend(hypotheses::doubts(&builder));
+    let Builder { graph, inputs, heightfields, .. } = builder;
+    Ok(Plan { graph, inputs, splits, origins, doubts, heightfields })
 }

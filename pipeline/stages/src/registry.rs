@@ -3,6 +3,7 @@
 use crate::builder::{BuildError, Builder};
 use crate::hypotheses;
 use crate::jobs;
+use crate::study::keys::properties;
 use sastrugi_schemas::Kind;
 use sastrugi_schemas::kind::schema_of;
 use sastrugi_schemas::study as envelope;
@@ -20,6 +21,27 @@ pub struct Section {
     pub kinds: fn() -> Vec<Kind>,
     /// Adds the section's items to the graph.
     pub add: fn(&mut Builder<'_>) -> Result<(), BuildError>,
+}
+
+/// Keys by which a table says of which kind it is.
+const SELECTORS: [&str; 2] = ["kind", "method"];
+
+impl Section {
+    /// The key of the envelope by which a table says of which kind it is, if there is one.
+    pub fn selector(&self) -> Option<&'static str> {
+        let keys = properties(&(self.envelope)());
+        SELECTORS.into_iter().find(|selector| keys.iter().any(|key| key == selector))
+    }
+
+    /// The kinds whose tables have keys of their own: the first alone where all have the same and no key of the envelope tells them apart.
+    pub fn distinct_kinds(&self) -> Vec<Kind> {
+        let mut kinds = (self.kinds)();
+        let own = |kind: &Kind| kind.parameters["properties"].clone();
+        if self.selector().is_none() && kinds.iter().all(|kind| own(kind) == own(&kinds[0])) {
+            kinds.truncate(1);
+        }
+        kinds
+    }
 }
 
 /// How a section is written.
@@ -140,7 +162,6 @@ pub fn kinds() -> Vec<Kind> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::study::keys::properties;
 
     /// A key of an envelope would never reach a generator.
     #[test]

@@ -1,58 +1,119 @@
-//! JSON Schema of a study file.
+//! JSON Schema of a study file (draft 2020-12): for validators, and for editors that complete and check as people write.
+//!
+//! All definitions stand at the root, named by where they come from (`terrain`, `terrain.multifractal`, `terrain.multifractal.RawLayer`), so that
+//! every reference can be followed. Each kind of a section is a choice with all keys of its tables.
 
-use crate::registry::{Form, SECTIONS};
+use crate::registry::{Form, SECTIONS, Section};
+use sastrugi_schemas::Kind;
 use sastrugi_schemas::kind::schema_of;
 use sastrugi_schemas::study::StudyHead;
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
+
+/// Key of a table that names several kinds at once, and holds the keys of all of them.
+const SEVERAL: &str = "methods";
 
 /// JSON Schema of a study file.
 pub fn study_schema() -> Value {
-    let mut properties = serde_json::Map::new();
-    properties.insert("study".to_owned(), schema_of::<StudyHead>());
+    let mut definitions = Map::new();
+    let mut properties = Map::new();
+    properties.insert("study".to_owned(), hoist("study", schema_of::<StudyHead>(), &mut definitions));
     for section in &SECTIONS {
-        if section.form == Form::Table {
-            properties.insert(section.name.to_owned(), (section.envelope)());
-            continue;
-        }
-        let kinds: Vec<Value> = (section.kinds)()
-            .into_iter()
-            .map(|k| json!({ "title": k.kind, "description": k.summary, "parameters": k.parameters }))
-            .collect();
-        let items = json!({ "envelope": (section.envelope)(), "kinds": kinds });
-        properties.insert(section.name.to_owned(), json!({ "type": "array", "items": items_schema(&items) }));
+        let table = table(section, &mut definitions);
+        let section_schema = match section.form {
+            Form::Table => table,
+            Form::Array => json!({ "type": "array", "items": table }),
+        };
+        properties.insert(section.name.to_owned(), section_schema);
     }
     json!({
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "sastrugi study",
+        "description": "A study: what is measured, generated, fitted, synthesised, driven and tested.",
         "type": "object",
         "required": ["study"],
         "additionalProperties": false,
         "properties": properties,
+        "$defs": definitions,
     })
 }
 
-/// An item's keys: the envelope's and those of any of the section's kinds.
-fn items_schema(parts: &Value) -> Value {
-    let mut item = parts["envelope"].clone();
-    let mut definitions = item.get("$defs").cloned().unwrap_or_else(|| json!({}));
-    let mut choices = Vec::new();
-    for kind in parts["kinds"].as_array().into_iter().flatten() {
-        if let Some(more) = kind["parameters"].get("$defs").and_then(Value::as_object) {
-            more.iter().for_each(|(k, v)| definitions[k] = v.clone());
-        }
-        choices.push(json!({
-            "title": kind["title"],
-            "description": kind["description"],
-            "properties": kind["parameters"]["properties"],
-        }));
-    }
-    if let Some(object) = item.as_object_mut() {
-        object.remove("additionalProperties");
+/// Moves a schema and its definitions to the root; what stands in its place.
+fn hoist(name: &str, mut schema: Value, definitions: &mut Map<String, Value>) -> Value {
+    if let Some(object) = schema.as_object_mut() {
         object.remove("$schema");
-        object.insert("$defs".to_owned(), definitions);
-        if !choices.is_empty() {
-            object.insert("anyOf".to_owned(), Value::Array(choices));
+        let own = object.remove("$defs");
+        for (inner, mut definition) in own.and_then(|d| d.as_object().cloned()).unwrap_or_default() {
+            rename(&mut definition, name);
+            definitions.insert(format!("{name}.{inner}"), definition);
         }
     }
-    item
+    rename(&mut schema, name);
+    definitions.insert(name.to_owned(), schema);
+    reference(name)
+}
+
+fn reference(name: &str) -> Value {
+    json!({ "$ref": format!("#/$defs/{name}") })
+}
+
+/// References as they are at the root.
+fn rename(schema: &mut Value, name: &str) {
+    match schema {
+        Value::Object(map) => map.iter_mut().for_each(|(key, value)| match value {
+            Value::String(target) if key == "$ref" => *target = target.replace("#/$defs/", &format!("#/$defs/{name}.")),
+            _ => rename(value, name),
+        }),
+        Value::Array(list) => list.iter_mut().for_each(|value| rename(value, name)),
+        _ => {}
+    }
+}
+
+/// A table of a section: the envelope's keys, and those of the kind that it is of.
+fn table(section: &Section, definitions: &mut Map<String, Value>) -> Value {
+    let place = hoist(section.name, (section.envelope)(), definitions);
+    let envelope = definitions.get(section.name).and_then(|e| e["properties"].as_object()).cloned().unwrap_or_default();
+    let (selector, kinds) = (section.selector(), section.distinct_kinds());
+    let mut own: Vec<(String, Map<String, Value>)> = Vec::new();
+    for kind in &kinds {
+        let name = format!("{}.{}", section.name, kind.kind);
+        hoist(&name, parameters_of(kind), definitions);
+        let properties = definitions.get(&name).and_then(|k| k["properties"].as_object()).cloned().unwrap_or_default();
+        own.push((name, properties));
+    }
+    let side_by_side = envelope.contains_key(SEVERAL).then(|| {
+        let all = own.iter().flat_map(|(_, properties)| properties.clone()).collect();
+        let name = format!("{}.{SEVERAL}", section.name);
+        definitions.insert(name.clone(), json!({ "title": SEVERAL, "required": [SEVERAL] }));
+        (name, all)
+    });
+    let mut choices = Vec::new();
+    for (name, properties) in own.into_iter().chain(side_by_side) {
+        let Some(definition) = definitions.get_mut(&name) else { continue };
+        let title = definition["title"].clone();
+        definition["properties"] = Value::Object(envelope.clone().into_iter().chain(properties).collect());
+        if let Some(key) = selector.filter(|_| title != SEVERAL) {
+            definition["properties"][key] = json!({ "const": title });
+        }
+        // In every choice, not beside them: editors that know earlier drafts of JSON Schema pass over `unevaluatedProperties`.
+        definition["additionalProperties"] = Value::Bool(false);
+        choices.push(reference(&name));
+    }
+    if let Some(envelope) =
+        definitions.get_mut(section.name).and_then(Value::as_object_mut).filter(|_| !choices.is_empty())
+    {
+        envelope.remove("additionalProperties");
+        envelope.insert("anyOf".to_owned(), Value::Array(choices));
+    }
+    place
+}
+
+/// What a table of a kind has beside its envelope. Keys that are required may come from a sweep, so none is here.
+fn parameters_of(kind: &Kind) -> Value {
+    let mut parameters = kind.parameters.clone();
+    if let Some(object) = parameters.as_object_mut() {
+        ["required", "default"].into_iter().for_each(|key| drop(object.remove(key)));
+        object.insert("title".to_owned(), kind.kind.into());
+        object.insert("description".to_owned(), format!("{} Source: {}", kind.summary, kind.source).into());
+    }
+    parameters
 }

@@ -10,7 +10,7 @@ use crate::job::ItemRef;
 use crate::runner::graph::Graph;
 use crate::study::{Study, StudyError};
 use sastrugi_numeric::Streams;
-use sastrugi_schemas::study::Pairing;
+use sastrugi_schemas::study::{Pairing, Shares};
 use sastrugi_schemas::tables::CellType;
 use sastrugi_schemas::{Cell, Table};
 use std::collections::{BTreeMap, BTreeSet};
@@ -49,7 +49,7 @@ struct Unit {
 /// # Errors
 /// A group with too few terrains.
 pub fn draw(study: &Study, fields: &BTreeMap<String, Heightfield>, graph: &Graph) -> Result<Splits, StudyError> {
-    let Some(shares) = study.head.split else { return Ok(Splits::new()) };
+    let Some(shares) = study.head.split.map(Shares::by_part) else { return Ok(Splits::new()) };
     let mut strata: BTreeMap<BTreeSet<String>, Vec<Unit>> = BTreeMap::new();
     for unit in units(study, fields, graph) {
         strata.entry(unit.groups.clone()).or_default().push(unit);
@@ -59,7 +59,7 @@ pub fn draw(study: &Study, fields: &BTreeMap<String, Heightfield>, graph: &Graph
     }
     let mut splits = Splits::new();
     for (groups, mut units) in strata {
-        let counts = counts(units.len(), &shares).ok_or_else(|| too_few(study, &groups, units.len(), &shares))?;
+        let counts = counts(units.len(), &shares).ok_or_else(|| too_few(study, &groups, &units, &shares))?;
         units.sort_by(|a, b| (a.rank, &a.terrains).cmp(&(b.rank, &b.terrains)));
         let parts = PARTS.into_iter().zip(counts).flat_map(|(part, count)| std::iter::repeat_n(part, count));
         for (unit, part) in units.into_iter().zip(parts) {
@@ -69,16 +69,27 @@ pub fn draw(study: &Study, fields: &BTreeMap<String, Heightfield>, graph: &Graph
     Ok(splits)
 }
 
-fn too_few(study: &Study, groups: &BTreeSet<String>, count: usize, shares: &[f64; 3]) -> StudyError {
+fn too_few(study: &Study, groups: &BTreeSet<String>, units: &[Unit], shares: &[f64; 3]) -> StudyError {
     let names: Vec<String> = groups.iter().map(|group| format!("\"{group}\"")).collect();
     let of = if names.is_empty() { "the study".to_owned() } else { format!("group {}", names.join(" with ")) };
     let parts = shares.iter().filter(|share| **share > 0.0).count();
+    let terrains = units.iter().map(|unit| unit.terrains.len()).sum::<usize>();
+    let counted = |count: usize, what: &str| format!("{count} {what}{}", if count == 1 { "" } else { "s" });
+    let tied = match units.iter().max_by_key(|unit| unit.terrains.len()) {
+        Some(Unit { terrains: tied, .. }) if terrains > units.len() => format!(
+            " in {} ({} belong together, made from one another or from the same random draws)",
+            counted(units.len(), "independent set"),
+            tied.join(", ")
+        ),
+        _ => String::new(),
+    };
     let message = format!(
-        "`split` asks for {parts} parts, but {of} has {count} terrain{} that can be parted; it takes at least one for each part",
-        if count == 1 { "" } else { "s" }
+        "`split` asks for {parts} parts, but {of} has {}{tied}; each part needs at least one",
+        counted(terrains, "terrain")
     );
     let span = study.span_of(&["study".to_owned(), "split".to_owned()]);
-    StudyError::at(span, message).with_help(Some("terrains without a `group` take no part".to_owned()))
+    let help = (!groups.is_empty()).then(|| "terrains without a `group` take no part".to_owned());
+    StudyError::at(span, message).with_help(help)
 }
 
 /// How many of `count` units go to each part: shares rounded by the largest remainders, at least one for each share above 0.
@@ -127,7 +138,7 @@ fn units(study: &Study, fields: &BTreeMap<String, Heightfield>, graph: &Graph) -
             rank: rank(),
         });
         unit.terrains.push(id.clone());
-        unit.groups.extend(field.group.clone());
+        unit.groups.extend(field.group.clone().filter(|_| field.is_grouped));
     }
     units.into_values().collect()
 }
@@ -231,12 +242,24 @@ mod tests {
         let text = format!("{HEAD}split = [0.7, 0.15, 0.15]\n{}{}", terrain("a", "a", 20), terrain("b", "b", 2));
         let error = splits(&text).unwrap_err();
         assert!(error.contains("group \"b\" has 2 terrains") && error.contains("3 parts"), "{error}");
+        let onto = "[[texture]]\nid = \"t\"\nfit = { model = \"exponential\", sigma_m = 0.03, range_m = 0.5 }\nonto = \"a-0001\"\ngroup = \"a\"\n\
+            size_m = [3.2, 3.2]\ncell_m = 0.05\n";
+        let error = splits(&format!("{HEAD}split = [0.7, 0.15, 0.15]\n{}{onto}", terrain("a", "a", 2))).unwrap_err();
+        assert!(error.contains("3 terrains in 2 independent sets (a-0001, t belong together"), "{error}");
         for (shares, words) in
             [("[0.5, 0.5, 0.5]", "add up to 1"), ("[1.2, -0.2, 0.0]", "0 to 1"), ("[1.0, 0.0, 0.0]", "two")]
         {
             let error = splits(&format!("{HEAD}split = {shares}\n{}", terrain("a", "a", 20))).unwrap_err();
             assert!(error.contains(words), "{shares}: {error}");
         }
+    }
+
+    #[test]
+    fn val_two_shares_are_train_and_test() {
+        let drawn = splits(&format!("{HEAD}split = [0.8, 0.2]\n{}", terrain("a", "a", 10))).unwrap();
+        assert_eq!(number(&drawn, "a"), [8, 0, 2]);
+        let error = splits(&format!("{HEAD}split = [1.0]\n{}", terrain("a", "a", 10))).unwrap_err();
+        assert!(error.contains("two or three parts"), "{error}");
     }
 
     #[test]

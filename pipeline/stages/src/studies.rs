@@ -63,8 +63,7 @@ pub fn run(loaded: &Loaded, request: &RunRequest<'_>, progress: &dyn Progress) -
     let work = request.work.map_or_else(|| default_work(request.output), Path::to_owned);
     let cache = Cache::open(&work)?;
     let graph = &loaded.graph;
-    let chosen = (0..graph.len()).filter(|&p| request.part.is_none_or(|part| part.owns(graph.key(p))));
-    let needed = graph.closure(chosen);
+    let needed = needed(loaded, request.part);
     check_memory(loaded, &cache, &needed, request.limits)?;
     let execution = execute(graph, &cache, &needed, request.limits, progress)?;
     write_timings(&cache, &execution)?;
@@ -91,6 +90,12 @@ pub fn run(loaded: &Loaded, request: &RunRequest<'_>, progress: &dyn Progress) -
     cache.drop_orphans(graph)?;
     let computed = execution.seconds.len() - execution.failures.iter().filter(|f| f.skipped_for.is_none()).count();
     Ok(RunSummary { output: request.output.to_owned(), items: needed.len(), computed, failures: execution.failures })
+}
+
+/// Items of a part of a study with those that they need; all of them without a part.
+fn needed(loaded: &Loaded, part: Option<Part>) -> Vec<usize> {
+    let graph = &loaded.graph;
+    graph.closure((0..graph.len()).filter(|&p| part.is_none_or(|part| part.owns(graph.key(p)))))
 }
 
 /// Refuses a run with an item that needs more memory by itself than there may be, before anything is computed.
@@ -180,9 +185,10 @@ fn write_timings(cache: &Cache, execution: &Execution) -> Result<(), Error> {
 ///
 /// # Errors
 /// When the work area cannot be read.
-pub fn plan_of(loaded: &Loaded, output: &Path, work: Option<&Path>) -> Result<PlanSummary, Error> {
+pub fn plan_of(loaded: &Loaded, output: &Path, work: Option<&Path>, part: Option<Part>) -> Result<PlanSummary, Error> {
     let work = work.map_or_else(|| default_work(output), Path::to_owned);
-    Ok(plan(&loaded.graph, &Cache::look(&work)))
+    let plan = plan(&loaded.graph, &needed(loaded, part), &Cache::look(&work));
+    Ok(PlanSummary { doubts: loaded.doubts.clone(), ..plan })
 }
 
 /// Joins shards to a release.
@@ -241,7 +247,7 @@ mod tests {
         let text = STUDY.replace("count = 2\n", "count = 2500\n").replace("id = \"m\"\n", "id = \"m\"\ncount = 20\n");
         let loaded = load_text(&text, "study", Path::new("")).unwrap();
         let nowhere = tempfile::tempdir().unwrap();
-        let summary = plan_of(&loaded, &nowhere.path().join("release"), None).unwrap();
+        let summary = plan_of(&loaded, &nowhere.path().join("release"), None, None).unwrap();
         // 2500 terrains of each of two cell sizes, in four stages; 20 missions on each.
         assert_eq!((summary.items, summary.ready, summary.stale.len()), (20_000, 0, 20_000));
         assert!(summary.stale.iter().all(|item| item.reason == "new"));

@@ -14,8 +14,10 @@ use sastrugi_stages::verbs::local::Local;
 use sastrugi_stages::verbs::roughness::{
     AerodynamicRoughness, ArealFigures, Bumps, Detrender, ObstacleHeight, Ride, RideRequest, WindEstimate, WindSettings,
 };
+use sastrugi_stages::verbs::texture::Amplitude;
 use sastrugi_stages::verbs::{self, numbers, parameters};
 use serde_json::{Value, json};
+use std::path::Path;
 
 /// `terrain`.
 pub fn terrain(args: &Terrain, common: &Common) -> Verdict {
@@ -50,12 +52,17 @@ pub fn texture(args: &Texture, common: &Common) -> Verdict {
         parameters: params,
         seed: args.seed.unwrap_or(0),
         onto: args.onto.as_deref(),
-        amplitude: args.amplitude.as_deref(),
+        amplitude: args.amplitude.as_deref().map(amplitude),
         fill: args.fill.as_deref(),
         output: &args.output,
         options: options(&args.writing, &args.output)?,
     };
     made(common, &verbs::texture::texture(&request)?)
+}
+
+/// A number, else a raster.
+fn amplitude(text: &str) -> Amplitude<'_> {
+    text.parse().map_or_else(|_| Amplitude::Raster(Path::new(text)), Amplitude::Factor)
 }
 
 /// A number as JSON, whole where it is, so that a count can be read from it.

@@ -4,6 +4,8 @@ use crate::Verdict;
 use crate::args::{Arguments, Common, Completions, Kinds, Schema};
 use crate::failure::{Code, Failure};
 use crate::output::{columns, print};
+use crate::parameters::{Parameter, parameters};
+use crate::reference;
 use clap::CommandFactory;
 use sastrugi_schemas::topics::ros2::{ROS2, ROVER_ROS2, TEAM_ROS2};
 use sastrugi_schemas::topics::{self, Field, Topic};
@@ -18,7 +20,7 @@ pub fn kinds(args: &Kinds, common: &Common) -> Verdict {
     let Some(name) = &args.kind else {
         let rows: Vec<Vec<String>> =
             all.iter().map(|k| vec![k.family.to_owned(), k.kind.to_owned(), k.summary.to_owned()]).collect();
-        print(common.json, &json!(all), &columns(&rows))?;
+        print(common.json, &all.iter().map(as_json).collect(), &columns(&rows))?;
         return Ok(Code::Done);
     };
     let chosen: Vec<&Kind> = all.iter().filter(|k| k.kind == name || k.family == name).collect();
@@ -29,86 +31,68 @@ pub fn kinds(args: &Kinds, common: &Common) -> Verdict {
         return Err(Failure::usage(format!("there is no kind `{name}`; {hint}")));
     }
     let text: Vec<String> = chosen.iter().map(|k| describe(k)).collect();
-    print(common.json, &json!(chosen), &text.join("\n\n"))?;
+    print(common.json, &chosen.iter().map(|k| as_json(k)).collect(), &text.join("\n\n"))?;
     Ok(Code::Done)
 }
 
+/// A kind as JSON. One that has values has them as `parameters`, as its file has, and their description as `schema`.
+fn as_json(kind: &Kind) -> Value {
+    let Some(values) = kind.values() else { return json!(kind) };
+    let mut schema = kind.parameters.clone();
+    if let Some(schema) = schema.as_object_mut() {
+        ["default", "x-sources"].into_iter().for_each(|key| drop(schema.remove(key)));
+    }
+    let mut json = json!({
+        "family": kind.family,
+        "kind": kind.kind,
+        "summary": kind.summary,
+        "source": kind.source,
+        "parameters": values,
+        "schema": schema,
+    });
+    if let Some(sources) = kind.sources() {
+        json["sources"] = sources.clone();
+    }
+    json
+}
+
 fn describe(kind: &Kind) -> String {
-    let mut rows = Vec::new();
-    parameters("", &[&kind.parameters], &mut rows);
+    let row = |p: Parameter| vec![format!("  {}", p.name), p.default, p.meaning];
+    let rows: Vec<Vec<String>> = match kind.values() {
+        Some(values) => numbers("", values, kind.sources()),
+        None => parameters(&kind.parameters).into_iter().map(row).collect(),
+    };
     let text = format!("{} {}: {}\nsource: {}", kind.family, kind.kind, kind.summary, kind.source);
     if rows.is_empty() { text } else { format!("{text}\n{}", columns(&rows)) }
 }
 
-/// Rows `name, default, description` of a schema's properties: tables opened, lists of tables as `name[]` or by the kind of table, and
-/// words with what each of them says. `path` leads from the root to the schema; a table within itself is not opened again.
-fn parameters(prefix: &str, path: &[&Value], rows: &mut Vec<Vec<String>>) {
-    let (Some(root), Some(schema)) = (path.first(), path.last()) else { return };
-    let schema = resolve(schema, root);
-    let open = |prefix: &str, table: &Value, rows: &mut Vec<Vec<String>>| {
-        if !path.iter().any(|outer| std::ptr::eq(*outer, table)) {
-            parameters(prefix, &[path, &[table]].concat(), rows);
-        }
-    };
-    let defaults = schema.get("default");
-    for (name, property) in schema.get("properties").and_then(Value::as_object).into_iter().flatten() {
-        if property.get("const").is_some() {
-            continue;
-        }
-        let inner = resolve(property, root);
-        let items = inner.get("items").map(|items| resolve(items, root));
-        let (tables, words) = (items.map_or_else(Vec::new, choices), words(inner));
-        let is_table = |schema: &Value| schema.get("properties").is_some();
-        let lists_tables = !tables.is_empty() || items.is_some_and(is_table);
-        let default = property.get("default").or_else(|| defaults.and_then(|d| d.get(name)));
-        let default = default.filter(|_| !is_table(inner) && !lists_tables).map(Value::to_string).unwrap_or_default();
-        let description = if property.get("description").is_some() { text_of(property) } else { text_of(inner) };
-        rows.push(vec![format!("  {prefix}{name}"), default, description]);
-        for (word, text) in words {
-            rows.push(vec![format!("  {prefix}{name} = {word}"), String::new(), text]);
-        }
-        if is_table(inner) {
-            open(&format!("{prefix}{name}."), inner, rows);
-        } else if let Some(items) = items {
-            open(&format!("{prefix}{name}[]."), items, rows);
-        }
-        for (kind, table) in tables {
-            rows.push(vec![format!("  {prefix}{name}[{kind}]"), String::new(), text_of(table)]);
-            open(&format!("{prefix}{name}[{kind}]."), table, rows);
+/// Rows `name, value, source` of the leaves of a value.
+fn numbers(prefix: &str, value: &Value, sources: Option<&Value>) -> Vec<Vec<String>> {
+    match value {
+        Value::Object(map) => map
+            .iter()
+            .flat_map(|(key, value)| {
+                let name = if prefix.is_empty() { key.clone() } else { format!("{prefix}.{key}") };
+                numbers(&name, value, sources.and_then(|s| s.get(key)))
+            })
+            .collect(),
+        _ => {
+            let source = sources.and_then(Value::as_str).unwrap_or_default();
+            vec![vec![format!("  {prefix}"), value.to_string(), source.to_owned()]]
         }
     }
-}
-
-/// Kinds of the tables that a list of `items` may hold, with their schemas.
-fn choices(items: &Value) -> Vec<(&str, &Value)> {
-    let all = items.get("oneOf").and_then(Value::as_array).into_iter().flatten();
-    all.filter_map(|c| Some((c.pointer("/properties/kind/const")?.as_str()?, c))).collect()
-}
-
-/// Words that a parameter may be, with what the schema says of each.
-fn words(schema: &Value) -> Vec<(String, String)> {
-    let all = schema.get("oneOf").and_then(Value::as_array).into_iter().flatten();
-    let described = all.filter(|word| word.get("description").is_some());
-    described.filter_map(|word| Some((word.get("const")?.to_string(), text_of(word)))).collect()
-}
-
-/// What a schema says of itself, on one line.
-fn text_of(schema: &Value) -> String {
-    schema.get("description").and_then(Value::as_str).unwrap_or_default().replace('\n', " ")
-}
-
-/// The schema that a reference stands for, also where there may be nothing in its place.
-fn resolve<'a>(schema: &'a Value, root: &'a Value) -> &'a Value {
-    let something =
-        schema.get("anyOf").and_then(Value::as_array).and_then(|any| any.iter().find(|s| s["type"] != "null"));
-    let schema = something.unwrap_or(schema);
-    let target = schema.get("$ref").and_then(Value::as_str).and_then(|r| r.strip_prefix('#'));
-    target.and_then(|path| root.pointer(path)).unwrap_or(schema)
 }
 
 /// `schema`.
 pub fn schema(args: &Schema, common: &Common) -> Verdict {
     match args.name.as_deref() {
+        None | Some("study") if args.markdown => {
+            let page = reference::study();
+            print(common.json, &json!({ "markdown": page }), &page)?;
+        }
+        Some(_) if args.markdown => {
+            return Err(Failure::usage("--markdown works only with `study`"));
+        }
         None | Some("study") => {
             let schema = schema::study_schema();
             let text = serde_json::to_string_pretty(&schema).map_err(Failure::failed)?;

@@ -6,6 +6,7 @@ mod coregister;
 mod files;
 mod fits;
 mod generate;
+mod init;
 mod lists;
 mod navigate;
 mod photoclinometry;
@@ -29,6 +30,7 @@ pub fn dispatch(arguments: &Arguments) -> Verdict {
     let common = &arguments.common;
     arguments.verb.output_file().into_iter().for_each(atomic::clear_leftovers);
     match &arguments.verb {
+        Verb::Init(args) => init::init(args, common),
         Verb::Run(args) => study::run(args, common),
         Verb::Plan(args) => study::plan(args, common),
         Verb::Merge(args) => study::merge(args, common),

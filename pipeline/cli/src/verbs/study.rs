@@ -3,7 +3,7 @@
 use crate::Verdict;
 use crate::args::{Common, Merge, Pack, Place, Plan, Report, Run, Traverse, Verify};
 use crate::failure::{Code, Failure};
-use crate::output::{bytes, columns, print, seconds};
+use crate::output::{bytes, columns, print, seconds, warn};
 use crate::progress::Teller;
 use sastrugi_report::{Companions, ReportError};
 use sastrugi_stages::loaded;
@@ -38,9 +38,17 @@ pub fn run(args: &Run, common: &Common) -> Verdict {
     let part = args.shard.as_deref().map(Part::parse).transpose()?;
     let limits = limits(args.memory)?;
     let loaded = loaded::load(&args.study)?;
+    tell_doubts(&loaded.doubts, common);
     let Place { output, work } = &args.place;
     let request = RunRequest { output, work: work.as_deref(), part, purpose: None, replace: args.replace, limits };
     finish_run(common, |teller| Ok(studies::run(&loaded, &request, teller)?))
+}
+
+/// What a user should know before hours are spent on a study.
+fn tell_doubts(doubts: &[String], common: &Common) {
+    if !common.quiet {
+        doubts.iter().for_each(|doubt| warn(&format!("sastrugi: warning: {doubt}")));
+    }
 }
 
 /// `merge`.
@@ -60,6 +68,7 @@ pub fn traverse(args: &Traverse, common: &Common) -> Verdict {
     parameters::assign(&mut parameters, &args.set)?;
     let mut roughness = json!({});
     parameters::assign(&mut roughness, &args.set_roughness)?;
+    tell_doubts(&parameters::vehicle_doubts(&parameters), common);
     let request = drive::Request { dem: &args.dem, seed: args.seed, roughness, missions, parameters, date: &args.date };
     let Place { output, work } = &args.place;
     let place = drive::Place { output, work: work.as_deref(), replace: args.replace, limits: limits(None)? };
@@ -106,7 +115,9 @@ pub(super) fn watch(
 /// `plan`.
 pub fn plan(args: &Plan, common: &Common) -> Verdict {
     let loaded = loaded::load(&args.study)?;
-    let plan = studies::plan_of(&loaded, &args.place.output, args.place.work.as_deref())?;
+    let part = args.shard.as_deref().map(Part::parse).transpose()?;
+    let plan = studies::plan_of(&loaded, &args.place.output, args.place.work.as_deref(), part)?;
+    tell_doubts(&loaded.doubts, common);
     let total_seconds = plan.stale.iter().fold(0.0, |sum, s| sum + s.seconds);
     let total_bytes = plan.stale.iter().fold(0.0, |sum, s| sum + s.bytes);
     let mut text = format!(

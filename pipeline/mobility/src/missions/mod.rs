@@ -119,10 +119,7 @@ pub enum MissionError {
         inside_y_m: f64,
     },
     /// No low-roughness cell lies inside the border.
-    #[error(
-        "find a start: none of the {cells} cells more than {border_m} m from the edge has low roughness; a smoother \
-         terrain or a narrower `border_m` would"
-    )]
+    #[error("find a start: none of the {cells} cells more than {border_m} m from the edge has low roughness")]
     NoEligibleStart {
         /// Cells inside of the border.
         cells: usize,

@@ -28,6 +28,7 @@ mod body;
 mod clearance;
 mod contact;
 mod controller;
+mod doubts;
 mod drive;
 mod ground;
 mod linkage;
@@ -42,6 +43,7 @@ mod tests;
 mod traverse;
 mod vector;
 
+pub(crate) use doubts::doubts;
 pub use ground::{Ground, GroundError, check_scale};
 pub use model::Vehicle;
 pub use params::{

@@ -31,6 +31,9 @@ const HUB_IDENTIFIERS: [&str; 20] = [
     "LGPL-3.0",
 ];
 
+/// Tables that a data loader opens where no other is asked for: the first of them that a release has.
+const FIRST_TABLES: [&str; 4] = ["missions", "rovers", "formations", "terrains"];
+
 /// The text of `README.md`.
 pub fn text(described: &Described<'_>) -> String {
     let head = described.head;
@@ -87,12 +90,14 @@ fn card(described: &Described<'_>) -> String {
     let head = described.head;
     let mut text = format!("---\npretty_name: {}\n{}", quoted(&head.title), hub_license(&head.license));
     text.push_str("tags:\n  - terrain\n  - elevation\n  - robotics\n  - synthetic\n  - sastrugi\n");
-    let mut tables = described.tables().peekable();
-    if tables.peek().is_some() {
+    let tables: Vec<&str> = described.tables().map(|table| table.name).collect();
+    if !tables.is_empty() {
         text.push_str("configs:\n");
     }
-    for table in tables {
-        let _ = writeln!(text, "  - config_name: {0}\n    data_files: \"tables/{0}/*.parquet\"", table.name);
+    let default = FIRST_TABLES.into_iter().find(|name| tables.contains(name)).or_else(|| tables.first().copied());
+    for name in tables {
+        let is_default = if default == Some(name) { "    default: true\n" } else { "" };
+        let _ = writeln!(text, "  - config_name: {name}\n{is_default}    data_files: \"tables/{name}/*.parquet\"");
     }
     text + "---\n\n"
 }

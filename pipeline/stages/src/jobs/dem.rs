@@ -9,6 +9,7 @@ use crate::operations::dem::{input_error, to_metres, window_of};
 use crate::operations::place::{PLACE, Place};
 use crate::revision::Room;
 use crate::runner::graph::Node;
+use crate::study::Entry;
 use sastrugi_schemas::study::{DemItem, GeoTiff};
 use sastrugi_store::dem::points::GridSettings;
 use sastrugi_store::dem::{self, Claimed, Dem, ReadOptions};
@@ -33,45 +34,48 @@ struct DemJob {
 /// # Errors
 /// A wrong item, or a file that is not there.
 pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
-    for entry in builder.study.entries(STAGE)? {
-        let (item, params): (DemItem, Value) = entry.read()?;
-        entry.check_keys::<DemItem>(&params, &json!({}))?;
-        builder.claim(&entry, STAGE, &item.id)?;
-        check(&item).map_err(|(key, message)| entry.error(key, format!("`{key}` {message}")))?;
-        if let Some(Objection::Conflict(why)) = terms::objection(&item, &builder.study.head.license) {
-            return Err(entry.error("license", format!("`license` {why}")).into());
-        }
-        let id = item.id.clone();
-        let original = Original::of(&format!("dem/{id}"), &builder.study.folder, &item.file)?;
-        let claimed = dem::claimed(&builder.study.folder.join(&item.file), &ReadOptions { cell_m: item.cell_m });
-        // Other formats have a byte or more for a cell.
-        let claimed = claimed.unwrap_or(Claimed { cells: original.bytes(), points: 0, cell_m: None });
-        let key = entry.path_of("file");
-        builder.inputs.push(InputPlace { key, release_path: original.release_path().to_owned() });
-        let field = Heightfield {
-            item: ItemRef::new(STAGE, &id),
-            group: item.group.clone(),
-            variant: None,
-            replicate: None,
-            kind: original::extension(&item.file),
-            parameters: recipe(&item),
-            streams: None,
-            release_path: format!("dem/{id}.metric.tif"),
-            cells: claimed.cells,
-            cell_m: claimed.cell_m,
-            geometry: None,
-        };
-        let (bytes, release_path, inputs) = (original.bytes(), original.release_path().to_owned(), original.inputs());
-        let original = original.node(original::STAGE, &id);
-        let geotiff = builder.study.head.geotiff;
-        let job = DemJob { item, original: original.item.clone(), release_path, bytes, claimed, geotiff };
-        let parents = vec![original.item.clone()];
-        let node = Node { item: field.item.clone(), parents, inputs, stream: None, job: Box::new(job) };
-        builder.node(original)?;
-        builder.node(node)?;
-        builder.heightfields.insert(id.clone(), field);
-        builder.name_family(&entry, &id, vec![id.clone()])?;
+    builder.each(STAGE, add_table)
+}
+
+fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildError> {
+    let (item, params): (DemItem, Value) = entry.read()?;
+    entry.check_keys::<DemItem>(&params, &json!({}))?;
+    builder.claim(entry, STAGE, &item.id)?;
+    check(&item).map_err(|(key, message)| entry.error(key, format!("`{key}` {message}")))?;
+    if let Some(Objection::Conflict(why)) = terms::objection(&item, &builder.study.head.license) {
+        return Err(entry.error("license", format!("`license` {why}")).into());
     }
+    let id = item.id.clone();
+    let original = Original::of(&format!("dem/{id}"), &builder.study.folder, &item.file)?;
+    let claimed = dem::claimed(&builder.study.folder.join(&item.file), &ReadOptions { cell_m: item.cell_m });
+    // Other formats have a byte or more for a cell.
+    let claimed = claimed.unwrap_or(Claimed { cells: original.bytes(), points: 0, cell_m: None });
+    let key = entry.path_of("file");
+    builder.inputs.push(InputPlace { key, release_path: original.release_path().to_owned() });
+    let field = Heightfield {
+        item: ItemRef::new(STAGE, &id),
+        group: Some(item.group.clone().unwrap_or_else(|| id.clone())),
+        is_grouped: item.group.is_some(),
+        variant: None,
+        replicate: None,
+        kind: original::extension(&item.file),
+        parameters: recipe(&item),
+        streams: None,
+        release_path: format!("dem/{id}.metric.tif"),
+        cells: claimed.cells,
+        cell_m: claimed.cell_m,
+        geometry: None,
+    };
+    let (bytes, release_path, inputs) = (original.bytes(), original.release_path().to_owned(), original.inputs());
+    let original = original.node(original::STAGE, &id);
+    let geotiff = builder.study.head.geotiff;
+    let job = DemJob { item, original: original.item.clone(), release_path, bytes, claimed, geotiff };
+    let parents = vec![original.item.clone()];
+    let node = Node { item: field.item.clone(), parents, inputs, stream: None, job: Box::new(job) };
+    builder.node(original)?;
+    builder.node(node)?;
+    builder.heightfields.insert(id.clone(), field);
+    builder.name_family(entry, &id, vec![id.clone()])?;
     Ok(())
 }
 

@@ -106,57 +106,59 @@ pub fn add_of_recovered(builder: &mut Builder<'_>) -> Result<(), BuildError> {
 }
 
 fn add_where(builder: &mut Builder<'_>, recovered: bool) -> Result<(), BuildError> {
-    for entry in builder.study.entries(STAGE)? {
-        let (item, params): (FitItem, Value) = entry.read()?;
-        if photoclinometry::may_be_recovered(builder, &item.dem) != recovered {
-            continue;
+    builder.each(STAGE, |builder, entry| add_table(builder, entry, recovered))
+}
+
+fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>, recovered: bool) -> Result<(), BuildError> {
+    let (item, params): (FitItem, Value) = entry.read()?;
+    if photoclinometry::may_be_recovered(builder, &item.dem) != recovered {
+        return Ok(());
+    }
+    entry.check_keys::<FitItem>(&params, &schema_of::<FitParameters>())?;
+    let Some(field) = builder.heightfields.get(&item.dem).cloned() else {
+        return Err(unknown_id(entry, "dem", &item.dem, builder.heightfields.keys()).into());
+    };
+    check_noise_reference(item.noise_reference.is_some(), item.minus.is_some()).map_err(|e| entry.refuse(e))?;
+    let expanded = entry.expand(&item.id, None, &item.sweep, &params)?;
+    expanded.iter().try_for_each(|one| builder.claim(entry, STAGE, &one.id))?;
+    let masks = mask::add(builder, entry, &item)?;
+    let noise_reference = mask::add_noise_reference(builder, entry, &item)?;
+    let mask_sources = masks.iter().map(|m| m.source.clone()).collect();
+    let source = Source { masks: mask_sources, ..builder.source_of(&item.dem, &field) };
+    let minus = item.minus.as_ref().map(|id| Subtrahend::of(builder, entry, id)).transpose()?;
+    let others = masks.iter().chain(&noise_reference).map(|m| &m.item).chain(minus.iter().map(|m| &m.dem));
+    let parents: Vec<ItemRef> = [&field.item].into_iter().chain(others).cloned().collect();
+    for one in expanded {
+        let raw: FitParameters = read_parameters(&one.params).map_err(|e| entry.refuse(e))?;
+        let settings = FitSettings::try_from(raw).map_err(|e| entry.refuse(e))?;
+        if noise_reference.is_some() {
+            // What the reference holds is known when it is read; whether the fit takes it, now.
+            settings
+                .with_noise(&Noise { white_sigma_m: f64::MIN_POSITIVE, ..Noise::default() })
+                .map_err(|e| entry.refuse(e))?;
         }
-        entry.check_keys::<FitItem>(&params, &schema_of::<FitParameters>())?;
-        let Some(field) = builder.heightfields.get(&item.dem).cloned() else {
-            return Err(unknown_id(&entry, "dem", &item.dem, builder.heightfields.keys()).into());
+        let job = FitJob {
+            id: one.id.clone(),
+            dem_id: item.dem.clone(),
+            dem: field.item.clone(),
+            masks: masks.clone(),
+            source: source.clone(),
+            noise_reference: noise_reference.clone(),
+            minus: minus.clone(),
+            settings,
+            streams: builder.streams(STAGE, &one.id, item.seed, 0),
+            cells: field.cells,
+            cell_m: field.cell_m,
         };
-        check_noise_reference(item.noise_reference.is_some(), item.minus.is_some()).map_err(|e| entry.refuse(e))?;
-        let expanded = entry.expand(&item.id, None, &item.sweep, &params)?;
-        expanded.iter().try_for_each(|one| builder.claim(&entry, STAGE, &one.id))?;
-        let masks = mask::add(builder, &entry, &item)?;
-        let noise_reference = mask::add_noise_reference(builder, &entry, &item)?;
-        let mask_sources = masks.iter().map(|m| m.source.clone()).collect();
-        let source = Source { masks: mask_sources, ..builder.source_of(&item.dem, &field) };
-        let minus = item.minus.as_ref().map(|id| Subtrahend::of(builder, &entry, id)).transpose()?;
-        let others = masks.iter().chain(&noise_reference).map(|m| &m.item).chain(minus.iter().map(|m| &m.dem));
-        let parents: Vec<ItemRef> = [&field.item].into_iter().chain(others).cloned().collect();
-        for one in expanded {
-            let raw: FitParameters = read_parameters(&one.params).map_err(|e| entry.refuse(e))?;
-            let settings = FitSettings::try_from(raw).map_err(|e| entry.refuse(e))?;
-            if noise_reference.is_some() {
-                // What the reference holds is known when it is read; whether the fit takes it, now.
-                settings
-                    .with_noise(&Noise { white_sigma_m: f64::MIN_POSITIVE, ..Noise::default() })
-                    .map_err(|e| entry.refuse(e))?;
-            }
-            let job = FitJob {
-                id: one.id.clone(),
-                dem_id: item.dem.clone(),
-                dem: field.item.clone(),
-                masks: masks.clone(),
-                source: source.clone(),
-                noise_reference: noise_reference.clone(),
-                minus: minus.clone(),
-                settings,
-                streams: builder.streams(STAGE, &one.id, item.seed, 0),
-                cells: field.cells,
-                cell_m: field.cell_m,
-            };
-            let node = Node {
-                item: ItemRef::new(STAGE, &one.id),
-                parents: parents.clone(),
-                inputs: Vec::new(),
-                stream: Some(job.streams.label()),
-                job: Box::new(job),
-            };
-            builder.node(node)?;
-            builder.fits.push(one.id);
-        }
+        let node = Node {
+            item: ItemRef::new(STAGE, &one.id),
+            parents: parents.clone(),
+            inputs: Vec::new(),
+            stream: Some(job.streams.label()),
+            job: Box::new(job),
+        };
+        builder.node(node)?;
+        builder.fits.push(one.id);
     }
     Ok(())
 }

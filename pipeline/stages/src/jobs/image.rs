@@ -56,23 +56,25 @@ struct ImageJob {
 /// # Errors
 /// A wrong item.
 pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
-    for entry in builder.study.entries(STAGE)? {
-        let (envelope, params): (ImageItem, Value) = entry.read()?;
-        entry.check_keys::<ImageItem>(&params, &schema_of::<RenderParameters>())?;
-        let surfaces = builder.family(&entry, "surface", &envelope.surface)?;
-        let expanded = entry.expand(&envelope.id, None, &envelope.sweep, &params)?;
-        for (k, one) in expanded.iter().enumerate() {
-            let parameters: RenderParameters = read_parameters(&one.params).map_err(|e| entry.refuse(e))?;
-            parameters.check().map_err(|e| entry.refuse(e))?;
-            for (j, surface) in surfaces.iter().enumerate() {
-                let id = if surfaces.len() == 1 { one.id.clone() } else { format!("{}-{surface}", one.id) };
-                builder.claim(&entry, STAGE, &id)?;
-                // Images differ by their noise, also those of one sweep and one explicit seed.
-                let number = (k * surfaces.len() + j) as u64;
-                let streams = builder.streams(STAGE, &id, envelope.seed, number);
-                let image = Image { item: ItemRef::new(STAGE, &id), id, surface: surface.clone(), sun: parameters.sun };
-                add_one(builder, &entry, &envelope, one, (image, parameters.clone(), streams))?;
-            }
+    builder.each(STAGE, add_table)
+}
+
+fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildError> {
+    let (envelope, params): (ImageItem, Value) = entry.read()?;
+    entry.check_keys::<ImageItem>(&params, &schema_of::<RenderParameters>())?;
+    let surfaces = builder.family(entry, "surface", &envelope.surface)?;
+    let expanded = entry.expand(&envelope.id, None, &envelope.sweep, &params)?;
+    for (k, one) in expanded.iter().enumerate() {
+        let parameters: RenderParameters = read_parameters(&one.params).map_err(|e| entry.refuse(e))?;
+        parameters.check().map_err(|e| entry.refuse(e))?;
+        for (j, surface) in surfaces.iter().enumerate() {
+            let id = if surfaces.len() == 1 { one.id.clone() } else { format!("{}-{surface}", one.id) };
+            builder.claim(entry, STAGE, &id)?;
+            // Images differ by their noise, also those of one sweep and one explicit seed.
+            let number = (k * surfaces.len() + j) as u64;
+            let streams = builder.streams(STAGE, &id, envelope.seed, number);
+            let image = Image { item: ItemRef::new(STAGE, &id), id, surface: surface.clone(), sun: parameters.sun };
+            add_one(builder, entry, &envelope, one, (image, parameters.clone(), streams))?;
         }
     }
     Ok(())

@@ -65,45 +65,48 @@ struct Altimetry {
 /// # Errors
 /// A wrong item.
 pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
-    for entry in builder.study.entries(STAGE)? {
-        let (item, params): (PhotoclinometryItem, Value) = entry.read()?;
-        entry.check_keys::<PhotoclinometryItem>(&params, &schema_of::<Settings>())?;
-        let by_surface = images_by_surface(builder, &entry, &item)?;
-        let coarse = coarse(builder, &entry, &item)?;
-        let altimetry = altimetry(builder, &entry, &item)?;
-        let expanded = entry.expand(&item.id, None, &item.sweep, &params)?;
-        let mut ids = Vec::new();
-        for (k, one) in expanded.iter().enumerate() {
-            let settings: Settings = read_parameters(&one.params).map_err(|e| entry.refuse(e))?;
-            settings.check().map_err(|e| entry.refuse(e))?;
-            for (j, (surface, images)) in by_surface.iter().enumerate() {
-                check_suns(&entry, images, &settings)?;
-                let id = if by_surface.len() == 1 { one.id.clone() } else { format!("{}-{surface}", one.id) };
-                builder.claim(&entry, STAGE, &id)?;
-                let number = (k * by_surface.len() + j) as u64;
-                let streams = builder.streams(STAGE, &id, item.seed, number);
-                let field = builder.surface(&entry, "images", surface)?.clone();
-                let job = PhotoclinometryJob {
-                    id: id.clone(),
-                    item_id: item.id.clone(),
-                    variant: joined(field.variant.as_deref(), one.sweep.as_deref()),
-                    group: item.group.clone().or_else(|| field.group.clone()),
-                    surface: (surface.clone(), field.item.clone()),
-                    images: images.clone(),
-                    coarse: coarse.clone(),
-                    altimetry: altimetry.clone(),
-                    cells: cells(&field, &settings),
-                    settings: settings.clone(),
-                    streams,
-                    geotiff: builder.study.head.geotiff,
-                };
-                add_one(builder, one, field, job)?;
-                ids.push(id);
-            }
-        }
-        builder.name_family(&entry, &item.id, ids)?;
-    }
+    builder.each(STAGE, add_table)?;
     fit::add_of_recovered(builder)
+}
+
+fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildError> {
+    let (item, params): (PhotoclinometryItem, Value) = entry.read()?;
+    entry.check_keys::<PhotoclinometryItem>(&params, &schema_of::<Settings>())?;
+    let by_surface = images_by_surface(builder, entry, &item)?;
+    let coarse = coarse(builder, entry, &item)?;
+    let altimetry = altimetry(builder, entry, &item)?;
+    let expanded = entry.expand(&item.id, None, &item.sweep, &params)?;
+    let mut ids = Vec::new();
+    for (k, one) in expanded.iter().enumerate() {
+        let settings: Settings = read_parameters(&one.params).map_err(|e| entry.refuse(e))?;
+        settings.check().map_err(|e| entry.refuse(e))?;
+        for (j, (surface, images)) in by_surface.iter().enumerate() {
+            check_suns(entry, images, &settings)?;
+            let id = if by_surface.len() == 1 { one.id.clone() } else { format!("{}-{surface}", one.id) };
+            builder.claim(entry, STAGE, &id)?;
+            let number = (k * by_surface.len() + j) as u64;
+            let streams = builder.streams(STAGE, &id, item.seed, number);
+            let field = builder.surface(entry, "images", surface)?.clone();
+            let job = PhotoclinometryJob {
+                id: id.clone(),
+                item_id: item.id.clone(),
+                variant: joined(field.variant.as_deref(), one.sweep.as_deref()),
+                group: item.group.clone().or_else(|| field.group.clone().filter(|_| field.is_grouped)),
+                surface: (surface.clone(), field.item.clone()),
+                images: images.clone(),
+                coarse: coarse.clone(),
+                altimetry: altimetry.clone(),
+                cells: cells(&field, &settings),
+                settings: settings.clone(),
+                streams,
+                geotiff: builder.study.head.geotiff,
+            };
+            add_one(builder, one, field, job)?;
+            ids.push(id);
+        }
+    }
+    builder.name_family(entry, &item.id, ids)?;
+    Ok(())
 }
 
 /// Adds a surface to the graph and to the heightfields.
@@ -117,6 +120,7 @@ fn add_one(
     let field = Heightfield {
         item: item.clone(),
         group: job.group.clone().or_else(|| one.sweep.clone()),
+        is_grouped: job.group.is_some() || one.sweep.is_some(),
         variant: job.variant.clone().filter(|_| job.group.is_some()),
         replicate: truth.replicate,
         kind: STAGE.to_owned(),

@@ -112,39 +112,42 @@ impl Pairs {
 /// # Errors
 /// A wrong item.
 pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
-    for entry in builder.study.entries(STAGE)? {
-        let (envelope, params): (RouteItem, Value) = entry.read()?;
-        let terrains = terrains(builder, &entry, &envelope.terrains)?;
-        let cost_raster = envelope.cost_raster.as_deref().map(|id| builder.surface(&entry, "cost_raster", id));
-        let cost_raster = cost_raster.transpose()?.map(|field| field.item.clone());
-        let vehicle = envelope.vehicle.as_deref().map(|name| registry::vehicle(name, &Map::new()));
-        let vehicle = vehicle.transpose().map_err(|e| entry.error("vehicle", format!("`vehicle` {e}")))?;
-        let obstacles = mask::add_obstacles(builder, &entry, &envelope)?;
-        let mut family = Vec::new();
-        for one in entry.expand(&envelope.id, None, &envelope.sweep, &params)? {
-            entry.check_keys::<RouteItem>(&one.params, &schema())?;
-            builder.claim(&entry, STAGE, &one.id)?;
-            let (parameters, rules): (RouteParameters, PairParameters) =
-                keys::read_both(&one.params).map_err(|e| entry.refuse(e))?;
-            parameters.check().map_err(|e| entry.refuse(e))?;
-            let given = parameters.check_given(vehicle.is_some(), cost_raster.is_some());
-            given.map_err(|e| entry.refuse(e))?;
-            let search = RouteSearch {
-                id: one.id.clone(),
-                variant: one.sweep,
-                parameters,
-                vehicle: vehicle.clone(),
-                obstacles: obstacles.clone(),
-                cost_raster: cost_raster.clone(),
-                pairs: pairs(&entry, &envelope, rules)?,
-                roughness: builder.study.roughness.clone(),
-            };
-            let routes = add_search(builder, &envelope, Arc::new(search), &terrains)?;
-            family.extend(routes.iter().cloned());
-            builder.routes.insert(one.id, routes);
-        }
-        builder.routes.insert(envelope.id, family);
+    builder.each(STAGE, add_table)
+}
+
+fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildError> {
+    let (envelope, params): (RouteItem, Value) = entry.read()?;
+    entry.check_keys::<RouteItem>(&params, &schema())?;
+    let terrains = terrains(builder, entry, &envelope.terrains)?;
+    let cost_raster = envelope.cost_raster.as_deref().map(|id| builder.surface(entry, "cost_raster", id));
+    let cost_raster = cost_raster.transpose()?.map(|field| field.item.clone());
+    let vehicle = envelope.vehicle.as_deref().map(|name| registry::vehicle(name, &Map::new()));
+    let vehicle = vehicle.transpose().map_err(|e| entry.error("vehicle", format!("`vehicle` {e}")))?;
+    let obstacles = mask::add_obstacles(builder, entry, &envelope)?;
+    let mut family = Vec::new();
+    for one in entry.expand(&envelope.id, None, &envelope.sweep, &params)? {
+        entry.check_keys::<RouteItem>(&one.params, &schema())?;
+        builder.claim(entry, STAGE, &one.id)?;
+        let (parameters, rules): (RouteParameters, PairParameters) =
+            keys::read_both(&one.params).map_err(|e| entry.refuse(e))?;
+        parameters.check().map_err(|e| entry.refuse(e))?;
+        let given = parameters.check_given(vehicle.is_some(), cost_raster.is_some());
+        given.map_err(|e| entry.refuse(e))?;
+        let search = RouteSearch {
+            id: one.id.clone(),
+            variant: one.sweep,
+            parameters,
+            vehicle: vehicle.clone(),
+            obstacles: obstacles.clone(),
+            cost_raster: cost_raster.clone(),
+            pairs: pairs(entry, &envelope, rules)?,
+            roughness: builder.study.roughness.clone(),
+        };
+        let routes = add_search(builder, &envelope, Arc::new(search), &terrains)?;
+        family.extend(routes.iter().cloned());
+        builder.routes.insert(one.id, routes);
     }
+    builder.routes.insert(envelope.id, family);
     Ok(())
 }
 

@@ -192,25 +192,28 @@ struct RoverJob {
 /// # Errors
 /// A wrong item.
 pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
-    for entry in builder.study.entries(STAGE)? {
-        let (envelope, params): (RoverItem, Value) = entry.read()?;
-        let Some(schema) = schema(&envelope.kind) else { return Err(unknown(&entry, &envelope.kind).into()) };
-        let terrains = terrains(builder, &entry, &envelope.terrains)?;
-        let sample_m = envelope.sample_m.unwrap_or(SAMPLE_M);
-        let record = envelope.record.unwrap_or(RECORD) as usize;
-        ParameterError::not_negative("sample_m", sample_m).map_err(|e| entry.refuse(e))?;
-        for one in entry.expand(&envelope.id, None, &envelope.sweep, &params)? {
-            if envelope.kind == Navigator::PLANNER {
-                check_planner_keys(&one.params).map_err(|e| entry.refuse(e))?;
-            }
-            entry.check_keys::<RoverItem>(&one.params, &schema)?;
-            builder.claim(&entry, STAGE, &one.id)?;
-            let (navigator, parameters) = prepare(&envelope.kind, &one.params).map_err(|e| entry.refuse(e))?;
-            rover_designs::add(builder, &entry, &envelope, &one, &terrains)?;
-            let (id, variant, head) = (one.id, one.sweep, builder.study.head.clone());
-            let trial = Arc::new(Trial { id, variant, navigator, parameters, sample_m, record, head });
-            terrains.iter().try_for_each(|terrain| add_one(builder, &entry, &envelope, &trial, terrain))?;
+    builder.each(STAGE, add_table)
+}
+
+fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildError> {
+    let (envelope, params): (RoverItem, Value) = entry.read()?;
+    let Some(schema) = schema(&envelope.kind) else { return Err(unknown(entry, &envelope.kind).into()) };
+    entry.check_keys::<RoverItem>(&params, &schema)?;
+    let terrains = terrains(builder, entry, &envelope.terrains)?;
+    let sample_m = envelope.sample_m.unwrap_or(SAMPLE_M);
+    let record = envelope.record.unwrap_or(RECORD) as usize;
+    ParameterError::not_negative("sample_m", sample_m).map_err(|e| entry.refuse(e))?;
+    for one in entry.expand(&envelope.id, None, &envelope.sweep, &params)? {
+        if envelope.kind == Navigator::PLANNER {
+            check_planner_keys(&one.params).map_err(|e| entry.refuse(e))?;
         }
+        entry.check_keys::<RoverItem>(&one.params, &schema)?;
+        builder.claim(entry, STAGE, &one.id)?;
+        let (navigator, parameters) = prepare(&envelope.kind, &one.params).map_err(|e| entry.refuse(e))?;
+        rover_designs::add(builder, entry, &envelope, &one, &terrains)?;
+        let (id, variant, head) = (one.id, one.sweep, builder.study.head.clone());
+        let trial = Arc::new(Trial { id, variant, navigator, parameters, sample_m, record, head });
+        terrains.iter().try_for_each(|terrain| add_one(builder, entry, &envelope, &trial, terrain))?;
     }
     Ok(())
 }

@@ -41,52 +41,50 @@ struct TerrainJob {
 /// # Errors
 /// A wrong item.
 pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
+    builder.each(STAGE, add_table)
+}
+
+fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildError> {
     let kinds = sastrugi_terrain::kinds();
-    for entry in builder.study.entries(STAGE)? {
-        let (item, params): (TerrainItem, Value) = entry.read()?;
-        if let Some(kind) = kinds.iter().find(|k| k.kind == item.kind) {
-            entry.check_keys::<TerrainItem>(&params, &kind.parameters)?;
-        }
-        let expanded = entry.expand(&item.id, item.count, &item.sweep, &params)?;
-        name_families(builder, &entry, &item.id, &expanded)?;
-        let mut copies = Copies::new();
-        for one in expanded {
-            builder.claim(&entry, STAGE, &one.id)?;
-            let generator = sastrugi_terrain::prepare(&item.kind, &one.params).map_err(|e| entry.refuse(e))?;
-            let inputs = Sources::find(builder, (&entry, &item), generator.as_ref(), &mut copies)?;
-            // Parameters name files as the release does, wherever they lie now.
-            let released = inputs.as_released(&one.params);
-            let generator = sastrugi_terrain::prepare(&item.kind, &released).map_err(|e| entry.refuse(e))?;
-            let shared = builder.is_paired().then(|| common(one.replicate));
-            let streams = builder.streams(STAGE, shared.as_ref().unwrap_or(&one.id), item.seed, one.replicate);
-            let field = Heightfield {
-                item: ItemRef::new(STAGE, &one.id),
-                group: item.group.clone().or_else(|| one.sweep.clone()),
-                variant: one.sweep.filter(|_| item.group.is_some()),
-                replicate: Some(one.replicate),
-                kind: item.kind.clone(),
-                parameters: generator.parameters(),
-                streams: Some(streams.clone()),
-                release_path: format!("terrain/{}.tif", one.id),
-                cells: generator.geometry().len() as u64,
-                cell_m: Some(generator.geometry().cell.into_iter().fold(f64::INFINITY, f64::min)),
-                geometry: Some(generator.geometry()),
-            };
-            let geotiff = builder.study.head.geotiff;
-            let exports = Exports::new(&item.exports, &generator.geometry()).map_err(|e| entry.error("exports", e))?;
-            let parents = inputs.0.iter().map(|s| s.item.clone()).collect::<BTreeSet<_>>().into_iter().collect();
-            let id = one.id.clone();
-            let job = TerrainJob { id, generator, inputs, streams, png16: item.png16, exports, geotiff };
-            let node = Node {
-                item: field.item.clone(),
-                parents,
-                inputs: Vec::new(),
-                stream: field.stream(),
-                job: Box::new(job),
-            };
-            builder.node(node)?;
-            builder.heightfields.insert(one.id, field);
-        }
+    let (item, params): (TerrainItem, Value) = entry.read()?;
+    if let Some(kind) = kinds.iter().find(|k| k.kind == item.kind) {
+        entry.check_keys::<TerrainItem>(&params, &kind.parameters)?;
+    }
+    let expanded = entry.expand(&item.id, item.count, &item.sweep, &params)?;
+    name_families(builder, entry, &item.id, &expanded)?;
+    let mut copies = Copies::new();
+    for one in expanded {
+        builder.claim(entry, STAGE, &one.id)?;
+        let generator = sastrugi_terrain::prepare(&item.kind, &one.params).map_err(|e| entry.refuse(e))?;
+        let inputs = Sources::find(builder, (entry, &item), generator.as_ref(), &mut copies)?;
+        // Parameters name files as the release does, wherever they lie now.
+        let released = inputs.as_released(&one.params);
+        let generator = sastrugi_terrain::prepare(&item.kind, &released).map_err(|e| entry.refuse(e))?;
+        let shared = builder.is_paired().then(|| common(one.replicate));
+        let streams = builder.streams(STAGE, shared.as_ref().unwrap_or(&one.id), item.seed, one.replicate);
+        let field = Heightfield {
+            item: ItemRef::new(STAGE, &one.id),
+            group: item.group.clone().or_else(|| one.sweep.clone()),
+            is_grouped: item.group.is_some() || one.sweep.is_some(),
+            variant: one.sweep.filter(|_| item.group.is_some()),
+            replicate: Some(one.replicate),
+            kind: item.kind.clone(),
+            parameters: generator.parameters(),
+            streams: Some(streams.clone()),
+            release_path: format!("terrain/{}.tif", one.id),
+            cells: generator.geometry().len() as u64,
+            cell_m: Some(generator.geometry().cell.into_iter().fold(f64::INFINITY, f64::min)),
+            geometry: Some(generator.geometry()),
+        };
+        let geotiff = builder.study.head.geotiff;
+        let exports = Exports::new(&item.exports, &generator.geometry()).map_err(|e| entry.error("exports", e))?;
+        let parents = inputs.0.iter().map(|s| s.item.clone()).collect::<BTreeSet<_>>().into_iter().collect();
+        let id = one.id.clone();
+        let job = TerrainJob { id, generator, inputs, streams, png16: item.png16, exports, geotiff };
+        let node =
+            Node { item: field.item.clone(), parents, inputs: Vec::new(), stream: field.stream(), job: Box::new(job) };
+        builder.node(node)?;
+        builder.heightfields.insert(one.id, field);
     }
     Ok(())
 }

@@ -9,14 +9,14 @@ use super::surface::{Surface, SurfaceRows};
 use crate::builder::{BuildError, Builder, HEIGHTS, Heightfield, unknown_id};
 use crate::job::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work};
 use crate::operations::dem::input_error;
-use crate::operations::textures::{fill_note, has_its_texture, lay_onto};
+use crate::operations::textures::{fill_note, has_its_texture, lay_onto, scaled};
 use crate::revision::Room;
 use crate::runner::graph::Node;
 use crate::study::{Entry, Expanded, StudyError};
 use sastrugi_numeric::{Grid, Streams};
-use sastrugi_schemas::Kind;
 use sastrugi_schemas::fit::FitFile;
 use sastrugi_schemas::study::{FitReference, GeoTiff, Methods, Modulate, Onto, TextureItem};
+use sastrugi_schemas::{Kind, ParameterError};
 use sastrugi_store::dem::{self, Crs};
 use sastrugi_store::digest;
 use sastrugi_texture::covariance::Covariance;
@@ -95,6 +95,7 @@ struct TextureJob {
     id: String,
     matched: Matched,
     base: Option<Base>,
+    amplitude: f64,
     modulation: Option<Modulation>,
     /// The DEM whose holes are filled.
     fill: Option<ItemRef>,
@@ -114,103 +115,109 @@ struct TextureJob {
 /// # Errors
 /// A wrong item.
 pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
+    builder.each(STAGE, add_table)
+}
+
+fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildError> {
     let kinds = kinds();
-    for entry in builder.study.entries(STAGE)? {
-        let (item, params): (TextureItem, Value) = entry.read()?;
-        let methods = methods(&entry, &item, &kinds)?;
-        entry.check_keys::<TextureItem>(&params, &joined_schema(&kinds, &methods))?;
-        let matched = matched(builder, &entry, &item)?;
-        check_purpose(&entry, &item, &params)?;
-        let base = item.onto.as_ref().map(|onto| Base::of(builder, &entry, onto, &matched)).transpose()?;
-        let fill = item.fill.as_deref().map(|id| heightfield(builder, &entry, "fill", id)).transpose()?;
-        let modulation = modulation(builder, &entry, &item)?;
-        let mut ids = Vec::new();
-        for one in entry.expand(&item.id, item.count, &item.sweep, &params)? {
-            let side_by_side = item.methods.is_some();
-            let one = on_background(one, &base, &matched, &item);
-            let streams = builder.streams(STAGE, &one.id, item.seed, one.replicate);
-            let mut entrants = Vec::new();
-            let mut refusal = None;
-            for method in &methods {
-                let own = if side_by_side { own_parameters(&one.params, &kinds, method) } else { one.params.clone() };
-                let checked = sastrugi_texture::method(method, &own)
-                    .and_then(|synthesis| Ok((matched.cost(synthesis.as_ref())?, synthesis)));
-                let cost = checked.as_ref().ok().map(|(cost, _)| *cost);
-                entrants.push(Entrant { method: method.clone(), parameters: own, cost });
-                let (cost, synthesis) = match checked {
-                    Ok(checked) => checked,
-                    Err(error) => {
-                        refusal = refusal.or(Some(error));
-                        continue;
-                    }
-                };
-                let id = if side_by_side { format!("{}-{}", one.id, method.replace('_', "-")) } else { one.id.clone() };
-                builder.claim(&entry, STAGE, &id)?;
-                let streams =
-                    if side_by_side { builder.streams(STAGE, &id, item.seed, one.replicate) } else { streams.clone() };
-                let field = Heightfield {
-                    item: ItemRef::new(STAGE, &id),
-                    group: item.group.clone().or_else(|| one.sweep.clone()),
-                    variant: one.sweep.clone().filter(|_| item.group.is_some()),
-                    replicate: Some(one.replicate),
-                    kind: method.clone(),
-                    parameters: parameters(&item, &matched, synthesis.as_ref()),
-                    streams: Some(streams.clone()),
-                    release_path: format!("texture/{id}.tif"),
-                    cells: match (&base, &fill) {
-                        (Some(Base { cells, .. }), _) | (None, Some((_, cells))) => *cells,
-                        (None, None) => synthesis.geometry().len() as u64,
-                    },
-                    cell_m: Some(synthesis.geometry().cell.into_iter().fold(f64::INFINITY, f64::min)),
-                    geometry: (base.is_none() && fill.is_none()).then(|| synthesis.geometry()),
-                };
-                let cells = field.cells;
-                let one_of_many = item.count.is_some_and(|count| count > 1);
-                let (base, fill) = (base.clone(), fill.as_ref().map(|(item, _)| item.clone()));
-                let raster = match &modulation {
-                    Some(Modulation::Raster(raster)) => Some(raster.clone()),
-                    _ => None,
-                };
-                let others = [matched.parent(), fill.clone(), raster].into_iter().flatten();
-                let parents: BTreeSet<ItemRef> = others.chain(base.iter().flat_map(Base::parents)).collect();
-                let parents = parents.into_iter().collect();
-                let (method, matched, modulation) = (method.clone(), matched.clone(), modulation.clone());
-                let job = TextureJob {
-                    id: id.clone(),
-                    matched,
-                    base,
-                    modulation,
-                    fill,
-                    method,
-                    synthesis,
-                    cost,
-                    one_of_many,
-                    cells,
-                    streams,
-                    geotiff: builder.study.head.geotiff,
-                };
-                let stream = field.stream();
-                let node = Node { item: field.item.clone(), parents, inputs: Vec::new(), stream, job: Box::new(job) };
-                builder.node(node)?;
-                builder.heightfields.insert(id.clone(), field);
-                ids.push(id);
-            }
-            if let Some(error) = refusal.filter(|_| entrants.iter().all(|e| e.cost.is_none())) {
-                return Err(entry.refuse(error).into());
-            }
-            if side_by_side && one.replicate == 0 {
-                builder.claim(&entry, scoreboard::STAGE, &one.id)?;
-                let stream = Some(streams.label());
-                let realisations = item.realisations;
-                let matched = matched.clone();
-                let parents = matched.parent().into_iter().collect();
-                let job = ScoreboardJob { id: one.id.clone(), matched, entrants, realisations, streams };
-                let item = ItemRef::new(scoreboard::STAGE, &one.id);
-                builder.node(Node { item, parents, inputs: Vec::new(), stream, job: Box::new(job) })?;
-            }
+    let (item, params): (TextureItem, Value) = entry.read()?;
+    let methods = methods(entry, &item, &kinds)?;
+    entry.check_keys::<TextureItem>(&params, &joined_schema(&kinds, &methods))?;
+    let matched = matched(builder, entry, &item)?;
+    check_purpose(entry, &item, &params)?;
+    let base = item.onto.as_ref().map(|onto| Base::of(builder, entry, onto, &matched)).transpose()?;
+    let fill = item.fill.as_deref().map(|id| heightfield(builder, entry, "fill", id)).transpose()?;
+    let modulation = modulation(builder, entry, &item)?;
+    let mut ids = Vec::new();
+    for one in entry.expand(&item.id, item.count, &item.sweep, &params)? {
+        let side_by_side = item.methods.is_some();
+        let one = on_background(one, &base, &matched, &item);
+        let streams = builder.streams(STAGE, &one.id, item.seed, one.replicate);
+        let mut entrants = Vec::new();
+        let mut refusal = None;
+        for method in &methods {
+            let own = if side_by_side { own_parameters(&one.params, &kinds, method) } else { one.params.clone() };
+            let checked = sastrugi_texture::method(method, &own)
+                .and_then(|synthesis| Ok((matched.cost(synthesis.as_ref())?, synthesis)));
+            let cost = checked.as_ref().ok().map(|(cost, _)| *cost);
+            entrants.push(Entrant { method: method.clone(), parameters: own, cost });
+            let (cost, synthesis) = match checked {
+                Ok(checked) => checked,
+                Err(error) => {
+                    refusal = refusal.or(Some(error));
+                    continue;
+                }
+            };
+            let id = if side_by_side { format!("{}-{}", one.id, method.replace('_', "-")) } else { one.id.clone() };
+            builder.claim(entry, STAGE, &id)?;
+            let streams =
+                if side_by_side { builder.streams(STAGE, &id, item.seed, one.replicate) } else { streams.clone() };
+            let own_label =
+                if side_by_side { format!("{}-{}", item.id, method.replace('_', "-")) } else { item.id.clone() };
+            let field = Heightfield {
+                item: ItemRef::new(STAGE, &id),
+                group: item.group.clone().or_else(|| one.sweep.clone()).or(Some(own_label)),
+                is_grouped: item.group.is_some() || one.sweep.is_some(),
+                variant: one.sweep.clone().filter(|_| item.group.is_some()),
+                replicate: Some(one.replicate),
+                kind: method.clone(),
+                parameters: parameters(&item, &matched, synthesis.as_ref()),
+                streams: Some(streams.clone()),
+                release_path: format!("texture/{id}.tif"),
+                cells: match (&base, &fill) {
+                    (Some(Base { cells, .. }), _) | (None, Some((_, cells))) => *cells,
+                    (None, None) => synthesis.geometry().len() as u64,
+                },
+                cell_m: Some(synthesis.geometry().cell.into_iter().fold(f64::INFINITY, f64::min)),
+                geometry: (base.is_none() && fill.is_none()).then(|| synthesis.geometry()),
+            };
+            let cells = field.cells;
+            let one_of_many = item.count.is_some_and(|count| count > 1);
+            let (base, fill) = (base.clone(), fill.as_ref().map(|(item, _)| item.clone()));
+            let raster = match &modulation {
+                Some(Modulation::Raster(raster)) => Some(raster.clone()),
+                _ => None,
+            };
+            let others = [matched.parent(), fill.clone(), raster].into_iter().flatten();
+            let parents: BTreeSet<ItemRef> = others.chain(base.iter().flat_map(Base::parents)).collect();
+            let parents = parents.into_iter().collect();
+            let (method, matched, modulation) = (method.clone(), matched.clone(), modulation.clone());
+            let job = TextureJob {
+                id: id.clone(),
+                matched,
+                base,
+                amplitude: item.amplitude,
+                modulation,
+                fill,
+                method,
+                synthesis,
+                cost,
+                one_of_many,
+                cells,
+                streams,
+                geotiff: builder.study.head.geotiff,
+            };
+            let stream = field.stream();
+            let node = Node { item: field.item.clone(), parents, inputs: Vec::new(), stream, job: Box::new(job) };
+            builder.node(node)?;
+            builder.heightfields.insert(id.clone(), field);
+            ids.push(id);
         }
-        builder.name_family(&entry, &item.id, ids)?;
+        if let Some(error) = refusal.filter(|_| entrants.iter().all(|e| e.cost.is_none())) {
+            return Err(entry.refuse(error).into());
+        }
+        if side_by_side && one.replicate == 0 {
+            builder.claim(entry, scoreboard::STAGE, &one.id)?;
+            let stream = Some(streams.label());
+            let realisations = item.realisations;
+            let matched = matched.clone();
+            let parents = matched.parent().into_iter().collect();
+            let job = ScoreboardJob { id: one.id.clone(), matched, entrants, realisations, streams };
+            let item = ItemRef::new(scoreboard::STAGE, &one.id);
+            builder.node(Node { item, parents, inputs: Vec::new(), stream, job: Box::new(job) })?;
+        }
     }
+    builder.name_family(entry, &item.id, ids)?;
     Ok(())
 }
 
@@ -226,6 +233,11 @@ fn on_background(mut one: Expanded, base: &Option<Base>, matched: &Matched, item
 
 /// Refuses keys that do not go together.
 fn check_purpose(entry: &Entry<'_>, item: &TextureItem, params: &Value) -> Result<(), StudyError> {
+    ParameterError::positive("amplitude", item.amplitude).map_err(|e| entry.refuse(e))?;
+    if item.amplitude != 1.0 && (item.methods.is_some() || item.fill.is_some()) {
+        let message = "`amplitude` cannot be combined with `methods` or `fill`";
+        return Err(entry.error("amplitude", message));
+    }
     if item.modulate.is_some() && item.onto.is_none() {
         return Err(entry.error("modulate", "`modulate` needs `onto`, the base whose texture it changes"));
     }
@@ -327,6 +339,7 @@ fn parameters(item: &TextureItem, matched: &Matched, synthesis: &dyn Method) -> 
     all.insert("fit".to_owned(), matched.describe());
     let more = [
         ("onto", item.onto.as_ref().map(|onto| json!(onto))),
+        ("amplitude", (item.amplitude != 1.0).then(|| json!(item.amplitude))),
         ("modulate", item.modulate.as_ref().map(|m| json!(m))),
         ("fill", item.fill.as_ref().map(|id| json!(id))),
     ];
@@ -349,6 +362,9 @@ impl Job for TextureJob {
         // Decides a note.
         if self.one_of_many {
             recipe["one_of_many"] = json!(true);
+        }
+        if self.amplitude != 1.0 {
+            recipe["amplitude"] = json!(self.amplitude);
         }
         match &self.modulation {
             None => {}
@@ -400,10 +416,15 @@ impl Job for TextureJob {
                 "{clip_share:.1e} of the spectrum was negative and set to 0; the covariance is off by at most {covariance_error_max_m2:.1e} m2"
             ));
         }
+        if self.amplitude != 1.0 {
+            notes.push(format!("heights scaled by {}", self.amplitude));
+        }
         if self.base.as_ref().is_some_and(|base| base.was_fitted) {
             notes.push(has_its_texture("onto = { background = \"<fit id>\" }"));
         }
+        // Compared with what was fitted, before an amplitude makes it another surface.
         let residual = self.residual(&grid, &fit);
+        let grid = scaled(grid, self.amplitude);
         let (heights, crs) = match &self.base {
             None => (grid, Crs::default()),
             Some(base) => {

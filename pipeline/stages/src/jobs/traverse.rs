@@ -13,7 +13,7 @@ use crate::study::{Entry, StudyError, keys};
 use rayon::prelude::*;
 use sastrugi_mobility::metrics::{Differentiator, MissionLabels, mission_row, replicate_row, sample_rows};
 use sastrugi_mobility::missions::{Difficulty, Mission, ReplicateParameters, ReplicateSettings};
-use sastrugi_mobility::registry::{Number, numbers, stated};
+use sastrugi_mobility::registry::{self, Number, numbers, stated};
 use sastrugi_mobility::vehicle::{
     Ground, GroundError, SurfaceLayers, SurfaceMap, TraverseError, TraverseParameters, TraverseSettings, Vehicle,
     check_scale, drive,
@@ -96,40 +96,50 @@ pub fn run_of(item_id: &str) -> &str {
 /// # Errors
 /// A wrong item.
 pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
-    for entry in builder.study.entries(STAGE)? {
-        let (envelope, params): (TraverseItem, Value) = entry.read()?;
-        let Some(drawn) = builder.missions.get(&envelope.missions).cloned() else {
-            return Err(unknown_id(&entry, "missions", &envelope.missions, builder.missions.keys()).into());
-        };
-        let rasters = [
-            raster(builder, &entry, "wheel_friction_raster", envelope.wheel_friction_raster.as_deref())?,
-            raster(builder, &entry, "rolling_resistance_raster", envelope.rolling_resistance_raster.as_deref())?,
-        ];
-        for one in entry.expand(&envelope.id, None, &envelope.sweep, &params)? {
-            entry.check_keys::<TraverseItem>(&one.params, &schema())?;
-            builder.claim(&entry, STAGE, &one.id)?;
-            let (raw, starts): (TraverseParameters, ReplicateParameters) =
-                keys::read_both(&one.params).map_err(|e| entry.refuse(e))?;
-            let (vehicle, settings) = raw.prepare().map_err(|e| entry.refuse(e))?;
-            if raw.goal_tolerance_m >= drawn.length_m {
-                let (tolerance_m, length_m) = (raw.goal_tolerance_m, drawn.length_m);
-                let message = format!("is {tolerance_m}; it must be below the missions' length of {length_m} m");
-                return Err(entry.refuse(ParameterError::new("goal_tolerance_m", message)).into());
+    builder.each(STAGE, add_table)
+}
+
+fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildError> {
+    let (envelope, params): (TraverseItem, Value) = entry.read()?;
+    entry.check_keys::<TraverseItem>(&params, &schema())?;
+    let Some(drawn) = builder.missions.get(&envelope.missions).cloned() else {
+        return Err(unknown_id(entry, "missions", &envelope.missions, builder.missions.keys()).into());
+    };
+    let rasters = [
+        raster(builder, entry, "wheel_friction_raster", envelope.wheel_friction_raster.as_deref())?,
+        raster(builder, entry, "rolling_resistance_raster", envelope.rolling_resistance_raster.as_deref())?,
+    ];
+    for one in entry.expand(&envelope.id, None, &envelope.sweep, &params)? {
+        entry.check_keys::<TraverseItem>(&one.params, &schema())?;
+        builder.claim(entry, STAGE, &one.id)?;
+        let (raw, starts): (TraverseParameters, ReplicateParameters) =
+            keys::read_both(&one.params).map_err(|e| entry.refuse(e))?;
+        let (vehicle, settings) = raw.prepare().map_err(|e| entry.refuse(e))?;
+        let doubts = registry::doubts(&raw.vehicle, &raw.vehicle_changes);
+        for doubt in doubts.into_iter().map(|doubt| format!("traverse \"{}\": {doubt}", envelope.id)) {
+            // Values of a sweep share their vehicle.
+            if !builder.doubts.contains(&doubt) {
+                builder.doubts.push(doubt);
             }
-            let starts = ReplicateSettings::new(starts, drawn.length_m).map_err(|e| entry.refuse(e))?;
-            let drive = Arc::new(Drive {
-                id: one.id,
-                variant: one.sweep,
-                vehicle,
-                settings,
-                starts,
-                rasters: rasters.clone(),
-                head: builder.study.head.clone(),
-                count: drawn.count,
-                seconds_each: (drawn.length_m / raw.speed_m_s).min(raw.timeout_s),
-            });
-            drawn.lines.iter().try_for_each(|lines| add_one(builder, &entry, &envelope.id, &drive, lines))?;
         }
+        if raw.goal_tolerance_m >= drawn.length_m {
+            let (tolerance_m, length_m) = (raw.goal_tolerance_m, drawn.length_m);
+            let message = format!("is {tolerance_m}; it must be below the missions' length of {length_m} m");
+            return Err(entry.refuse(ParameterError::new("goal_tolerance_m", message)).into());
+        }
+        let starts = ReplicateSettings::new(starts, drawn.length_m).map_err(|e| entry.refuse(e))?;
+        let drive = Arc::new(Drive {
+            id: one.id,
+            variant: one.sweep,
+            vehicle,
+            settings,
+            starts,
+            rasters: rasters.clone(),
+            head: builder.study.head.clone(),
+            count: drawn.count,
+            seconds_each: (drawn.length_m / raw.speed_m_s).min(raw.timeout_s),
+        });
+        drawn.lines.iter().try_for_each(|lines| add_one(builder, entry, &envelope.id, &drive, lines))?;
     }
     Ok(())
 }

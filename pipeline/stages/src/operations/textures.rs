@@ -4,6 +4,11 @@ use crate::job::JobError;
 use sastrugi_numeric::Grid;
 use sastrugi_schemas::fit::FitFile;
 
+/// A texture with its heights multiplied.
+pub fn scaled(texture: Grid, factor: f64) -> Grid {
+    if factor == 1.0 { texture } else { texture.map(|height| factor * height) }
+}
+
 /// Said of holes that are filled by an empirical fit.
 pub fn fill_note(fit: &FitFile) -> Option<String> {
     let model = &fit.map.as_ref()?.model;

@@ -23,18 +23,20 @@ pub struct Stale {
 /// What a run would do.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct PlanSummary {
-    /// Items of the study.
+    /// Items of the study, or of a part of it with those that they need.
     pub items: usize,
     /// Items with a result.
     pub ready: usize,
     /// Items to compute.
     pub stale: Vec<Stale>,
+    /// What makes no sense in the study though it is allowed, a sentence each.
+    pub doubts: Vec<String>,
 }
 
-/// Compares a graph with a work area; in an empty one everything is new.
-pub fn plan(graph: &Graph, cache: &Cache) -> PlanSummary {
+/// Compares items of a graph with a work area; in an empty one everything is new.
+pub fn plan(graph: &Graph, needed: &[usize], cache: &Cache) -> PlanSummary {
     let mut stale = Vec::new();
-    for position in 0..graph.len() {
+    for &position in needed {
         let node = graph.node(position);
         let reason = match cache.knows(&node.item) {
             true if cache.holds(&node.item, graph.key(position)) => continue,
@@ -45,7 +47,7 @@ pub fn plan(graph: &Graph, cache: &Cache) -> PlanSummary {
         let (item, memory_bytes) = (node.item.to_string(), node.job.memory_bytes());
         stale.push(Stale { item, reason, seconds: estimate.seconds, bytes: estimate.bytes, memory_bytes });
     }
-    PlanSummary { items: graph.len(), ready: graph.len() - stale.len(), stale }
+    PlanSummary { items: needed.len(), ready: needed.len() - stale.len(), stale, doubts: Vec::new() }
 }
 
 /// Why an item that was tried before has no result.

@@ -1,10 +1,10 @@
 //! One item table of a section: envelope and kernel parameters taken apart, replicates and sweeps spelled out.
 
 use super::keys::{self, UnknownKey};
-use super::text::{StudyError, StudyText};
+use super::text::{Refusals, StudyError, StudyText};
 use super::{check_id, segments, unknown_key};
 use sastrugi_schemas::ParameterError;
-use sastrugi_schemas::kind::{read_parameters, schema_of};
+use sastrugi_schemas::kind::{read_all, schema_of};
 use schemars::JsonSchema;
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
@@ -51,30 +51,43 @@ impl<'a> Entry<'a> {
     /// Takes the envelope and the kernel's parameters apart.
     ///
     /// # Errors
-    /// An envelope key of the wrong type, or an id that is not well formed.
-    pub fn read<E: DeserializeOwned + JsonSchema>(&self) -> Result<(E, Value), StudyError> {
+    /// Envelope keys of the wrong type, and an id that is not well formed.
+    pub fn read<E: DeserializeOwned + JsonSchema>(&self) -> Result<(E, Value), Refusals> {
         let names = keys::properties(&schema_of::<E>());
         let (envelope, params): (Map<_, _>, Map<_, _>) =
             self.table.clone().into_iter().partition(|(key, _)| names.contains(key));
-        if let Some(id) = envelope.get("id").and_then(Value::as_str) {
-            check_id("id", id).map_err(|e| self.refuse(e))?;
+        let id = envelope.get("id").and_then(Value::as_str);
+        let mut errors: Vec<StudyError> =
+            id.and_then(|id| check_id("id", id).err()).map(|e| self.refuse(e)).into_iter().collect();
+        match read_all(Value::Object(envelope)) {
+            Ok(envelope) => Refusals::none(errors).map(|()| (envelope, Value::Object(params))),
+            Err(refused) => {
+                errors.extend(refused.into_iter().map(|e| self.refuse_missing(e, &names, &params)));
+                Err(Refusals(errors))
+            }
         }
-        let envelope = read_parameters(&Value::Object(envelope)).map_err(|e| self.refuse(e))?;
-        Ok((envelope, Value::Object(params)))
+    }
+
+    /// A refusal; where a required key is missing and another stands for it, that of the other.
+    fn refuse_missing(&self, error: ParameterError, names: &[String], params: &Map<String, Value>) -> StudyError {
+        let mut others = params.keys().map(|key| UnknownKey { path: vec![key.clone()], known: names.to_vec() });
+        match others.find(|other| other.nearest().is_some_and(|key| error.is_missing(key))) {
+            Some(other) => unknown_key(self.text, &self.path(), &other),
+            None => self.refuse(error),
+        }
     }
 
     /// Refuses parameter keys that the schema does not have; `E` is the envelope, whose keys are suggested too.
     ///
     /// # Errors
-    /// The first unknown key.
-    pub fn check_keys<E: JsonSchema>(&self, params: &Value, schema: &Value) -> Result<(), StudyError> {
-        let Some(mut unknown) = keys::find_unknown(params, schema).or_else(|| any_key(params, schema)) else {
-            return Ok(());
-        };
-        if unknown.path.len() == 1 {
-            unknown.known.extend(keys::properties(&schema_of::<E>()));
+    /// The unknown keys.
+    pub fn check_keys<E: JsonSchema>(&self, params: &Value, schema: &Value) -> Result<(), Refusals> {
+        let mut unknown = keys::find_unknown(params, schema);
+        unknown.extend(any_keys(params, schema));
+        for key in unknown.iter_mut().filter(|key| key.path.len() == 1) {
+            key.known.extend(keys::properties(&schema_of::<E>()));
         }
-        Err(unknown_key(self.text, &self.path(), &unknown))
+        Refusals::none(unknown.iter().map(|key| unknown_key(self.text, &self.path(), key)).collect())
     }
 
     /// Spells out sweeps and replicates.
@@ -139,17 +152,18 @@ impl<'a> Entry<'a> {
     /// An error about a key of this table (dotted path), or about the table where the key is not written.
     pub fn error(&self, key: &str, message: impl Into<String>) -> StudyError {
         let path = self.path_of_dotted(key);
-        let id = self
-            .table
-            .get("id")
-            .and_then(Value::as_str)
-            .map_or_else(|| format!("number {}", self.index + 1), |id| format!("\"{id}\""));
+        let id = self.id().map_or_else(|| format!("number {}", self.index + 1), |id| format!("\"{id}\""));
         StudyError::at(self.text.span(&path, false), format!("{} {id}: {}", self.section, message.into()))
     }
 
     /// A kernel's refusal, with its place.
     pub fn refuse(&self, error: ParameterError) -> StudyError {
         self.error(&error.key, error.to_string())
+    }
+
+    /// Its id, where it has one that is text.
+    pub fn id(&self) -> Option<&'a str> {
+        self.table.get("id").and_then(Value::as_str)
     }
 
     /// Path of one of this table's keys in the study.
@@ -174,9 +188,12 @@ pub fn joined(first: Option<&str>, second: Option<&str>) -> Option<String> {
 }
 
 /// For a schema without properties every key is unknown.
-fn any_key(params: &Value, schema: &Value) -> Option<UnknownKey> {
-    let key = params.as_object()?.keys().next()?;
-    keys::properties(schema).is_empty().then(|| UnknownKey { path: vec![key.clone()], known: Vec::new() })
+fn any_keys(params: &Value, schema: &Value) -> Vec<UnknownKey> {
+    if !keys::properties(schema).is_empty() {
+        return Vec::new();
+    }
+    let keys = params.as_object().into_iter().flat_map(Map::keys);
+    keys.map(|key| UnknownKey { path: vec![key.clone()], known: Vec::new() }).collect()
 }
 
 fn replicates(item: Expanded, count: Option<u32>) -> Vec<Expanded> {
@@ -223,10 +240,10 @@ mod tests {
         f(Entry::new("terrain", 0, &table, &text))
     }
 
-    fn expand(toml: &str) -> Result<Vec<Expanded>, StudyError> {
+    fn expand(toml: &str) -> Result<Vec<Expanded>, Refusals> {
         with(toml, |entry| {
             let (item, params): (TerrainItem, _) = entry.read()?;
-            entry.expand(&item.id, item.count, &item.sweep, &params)
+            Ok(entry.expand(&item.id, item.count, &item.sweep, &params)?)
         })
     }
 
@@ -244,7 +261,7 @@ mod tests {
 
     #[test]
     fn val_refusals() {
-        let message = |toml: &str| expand(toml).unwrap_err().message;
+        let message = |toml: &str| expand(toml).unwrap_err().to_string();
         assert!(message("[[terrain]]\nid = \"a\"\nkind = \"k\"\ncount = 0\n").contains("1 or more"));
         assert!(message("[[terrain]]\nid = \"A\"\nkind = \"k\"\n").contains("a-z"));
         assert!(message("[[terrain]]\nid = \"a\"\nkind = \"k\"\nsweep.d = []\n").contains("no values"));

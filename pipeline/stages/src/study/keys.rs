@@ -21,11 +21,36 @@ impl UnknownKey {
         self.path.last().map_or("", String::as_str)
     }
 
-    /// The known key that is nearest in spelling, if one is near.
+    /// The known key that is meant, as far as can be told: the product's word for the same thing, or the nearest in spelling.
     pub fn nearest(&self) -> Option<&str> {
-        nearest(self.key(), self.known.iter().map(String::as_str))
+        let known = || self.known.iter().map(String::as_str);
+        let synonym = SYNONYMS.iter().find(|(words, key)| words.contains(&self.key()) && known().any(|k| k == *key));
+        synonym.map(|(_, key)| *key).or_else(|| nearest(self.key(), known()))
     }
 }
+
+/// Words that people try, and the key that they mean.
+const SYNONYMS: [(&[&str], &str); 19] = [
+    (&["author", "authors", "people"], "creators"),
+    (&["institution", "institutions", "affiliation"], "organizations"),
+    (&["path", "filename", "dem_file", "input", "source"], "file"),
+    (&["n", "number", "replicates", "repetitions", "copies"], "count"),
+    (&["n", "number", "replicates", "count"], "pairs"),
+    (&["n", "number", "replicates", "count"], "rovers"),
+    (&["resolution", "pixel_size", "spacing", "gsd", "dx", "cellsize"], "cell_m"),
+    (&["size", "extent", "width", "height"], "size_m"),
+    (&["shape", "pixels"], "size_px"),
+    (&["type", "generator", "algorithm"], "kind"),
+    (&["generator", "algorithm", "kind"], "method"),
+    (&["label", "category"], "group"),
+    (&["name", "key"], "id"),
+    (&["roi", "bbox", "bounds", "crop"], "window"),
+    (&["random_seed", "rng"], "seed"),
+    (&["robot", "platform"], "vehicle"),
+    (&["outer_scale", "detrend", "detrending", "window_m"], "outer_scale_m"),
+    (&["summary", "abstract"], "description"),
+    (&["terrain", "surface", "surfaces"], "terrains"),
+];
 
 /// The candidate nearest to `word` in spelling, if it is near at all (Jaro and Winkler's similarity above 0.75).
 pub fn nearest<'a>(word: &str, candidates: impl Iterator<Item = &'a str>) -> Option<&'a str> {
@@ -69,42 +94,52 @@ where
     Ok((read_parameters(&Value::Object(first))?, read_parameters(&Value::Object(second))?))
 }
 
-/// The first unknown key of `value`, depth first.
-pub fn find_unknown(value: &Value, schema: &Value) -> Option<UnknownKey> {
-    search(value, schema, schema, &mut Vec::new())
+/// The unknown keys of `value`, depth first.
+pub fn find_unknown(value: &Value, schema: &Value) -> Vec<UnknownKey> {
+    let mut found = Vec::new();
+    search(value, schema, schema, &mut Vec::new(), &mut found);
+    found
 }
 
-fn search(value: &Value, schema: &Value, root: &Value, path: &mut Vec<String>) -> Option<UnknownKey> {
+fn search(value: &Value, schema: &Value, root: &Value, path: &mut Vec<String>, found: &mut Vec<UnknownKey>) {
     match value {
-        Value::Object(map) => search_object(map, schema, root, path),
+        Value::Object(map) => search_object(map, schema, root, path, found),
         Value::Array(list) => {
-            let item = alternatives(schema, root).into_iter().find_map(|s| s.get("items"))?;
-            list.iter().enumerate().find_map(|(i, v)| below(path, i.to_string(), |path| search(v, item, root, path)))
+            let Some(item) = alternatives(schema, root).into_iter().find_map(|s| s.get("items")) else { return };
+            for (i, v) in list.iter().enumerate() {
+                below(path, i.to_string(), |path| search(v, item, root, path, found));
+            }
         }
-        _ => None,
+        _ => {}
     }
 }
 
-fn search_object(map: &Map<String, Value>, schema: &Value, root: &Value, path: &mut Vec<String>) -> Option<UnknownKey> {
+fn search_object(
+    map: &Map<String, Value>,
+    schema: &Value,
+    root: &Value,
+    path: &mut Vec<String>,
+    found: &mut Vec<UnknownKey>,
+) {
     let objects = objects(schema, root);
     if objects.is_empty() {
-        return None;
+        return;
     }
-    map.iter().find_map(|(key, value)| {
+    for (key, value) in map {
         below(path, key.clone(), |path| match objects.iter().find_map(|o| o.get(key)) {
-            Some(inner) => search(value, inner, root, path),
+            Some(inner) => search(value, inner, root, path, found),
             None => {
-                Some(UnknownKey { path: path.clone(), known: objects.iter().flat_map(|o| o.keys().cloned()).collect() })
+                let known = objects.iter().flat_map(|o| o.keys().cloned()).collect();
+                found.push(UnknownKey { path: path.clone(), known });
             }
-        })
-    })
+        });
+    }
 }
 
-fn below<T>(path: &mut Vec<String>, segment: String, f: impl FnOnce(&mut Vec<String>) -> T) -> T {
+fn below(path: &mut Vec<String>, segment: String, f: impl FnOnce(&mut Vec<String>)) {
     path.push(segment);
-    let result = f(path);
+    f(path);
     path.pop();
-    result
 }
 
 /// The `properties` of a schema and of everything it refers to or chooses from.
@@ -146,11 +181,17 @@ mod tests {
     #[test]
     fn val_unknown_keys_at_every_depth() {
         let schema = sastrugi_schemas::kind::schema_of::<Outer>();
-        let unknown = |v: Value| find_unknown(&v, &schema).map(|u| (u.path.join("."), u.nearest().map(str::to_owned)));
-        assert_eq!(unknown(json!({"low": {"sigma_px": 1}, "cell_m": 2})), None);
-        assert_eq!(unknown(json!({"cel_m": 2})), Some(("cel_m".into(), Some("cell_m".into()))));
-        assert_eq!(unknown(json!({"low": {"sigma": 1}})), Some(("low.sigma".into(), Some("sigma_px".into()))));
-        assert_eq!(unknown(json!({"optional": {"sigma": 1}})).unwrap().0, "optional.sigma");
-        assert_eq!(unknown(json!({"list": [{"sigma_px": 1}, {"x": 1}]})), Some(("list.1.x".into(), None)));
+        let unknown = |v: Value| -> Vec<(String, Option<String>)> {
+            let found = find_unknown(&v, &schema);
+            found.iter().map(|u| (u.path.join("."), u.nearest().map(str::to_owned))).collect()
+        };
+        let one = |path: &str, nearest: Option<&str>| vec![(path.to_owned(), nearest.map(str::to_owned))];
+        assert_eq!(unknown(json!({"low": {"sigma_px": 1}, "cell_m": 2})), []);
+        assert_eq!(unknown(json!({"cel_m": 2})), one("cel_m", Some("cell_m")));
+        assert_eq!(unknown(json!({"resolution": 2})), one("resolution", Some("cell_m")));
+        assert_eq!(unknown(json!({"low": {"sigma": 1}})), one("low.sigma", Some("sigma_px")));
+        assert_eq!(unknown(json!({"optional": {"sigma": 1}}))[0].0, "optional.sigma");
+        assert_eq!(unknown(json!({"list": [{"sigma_px": 1}, {"x": 1}]})), one("list.1.x", None));
+        assert_eq!(unknown(json!({"x": 1, "low": {"y": 1}, "list": [{"z": 1}]})).len(), 3);
     }
 }

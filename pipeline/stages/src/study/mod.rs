@@ -5,14 +5,18 @@ pub mod keys;
 pub mod text;
 
 pub use entry::{Entry, Expanded};
-pub use text::{StudyError, StudyText};
+use keys::UnknownKey;
+pub use text::{Refusals, StudyError, StudyText};
 
 use sastrugi_schemas::ParameterError;
-use sastrugi_schemas::kind::{read_parameters, schema_of};
-use sastrugi_schemas::study::{McapFlavour, RoughnessSection, StudyHead};
+use sastrugi_schemas::kind::{read_all, remove, schema_of};
+use sastrugi_schemas::study::{McapFlavour, RoughnessSection, Shares, StudyHead};
 use serde_json::{Map, Value};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+
+/// What the message on a section that no study has begins with.
+pub const UNKNOWN_SECTION: &str = "unknown section";
 
 /// A study as read: the head checked, the items still tables.
 pub struct Study {
@@ -30,18 +34,28 @@ impl Study {
     /// Reads a study from its text; `folder` is where relative paths start.
     ///
     /// # Errors
-    /// The first thing that is wrong, with its place.
-    pub fn parse(raw: &str, folder: &Path, sections: &[&'static str]) -> Result<Self, StudyError> {
+    /// All that is wrong outside of the items, with its place.
+    pub fn parse(raw: &str, folder: &Path, sections: &[&'static str]) -> Result<Self, Refusals> {
+        let (study, errors) = Self::read(raw, folder, sections)?;
+        Refusals::none(errors).map(|()| study)
+    }
+
+    /// The same, with what is wrong outside of the items beside a study whose items can be checked as well.
+    ///
+    /// # Errors
+    /// A text that is not TOML.
+    pub fn read(raw: &str, folder: &Path, sections: &[&'static str]) -> Result<(Self, Vec<StudyError>), StudyError> {
         let text = StudyText::parse(raw)?;
         let Value::Object(root) = text.to_json()? else {
             return Err(StudyError::at(None, "a study is a table of sections"));
         };
-        let head = read_head(&root, &text)?;
-        let roughness = read_section::<RoughnessSection>(&root, &text, "roughness")?.unwrap_or_default();
-        check_roughness(&roughness).map_err(|e| section_error(&text, "roughness", e))?;
+        let mut errors = Vec::new();
+        let head = read_head(&root, &text, &mut errors);
+        let roughness = read_section::<RoughnessSection>(&root, &text, "roughness", &mut errors).unwrap_or_default();
+        errors.extend(check_roughness(&roughness).err().map(|e| section_error(&text, "roughness", e)));
         let study = Self { head, roughness, folder: folder.to_owned(), text, root };
-        study.check_sections(sections)?;
-        Ok(study)
+        errors.extend(study.unknown_sections(sections));
+        Ok((study, errors))
     }
 
     /// The tables of `[[section]]`, in order.
@@ -63,20 +77,25 @@ impl Study {
         self.text.exact_span(path)
     }
 
-    fn check_sections(&self, sections: &[&'static str]) -> Result<(), StudyError> {
+    fn unknown_sections(&self, sections: &[&'static str]) -> Vec<StudyError> {
         let known = || ["study"].into_iter().chain(sections.iter().copied());
-        let Some(unknown) = self.root.keys().find(|k| !known().any(|s| s == *k)) else { return Ok(()) };
         let names: Vec<&str> = known().collect();
-        let message = format!("unknown section `{unknown}`; a study has {}", names.join(", "));
-        let help = keys::nearest(unknown, known()).map(|n| format!("did you mean `{n}`?"));
-        Err(StudyError::at(self.text.span(std::slice::from_ref(unknown), true), message).with_help(help))
+        let unknown = self.root.keys().filter(|k| !known().any(|s| s == *k));
+        let refuse = |unknown: &String| {
+            let message = format!("{UNKNOWN_SECTION} `{unknown}`; a study has {}", names.join(", "));
+            let help = keys::nearest(unknown, known()).map(|n| format!("did you mean `{n}`?"));
+            StudyError::at(self.text.span(std::slice::from_ref(unknown), true), message).with_help(help)
+        };
+        unknown.map(refuse).collect()
     }
 }
 
-fn read_head(root: &Map<String, Value>, text: &StudyText) -> Result<StudyHead, StudyError> {
-    let Some(mut head) = read_section::<StudyHead>(root, text, "study")? else {
-        return Err(StudyError::at(None, "the section [study] is missing; it holds at least name, seed and date"));
-    };
+/// The head; where it cannot be read, one that does for checking the items.
+fn read_head(root: &Map<String, Value>, text: &StudyText, errors: &mut Vec<StudyError>) -> StudyHead {
+    if !root.contains_key("study") {
+        errors.push(StudyError::at(None, "the section [study] is missing; it holds at least name, seed and date"));
+    }
+    let Some(mut head) = read_section::<StudyHead>(root, text, "study", errors) else { return readable_head(root) };
     if head.title.is_empty() {
         head.title.clone_from(&head.name);
     }
@@ -87,25 +106,52 @@ fn read_head(root: &Map<String, Value>, text: &StudyText) -> Result<StudyHead, S
         check_version(head.version.as_deref()),
         check_url(head.url.as_deref()),
         check_doi(head.doi.as_deref()),
-        check_split(head.split.as_ref()),
+        check_split(head.split),
         check_creators(&head),
         check_organizations(&head),
         check_epoch(&head),
     ];
-    checks.into_iter().collect::<Result<Vec<()>, _>>().map_err(|e| section_error(text, "study", e))?;
-    Ok(head)
+    errors.extend(checks.into_iter().filter_map(Result::err).map(|e| section_error(text, "study", e)));
+    head
 }
 
-/// Reads a section that is one table.
-fn read_section<T>(root: &Map<String, Value>, text: &StudyText, section: &str) -> Result<Option<T>, StudyError>
+/// A head with every key that can be read, for checking what depends on it; its errors are told.
+fn readable_head(root: &Map<String, Value>) -> StudyHead {
+    let keys = root.get("study").and_then(Value::as_object).into_iter().flatten();
+    keys.fold(StudyHead::default(), |head, (key, value)| {
+        let with = serde_json::to_value(&head).map(|mut all| {
+            all[key] = value.clone();
+            all
+        });
+        with.and_then(serde_json::from_value).unwrap_or(head)
+    })
+}
+
+/// Reads a section that is one table, if it is there and right.
+fn read_section<T>(
+    root: &Map<String, Value>,
+    text: &StudyText,
+    section: &str,
+    errors: &mut Vec<StudyError>,
+) -> Option<T>
 where
     T: serde::de::DeserializeOwned + schemars::JsonSchema,
 {
-    let Some(value) = root.get(section) else { return Ok(None) };
-    if let Some(unknown) = keys::find_unknown(value, &schema_of::<T>()) {
-        return Err(unknown_key(text, &[section.to_owned()], &unknown));
+    let mut value = root.get(section)?.clone();
+    let unknown = keys::find_unknown(&value, &schema_of::<T>());
+    for key in &unknown {
+        errors.push(unknown_key(text, &[section.to_owned()], key));
+        remove(&mut value, &key.path);
     }
-    read_parameters(value).map(Some).map_err(|e| section_error(text, section, e))
+    // A required key under another name is not missing as well.
+    let is_told = |e: &ParameterError| unknown.iter().filter_map(UnknownKey::nearest).any(|key| e.is_missing(key));
+    match read_all(value) {
+        Ok(read) => Some(read),
+        Err(refused) => {
+            errors.extend(refused.into_iter().filter(|e| !is_told(e)).map(|e| section_error(text, section, e)));
+            None
+        }
+    }
 }
 
 fn section_error(text: &StudyText, section: &str, error: ParameterError) -> StudyError {
@@ -185,9 +231,13 @@ fn check_license(license: &str) -> Result<(), ParameterError> {
     Ok(())
 }
 
-fn check_split(split: Option<&[f64; 3]>) -> Result<(), ParameterError> {
-    let Some(shares) = split else { return Ok(()) };
-    let refuse = |rule: &str| Err(ParameterError::new("split", format!("is {shares:?}; {rule}")));
+fn check_split(split: Option<Shares>) -> Result<(), ParameterError> {
+    let Some(shares) = split.map(Shares::by_part) else { return Ok(()) };
+    let written = match split {
+        Some(Shares::Two(two)) => format!("{two:?}"),
+        _ => format!("{shares:?}"),
+    };
+    let refuse = |rule: &str| Err(ParameterError::new("split", format!("is {written}; {rule}")));
     if !shares.iter().all(|share| (0.0..=1.0).contains(share)) {
         return refuse("shares are 0 to 1");
     }
@@ -286,13 +336,14 @@ mod tests {
 
     const HEAD: &str = "[study]\nname = \"x\"\nseed = 1\ndate = \"2024-02-29\"\n";
 
-    fn parse(text: &str) -> Result<Study, StudyError> {
-        Study::parse(text, Path::new("."), &["terrain", "dem"])
+    fn parse(text: &str) -> Result<Study, Refusals> {
+        Study::parse(text, Path::new("."), &["terrain", "dem", "roughness"])
     }
 
     fn refusal(text: &str) -> (String, String) {
-        let error = parse(text).err().expect("refused");
-        (error.message, error.span.map(|s| text[s].to_owned()).unwrap_or_default())
+        let Refusals(errors) = parse(text).err().expect("refused");
+        let [error] = errors.as_slice() else { panic!("{errors:?}") };
+        (error.message.clone(), error.span.clone().map(|s| text[s].to_owned()).unwrap_or_default())
     }
 
     #[test]

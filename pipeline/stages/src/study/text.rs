@@ -14,17 +14,46 @@ pub struct StudyError {
     pub span: Option<Range<usize>>,
     /// A suggestion.
     pub help: Option<String>,
+    /// The id that it says is missing; no error where the item of that id is itself refused.
+    pub missing_id: Option<String>,
 }
 
 impl StudyError {
     /// An error about a place in the text.
     pub fn at(span: Option<Range<usize>>, message: impl Into<String>) -> Self {
-        Self { message: message.into(), span, help: None }
+        Self { message: message.into(), span, help: None, missing_id: None }
     }
 
     /// The error with a suggestion.
     pub fn with_help(self, help: Option<String>) -> Self {
         Self { help, ..self }
+    }
+}
+
+/// All that is wrong in a study's text, at least one thing.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{}", .0.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))]
+pub struct Refusals(pub Vec<StudyError>);
+
+impl From<StudyError> for Refusals {
+    fn from(error: StudyError) -> Self {
+        Self(vec![error])
+    }
+}
+
+impl Refusals {
+    /// `Ok` where nothing is wrong; else what is, each thing once and in the order of the text.
+    ///
+    /// # Errors
+    /// When there are any.
+    pub fn none(mut errors: Vec<StudyError>) -> Result<(), Self> {
+        if errors.is_empty() {
+            return Ok(());
+        }
+        let place = |error: &StudyError| error.span.as_ref().map_or((usize::MAX, 0), |span| (span.start, span.end));
+        errors.sort_by(|a, b| place(a).cmp(&place(b)).then_with(|| a.message.cmp(&b.message)));
+        errors.dedup();
+        Err(Self(errors))
     }
 }
 

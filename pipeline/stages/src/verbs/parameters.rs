@@ -3,7 +3,7 @@
 use crate::error::Error;
 use crate::study::keys;
 use crate::study::text::{StudyText, value_to_json};
-use sastrugi_mobility::registry::CUSTOM;
+use sastrugi_mobility::registry::{CUSTOM, doubts};
 use sastrugi_schemas::Kind;
 use serde_json::{Map, Value};
 use std::path::Path;
@@ -23,26 +23,56 @@ pub fn assign(params: &mut Value, pairs: &[String]) -> Result<(), Error> {
     Ok(())
 }
 
-/// The vehicle of a run: the name of a known one, or a file like the shipped ones (`.toml`), whose table `[parameters]` is a
-/// vehicle of the user's own.
+/// Keys of a vehicle file: those that are read, and those that `kinds` prints beside them.
+const VEHICLE_KEYS: [&str; 8] = ["base", "parameters", "sources", "kind", "family", "summary", "source", "schema"];
+
+/// The vehicle of a run: the name of a known one, or a vehicle file (`.toml`, or `.json` as `kinds` prints it). The table `parameters` of a file holds
+/// those that differ from the vehicle named by `base` or `kind`, or all of them where neither is there.
 ///
 /// # Errors
-/// A file that cannot be read, is no TOML, or has no such table.
+/// A file that cannot be read, is neither TOML nor JSON, or is not a vehicle file.
 pub fn assign_vehicle(params: &mut Value, vehicle: &str) -> Result<(), Error> {
-    if !vehicle.ends_with(".toml") {
+    let is = |ending: &str| vehicle.to_ascii_lowercase().ends_with(ending);
+    if !is(".toml") && !is(".json") {
         return place(params, "vehicle", Value::from(vehicle));
     }
+    let refused = |e: &dyn std::fmt::Display| Error::Usage(format!("{vehicle}: {e}"));
     let text =
         sastrugi_store::file::read_text(Path::new(vehicle)).map_err(|e| Error::Input(format!("{vehicle}: {e}")))?;
-    let parsed = StudyText::parse(&text).and_then(|text| text.to_json());
-    let file = parsed.map_err(|e| Error::Usage(format!("{vehicle}: {e}")))?;
+    let file: Value = if is(".json") {
+        serde_json::from_str(&text).map_err(|e| refused(&e))?
+    } else {
+        StudyText::parse(&text).and_then(|text| text.to_json()).map_err(|e| refused(&e))?
+    };
+    // `kinds` lists what it prints.
+    let file = match file.as_array().map(Vec::as_slice) {
+        None => &file,
+        Some([one]) => one,
+        Some(several) => return Err(refused(&format!("holds {} vehicles; keep one of them", several.len()))),
+    };
+    let mut keys = file.as_object().into_iter().flat_map(Map::keys);
+    if let Some(unknown) = keys.find(|key| !VEHICLE_KEYS.contains(&key.as_str())) {
+        return Err(refused(&format!(
+            "unknown key `{unknown}`; numbers of the vehicle stand in the table `parameters`"
+        )));
+    }
+    let base = match file.get("base").or_else(|| file.get("kind")) {
+        None => CUSTOM,
+        Some(base) => base.as_str().ok_or_else(|| refused(&"`base` must be the name of a vehicle"))?,
+    };
     match file.get("parameters") {
         Some(parameters @ Value::Object(_)) => {
-            place(params, "vehicle", Value::from(CUSTOM))?;
+            place(params, "vehicle", Value::from(base))?;
             place(params, "vehicle_changes", parameters.clone())
         }
-        _ => Err(Error::Usage(format!("{vehicle}: it has no table [parameters]; a vehicle file has one"))),
+        _ => Err(refused(&"missing table `parameters`")),
     }
+}
+
+/// Doubts about the vehicle of a run, a sentence each.
+pub fn vehicle_doubts(params: &Value) -> Vec<String> {
+    let changes = params["vehicle_changes"].as_object().cloned().unwrap_or_default();
+    params["vehicle"].as_str().map(|kind| doubts(kind, &changes)).unwrap_or_default()
 }
 
 fn parse_value(pair: &str, text: &str) -> Result<Value, Error> {
@@ -91,7 +121,8 @@ pub fn to_toml(value: &Value) -> Result<toml_edit::Value, Error> {
 pub fn read_file(path: &Path) -> Result<Value, Error> {
     let text = sastrugi_store::file::read_text(path).map_err(|e| Error::Input(format!("{}: {e}", path.display())))?;
     let name = path.display().to_string();
-    StudyText::parse(&text).and_then(|t| t.to_json()).map_err(|error| Error::Study { name, text, error })
+    let read = StudyText::parse(&text).and_then(|t| t.to_json());
+    read.map_err(|error| Error::Study { name, text, refusals: error.into() })
 }
 
 /// Refuses parameters that a kind does not have.
@@ -107,7 +138,8 @@ pub fn check(params: &Value, kind: &Kind) -> Result<(), Error> {
 /// # Errors
 /// The first unknown key, with the nearest known one.
 pub fn check_schema(params: &Value, schema: &Value, of: &str) -> Result<(), Error> {
-    let Some(unknown) = keys::find_unknown(params, schema) else { return Ok(()) };
+    let found = keys::find_unknown(params, schema);
+    let Some(unknown) = found.first() else { return Ok(()) };
     let hint = match unknown.nearest() {
         Some(nearest) => format!("did you mean `{nearest}`?"),
         None => format!("it has {}", unknown.known.join(", ")),

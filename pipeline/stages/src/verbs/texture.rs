@@ -3,9 +3,10 @@
 use super::parameters;
 use crate::error::Error;
 use crate::jobs::texture::{STAGE, kinds};
-use crate::operations::textures::{fill_note, has_its_texture, lay_onto};
+use crate::operations::textures::{fill_note, has_its_texture, lay_onto, scaled};
 use crate::verbs::{Read, Reading, read};
 use sastrugi_numeric::Streams;
+use sastrugi_schemas::ParameterError;
 use sastrugi_schemas::fit::FitFile;
 use sastrugi_store::dem::points::GridSettings;
 use sastrugi_store::dem::{self, Crs, WriteOptions};
@@ -27,14 +28,23 @@ pub struct Request<'a> {
     pub seed: u64,
     /// Base DEM to add the texture to.
     pub onto: Option<&'a Path>,
-    /// Raster of factors of the texture on its base.
-    pub amplitude: Option<&'a Path>,
+    /// Factor on the heights of the texture.
+    pub amplitude: Option<Amplitude<'a>>,
     /// DEM whose holes are filled, in place of a texture.
     pub fill: Option<&'a Path>,
     /// DEM to write.
     pub output: &'a Path,
     /// How to write.
     pub options: WriteOptions,
+}
+
+/// Factor on a texture.
+#[derive(Clone, Copy)]
+pub enum Amplitude<'a> {
+    /// One number.
+    Factor(f64),
+    /// A raster of factors of the texture on its base.
+    Raster(&'a Path),
 }
 
 /// Said where `covariance` is not given with a base: a file does not say whether it was measured.
@@ -63,8 +73,14 @@ pub fn texture(request: &Request<'_>) -> Result<Value, Error> {
     if let Some(dem) = request.fill {
         return fill(request, dem, &fit);
     }
-    if request.amplitude.is_some() && request.onto.is_none() {
-        return Err(Error::Usage("`--amplitude` needs `--onto`, the base whose texture it changes".to_owned()));
+    let (factor, raster) = match request.amplitude {
+        None => (1.0, None),
+        Some(Amplitude::Factor(factor)) => (ParameterError::positive("--amplitude", factor)?, None),
+        Some(Amplitude::Raster(path)) => (1.0, Some(path)),
+    };
+    if raster.is_some() && request.onto.is_none() {
+        let message = "`--amplitude` with a raster needs `--onto`, the base whose texture it changes";
+        return Err(Error::Usage(message.to_owned()));
     }
     let mut parameters = request.parameters.clone();
     let on_background = request.onto.is_some() && fit.window_m.is_some() && request.method == fft_ma::kind().kind;
@@ -77,20 +93,22 @@ pub fn texture(request: &Request<'_>) -> Result<Value, Error> {
     let streams = Streams::for_seed(request.seed, STAGE);
     let mut notes = sastrugi_texture::fit_notes(&fit);
     notes.extend(synthesis.notes());
+    notes.extend((factor != 1.0).then(|| format!("heights scaled by {factor}")));
     notes.extend(chosen.then(|| RESIDUAL_CHOSEN.to_owned()));
     if let Some(path) = request.onto.filter(|path| is_fitted_dem(path, &fit)) {
         notes.push(format!("{}: {}", path.display(), has_its_texture("`fit --background DEM` writes it")));
     }
     let outcome = synthesis.generate(&streams).map_err(|e| Error::Usage(e.to_string()))?;
+    let texture = scaled(outcome.grid, factor);
     let (heights, crs) = match request.onto {
-        None => (outcome.grid, Crs::default()),
+        None => (texture, Crs::default()),
         Some(path) => {
             // A point cloud is gridded to the texture's cells.
-            let gridding = GridSettings { cell_m: Some(outcome.grid.geometry.cell[0]), ..GridSettings::default() };
+            let gridding = GridSettings { cell_m: Some(texture.geometry.cell[0]), ..GridSettings::default() };
             let reading = Reading { gridding, ..Reading::default() };
             let Read { dem: base, notes: read_notes, .. } = read(path, &reading)?;
             notes.extend(read_notes);
-            let factors = match request.amplitude {
+            let factors = match raster {
                 None => None,
                 Some(path) => {
                     let raster = read(path, &reading)?.dem.grid;
@@ -98,7 +116,7 @@ pub fn texture(request: &Request<'_>) -> Result<Value, Error> {
                     Some(factors.map_err(|e| Error::Input(format!("{}: {e}", path.display())))?)
                 }
             };
-            let sum = lay_onto(&base.grid, &outcome.grid, synthesis.is_periodic(), factors.as_ref());
+            let sum = lay_onto(&base.grid, &texture, synthesis.is_periodic(), factors.as_ref());
             (sum.map_err(|e| Error::Usage(e.message))?, base.info.crs)
         }
     };
@@ -109,6 +127,7 @@ pub fn texture(request: &Request<'_>) -> Result<Value, Error> {
         "seed": request.seed,
         "stream": streams.label(),
         "parameters": synthesis.parameters(),
+        "amplitude": factor,
         "covariance_error_max_m2": outcome.covariance_error_max_m2,
         "clip_share": outcome.clip_share,
         "grid": super::describe_grid(&heights),

@@ -6,6 +6,7 @@ mod trail;
 
 use crate::builder::{BuildError, Builder};
 use crate::job::{ItemRef, JobError, Work};
+use crate::study::Entry;
 use sastrugi_mobility::missions::Mission;
 use sastrugi_schemas::Kind;
 use sastrugi_schemas::study::{MissionKind, MissionsItem};
@@ -27,14 +28,16 @@ pub fn kinds() -> Vec<Kind> {
 /// # Errors
 /// A wrong item.
 pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
-    for entry in builder.study.entries(STAGE)? {
-        let (envelope, params): (MissionsItem, Value) = entry.read()?;
-        builder.claim(&entry, STAGE, &envelope.id)?;
-        match envelope.kind {
-            MissionKind::Straight => straight::add(builder, &entry, &envelope, &params)?,
-            MissionKind::Routed => routed::add(builder, &entry, &envelope, &params)?,
-            MissionKind::Trail => trail::add(builder, &entry, &envelope, &params)?,
-        }
+    builder.each(STAGE, add_table)
+}
+
+fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildError> {
+    let (envelope, params): (MissionsItem, Value) = entry.read()?;
+    builder.claim(entry, STAGE, &envelope.id)?;
+    match envelope.kind {
+        MissionKind::Straight => straight::add(builder, entry, &envelope, &params)?,
+        MissionKind::Routed => routed::add(builder, entry, &envelope, &params)?,
+        MissionKind::Trail => trail::add(builder, entry, &envelope, &params)?,
     }
     Ok(())
 }

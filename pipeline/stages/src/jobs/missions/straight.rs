@@ -9,8 +9,9 @@ use crate::operations::drawn::{Drawn, Lines};
 use crate::revision::Room;
 use crate::runner::graph::Node;
 use crate::study::Entry;
-use sastrugi_mobility::missions::{MissionParameters, MissionSettings, StartCells, draw_missions};
+use sastrugi_mobility::missions::{MissionError, MissionParameters, MissionSettings, StartCells, draw_missions};
 use sastrugi_numeric::{Geometry, Streams};
+use sastrugi_roughness::shares;
 use sastrugi_schemas::Kind;
 use sastrugi_schemas::kind::{read_parameters, schema_of};
 use sastrugi_schemas::study::MissionsItem;
@@ -36,6 +37,26 @@ struct StraightJob {
     streams: Streams,
     /// Cells of the heightfield.
     cells: u64,
+    /// Radius of the closing that its class map went through, m.
+    closing_radius_m: f64,
+}
+
+impl StraightJob {
+    /// What would leave cells to start from, as the class map before its closing tells.
+    fn advice(&self, work: &Work<'_>, error: &MissionError) -> String {
+        let MissionError::NoEligibleStart { border_m, .. } = error else { return String::new() };
+        let path = work.parent(&roughness::item(&self.heightfield), roughness::CLASSES_RAW);
+        let Some(raw) = path.ok().and_then(|path| dem::read_classes(&path).ok()) else { return String::new() };
+        let percent = 100.0 * shares(&raw, *border_m).low;
+        if percent > 0.0 {
+            let radius_m = self.closing_radius_m;
+            return format!(
+                "; {percent:.2} % of the surface was low before closing with [roughness] closing_radius_m = {radius_m} m: reduce it if the vehicle is \
+                 smaller"
+            );
+        }
+        "; every cell is steeper than [roughness] low_max: take a smoother terrain, a narrower `border_m`, or a larger `low_max`".to_owned()
+    }
 }
 
 /// Adds the items of one table.
@@ -75,6 +96,7 @@ pub fn add(
             start_cells: if one.shared.is_some() { StartCells::All } else { StartCells::Low },
             streams,
             cells: builder.heightfields.get(&one.heightfield).map_or(0, |field| field.cells),
+            closing_radius_m: builder.study.roughness.closing_radius_m,
         };
         let parents = vec![roughness::item(&one.heightfield)];
         let item = one.item.clone();
@@ -152,7 +174,7 @@ impl Job for StraightJob {
         let path = work.parent(&roughness::item(&self.heightfield), roughness::CLASSES)?;
         let classes = dem::read_classes(&path).map_err(input_error)?;
         let missions = draw_missions(&classes, &self.settings, self.start_cells, &self.streams)
-            .map_err(|e| JobError::input(format!("cannot {e}")))?;
+            .map_err(|e| JobError::input(format!("cannot {e}{}", self.advice(work, &e))))?;
         let text = serde_json::to_vec(&missions).map_err(JobError::new)?;
         work.write(MISSIONS, &text)?;
         Ok(Outcome { products: vec![Product::internal(MISSIONS)], ..Outcome::default() })

@@ -77,29 +77,32 @@ struct NavigateJob {
 /// # Errors
 /// A wrong item.
 pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
-    for entry in builder.study.entries(STAGE)? {
-        let (envelope, params): (NavigateItem, Value) = entry.read()?;
-        let Some(routes) = builder.routes.get(&envelope.route).cloned() else {
-            return Err(unknown_id(&entry, "route", &envelope.route, builder.routes.keys()).into());
-        };
-        one_search(&entry, &routes)?;
-        if envelope.count == Some(0) {
-            return Err(entry.error("count", "`count` is 0; it must be 1 or more").into());
-        }
-        for one in entry.expand(&envelope.id, None, &envelope.sweep, &params)? {
-            entry.check_keys::<NavigateItem>(&one.params, &schema_of::<TeamParameters>())?;
-            builder.claim(&entry, STAGE, &one.id)?;
-            let parameters: TeamParameters = read_parameters(&one.params).map_err(|e| entry.refuse(e))?;
-            parameters.check().map_err(|e| entry.refuse(e))?;
-            let lead = Arc::new(Lead {
-                id: one.id,
-                variant: one.sweep,
-                parameters,
-                count: envelope.count.unwrap_or(1),
-                head: builder.study.head.clone(),
-            });
-            routes.iter().try_for_each(|routes| add_one(builder, &envelope, &lead, routes))?;
-        }
+    builder.each(STAGE, add_table)
+}
+
+fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildError> {
+    let (envelope, params): (NavigateItem, Value) = entry.read()?;
+    entry.check_keys::<NavigateItem>(&params, &schema_of::<TeamParameters>())?;
+    let Some(routes) = builder.routes.get(&envelope.route).cloned() else {
+        return Err(unknown_id(entry, "route", &envelope.route, builder.routes.keys()).into());
+    };
+    one_search(entry, &routes)?;
+    if envelope.count == Some(0) {
+        return Err(entry.error("count", "`count` is 0; it must be 1 or more").into());
+    }
+    for one in entry.expand(&envelope.id, None, &envelope.sweep, &params)? {
+        entry.check_keys::<NavigateItem>(&one.params, &schema_of::<TeamParameters>())?;
+        builder.claim(entry, STAGE, &one.id)?;
+        let parameters: TeamParameters = read_parameters(&one.params).map_err(|e| entry.refuse(e))?;
+        parameters.check().map_err(|e| entry.refuse(e))?;
+        let lead = Arc::new(Lead {
+            id: one.id,
+            variant: one.sweep,
+            parameters,
+            count: envelope.count.unwrap_or(1),
+            head: builder.study.head.clone(),
+        });
+        routes.iter().try_for_each(|routes| add_one(builder, &envelope, &lead, routes))?;
     }
     Ok(())
 }

@@ -1,0 +1,150 @@
+//! The page on study files (`docs/study.md`): every section, kind and key, from the schemas of what reads them.
+
+use crate::examples::EXAMPLES;
+use crate::parameters::{Parameter, parameters, text_of};
+use sastrugi_schemas::Kind;
+use sastrugi_schemas::kind::schema_of;
+use sastrugi_schemas::study::StudyHead;
+use sastrugi_stages::registry::{Form, SECTIONS, Section};
+use sastrugi_stages::starting::STARTING;
+use serde_json::Value;
+
+const INTRODUCTION: &str = include_str!("reference.md");
+
+/// The page, Markdown.
+pub fn study() -> String {
+    let listed = |name: &str, form: Form, envelope: &Value| {
+        let heading = heading(name, form);
+        let anchor = name.replace('_', "-");
+        format!("| [`{heading}`](#{anchor}) | {} |", purpose(envelope))
+    };
+    let head = schema_of::<StudyHead>();
+    let mut contents = vec![listed("study", Form::Table, &head)];
+    contents.extend(SECTIONS.iter().map(|s| listed(s.name, s.form, &(s.envelope)())));
+    let mut parts = vec![
+        INTRODUCTION.trim_end().to_owned(),
+        format!("## Sections\n\n| section | what it is |\n|---|---|\n{}", contents.join("\n")),
+        chapter("study", Form::Table, &head),
+    ];
+    for section in &SECTIONS {
+        parts.push(chapter(section.name, section.form, &(section.envelope)()));
+        parts.extend(kinds(section));
+    }
+    parts.join("\n\n")
+}
+
+fn heading(name: &str, form: Form) -> String {
+    match form {
+        Form::Table => format!("[{name}]"),
+        Form::Array => format!("[[{name}]]"),
+    }
+}
+
+/// What a section is: its description without its own name before it.
+fn purpose(envelope: &Value) -> String {
+    let text = text_of(envelope);
+    capital(text.split_once("`: ").map_or(text.as_str(), |(_, purpose)| purpose))
+}
+
+fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map(|first| first.to_uppercase().collect::<String>() + letters.as_str()).unwrap_or_default()
+}
+
+fn chapter(name: &str, form: Form, envelope: &Value) -> String {
+    let example = example(&heading(name, form)).map(|text| format!("\n\n```toml\n{text}\n```")).unwrap_or_default();
+    let place = Place { section: name, kind: None };
+    format!("## {name}\n\n{}{example}\n\n{}", purpose(envelope), table(&place, envelope))
+}
+
+/// Tables of the kinds of a section.
+fn kinds(section: &Section) -> Vec<String> {
+    let kinds = (section.kinds)();
+    let distinct = section.distinct_kinds();
+    let of_kind = |kind: &Kind| match section.selector() {
+        Some(selector) => format!("### `{selector} = \"{}\"`", kind.kind),
+        None => format!("### Parameters of [[{}]]", section.name),
+    };
+    let said = |kind: &Kind| {
+        format!("{}. Source: {}.", capital(kind.summary.trim_end_matches('.')), kind.source.trim_end_matches('.'))
+    };
+    let text = |kind: &Kind| {
+        let summary = match kinds.len() == distinct.len() {
+            true => said(kind),
+            false => kinds.iter().map(|k| format!("* `{}`: {}", k.kind, said(k))).collect::<Vec<_>>().join("\n"),
+        };
+        let place = Place { section: section.name, kind: section.selector().map(|selector| (selector, kind.kind)) };
+        let rows = table(&place, &kind.parameters);
+        format!("{}\n\n{summary}{}{rows}", of_kind(kind), if rows.is_empty() { "" } else { "\n\n" })
+    };
+    distinct.iter().map(text).collect()
+}
+
+/// A table of keys; empty where there are none.
+fn table(place: &Place<'_>, schema: &Value) -> String {
+    let rows: Vec<String> = parameters(schema).iter().map(|p| row(place, p)).collect();
+    if rows.is_empty() {
+        return String::new();
+    }
+    format!("| key | holds | default | example | meaning |\n|---|---|---|---|---|\n{}", rows.join("\n"))
+}
+
+fn row(place: &Place<'_>, p: &Parameter) -> String {
+    let code = |text: &str| if text.is_empty() { String::new() } else { format!("`{}`", text.replace('|', "\\|")) };
+    let example = if ["", "table", "list of tables"].contains(&p.holds.as_str()) { None } else { example_of(place, p) };
+    let default = if p.is_required { "**required**".to_owned() } else { code(&p.default) };
+    let (name, example) = (code(&p.name), code(&example.unwrap_or_default()));
+    format!("| {name} | {} | {default} | {example} | {} |", p.holds, p.meaning.replace('|', "\\|"))
+}
+
+/// Where a key belongs: its section, and the kind of its table where kinds have keys of their own.
+struct Place<'a> {
+    section: &'a str,
+    /// Key that names the kind, and the kind.
+    kind: Option<(&'static str, &'static str)>,
+}
+
+/// The first table of a section in the studies to start from, without the comments around it.
+fn example(heading: &str) -> Option<String> {
+    STARTING.iter().find_map(|starting| {
+        let lines = starting.text.lines().skip_while(|line| *line != heading);
+        let table: Vec<&str> = lines.take_while(|line| !line.is_empty()).collect();
+        (!table.is_empty()).then(|| table.join("\n"))
+    })
+}
+
+/// A value of a key: from a study to start from, its default, or from the list of examples.
+fn example_of(place: &Place<'_>, p: &Parameter) -> Option<String> {
+    let last = p.name.rsplit('.').next().unwrap_or_default();
+    let in_section = format!("{}: {last}", place.section);
+    let find = |name: &str| EXAMPLES.iter().find(|(key, _)| *key == name).map(|(_, value)| (*value).to_owned());
+    let listed = || find(&in_section).or_else(|| find(&p.name)).or_else(|| find(last));
+    let default = || Some(p.default.clone()).filter(|default| !["", "[]", "{}", "\"\""].contains(&default.as_str()));
+    written(place, &p.name).or_else(default).or_else(listed)
+}
+
+/// What a key is given in the first table of its section and kind that has it, in the studies to start from.
+fn written(place: &Place<'_>, key: &str) -> Option<String> {
+    let headings = [heading(place.section, Form::Array), heading(place.section, Form::Table)];
+    let is_of_kind = |table: &str| match place.kind {
+        None => true,
+        Some((selector, kind)) => value_in(table, selector) == Some(format!("\"{kind}\"")),
+    };
+    STARTING.iter().find_map(|starting| {
+        let tables = starting.text.split("\n\n").map(|part| part.trim_start_matches('\n'));
+        let mut own = tables.filter_map(|part| {
+            let at = part.lines().position(|line| headings.iter().any(|heading| line == heading))?;
+            Some(part.lines().skip(at + 1).collect::<Vec<_>>().join("\n"))
+        });
+        own.find_map(|table| if is_of_kind(&table) { value_in(&table, key) } else { None })
+    })
+}
+
+/// The value of a key in the lines of a table.
+fn value_in(table: &str, key: &str) -> Option<String> {
+    table.lines().find_map(|line| {
+        let (name, value) = line.split_once(" = ")?;
+        let value = value.split_once("  #").map_or(value, |(value, _)| value);
+        (name == key).then(|| value.trim().to_owned())
+    })
+}

@@ -1,0 +1,225 @@
+//! Writing a study: where to start, what is wrong with it, and what makes no sense in it.
+
+use sastrugi_tests::{area, sastrugi_in, sums, write};
+use serde_json::Value;
+use std::path::Path;
+
+const KINDS: [&str; 6] = ["terrain", "texture", "traverse", "navigate", "rover", "photoclinometry"];
+
+fn planned(folder: &Path, study: &str) -> (Value, String) {
+    let call = sastrugi_in(folder, &["plan", study, "--json"]);
+    assert_eq!(call.code, 0, "{}", call.stderr);
+    (serde_json::from_str(&call.stdout).unwrap(), call.stderr)
+}
+
+/// Every study to start from can be run as it is, once its DEM is there, and nothing of it is doubtful.
+#[test]
+fn val_studies_to_start_from_can_be_run() {
+    let folder = area();
+    let path = folder.path();
+    std::fs::copy(sastrugi_fixtures::jacksboro(), path.join("site.tif")).unwrap();
+    for kind in KINDS {
+        let file = format!("my-{kind}.toml");
+        let call = sastrugi_in(path, &["init", kind, "-o", &file]);
+        assert!(call.code == 0 && call.stdout.contains(&format!("sastrugi plan {file}")), "{kind}: {}", call.stderr);
+        let text = std::fs::read_to_string(path.join(&file)).unwrap();
+        assert!(text.starts_with("#:schema study.schema.json\n") && text.contains(&format!("sastrugi run {file}")));
+        let (plan, warnings) = planned(path, &file);
+        assert!(plan["items"].as_u64() > Some(3) && warnings.is_empty(), "{kind}: {warnings}");
+    }
+    let call = sastrugi_in(path, &["init", "-o", "my-rover.toml"]);
+    assert!(call.code == 2 && call.stderr.contains("exists"), "{}", call.stderr);
+    assert!(std::fs::read_to_string(path.join("my-rover.toml")).unwrap().contains("sojourner_like"));
+}
+
+/// All that is wrong is told in one call, in the order of the text, and what follows from another error is not.
+#[test]
+fn val_all_errors_are_told_at_once() {
+    let folder = area();
+    let text = "[study]\nname = \"x\"\nseed = 1\ndate = \"2026-13-01\"\nauthors = [\"me\"]\n\n\
+        [[dem]]\nid = \"site\"\npath = \"site.tif\"\n\n\
+        [[fit]]\nid = \"snow\"\ndem = \"site\"\nouter_scale_m = 2.0\n\n\
+        [[terrain]]\nid = \"a\"\nkind = \"multifractal\"\nn = 3\nresolution = 0.1\n\n\
+        [[terrain]]\nid = \"b\"\nkind = \"multifractal\"\ncount = \"three\"\npng16 = 1\n\n\
+        [[terrain]]\nid = \"c\"\nkind = \"gap\"\ncell_m = -1.0\n\n\
+        [[missions]]\nid = \"m\"\nterrains = [\"a\", \"b\", \"d\"]\n\n\
+        [[traverse]]\nid = \"t\"\nmissions = \"m\"\n\n\
+        [[texture]]\nid = \"own\"\nfit = \"no-fit\"\nsize_m = [5.0, 5.0]\ncell_m = 0.1\n\n[more]\n";
+    write(folder.path(), "study.toml", text);
+    let call = sastrugi_in(folder.path(), &["plan", "study.toml"]);
+    assert_eq!(call.code, 2, "{}", call.stderr);
+    let told = [
+        "YYYY-MM-DD",
+        "unknown key `authors`",
+        "did you mean `creators`?",
+        "unknown key `path`",
+        "did you mean `file`?",
+        "unknown key `n`",
+        "did you mean `count`?",
+        "unknown key `resolution`",
+        "did you mean `cell_m`?",
+        "`count`",
+        "`png16`",
+        "`cell_m`",
+        "`fit` names \"no-fit\"",
+        "unknown section `more`",
+    ];
+    let mut rest = call.stderr.as_str();
+    for words in told {
+        let at = rest.find(words).unwrap_or_else(|| panic!("\"{words}\" is not in its place in: {}", call.stderr));
+        rest = &rest[at + words.len()..];
+    }
+    assert!(call.stderr.contains("refused for 10 reasons"), "{}", call.stderr);
+    // The fit of a DEM that is refused, the missions on it and their traverse are not.
+    for words in ["\"d\"", "names \"site\"", "names \"m\""] {
+        assert!(!call.stderr.contains(words), "{}", call.stderr);
+    }
+}
+
+/// A claim that so few terrains cannot support, and a vehicle that cannot be meant, are told before the run.
+#[test]
+fn val_doubts_are_told_before_the_run() {
+    let folder = area();
+    let path = folder.path();
+    let call = sastrugi_in(path, &["init", "traverse"]);
+    assert_eq!(call.code, 0, "{}", call.stderr);
+    let text = std::fs::read_to_string(path.join("study.toml")).unwrap();
+    let told = |name: &str, text: &str, words: &[&str]| {
+        write(path, name, text);
+        let (plan, warnings) = planned(path, name);
+        assert_eq!(plan["doubts"].as_array().map(Vec::len), Some(words.len()), "{warnings}");
+        words.iter().for_each(|word| assert!(warnings.contains(word), "{word}: {warnings}"));
+    };
+    told("enough.toml", &text, &[]);
+    let few = text.replace("count = 5", "count = 3");
+    told(
+        "few.toml",
+        &few,
+        &["with 3 and 3 terrains the smallest possible p is 0.10; use at least 4 terrains per group"],
+    );
+    let paired = text.replace("license =", "pairing = \"common\"\nlicense =");
+    let words = "with 5 paired terrains the smallest possible p is 0.06; use at least 6 paired terrains";
+    told("paired.toml", &paired, &[words]);
+    let second = "\n[[hypothesis]]\nid = \"and-success\"\nstatistic = \"success\"\ngroups = [\"smooth\", \"rough\"]\ntest = \"difference\"\n";
+    let family = text.replace("count = 5", "count = 4") + second;
+    let words = "p is 0.06 over its family; use at least 5 terrains";
+    told("family.toml", &family, &["\"rough-ground-shakes\" cannot", words]);
+    let heavy = text.replace("speed_m_s = 1.0", "speed_m_s = 1.0\nvehicle_changes = { chassis = { mass_kg = 80.0 } }");
+    told(
+        "heavy.toml",
+        &heavy,
+        &["traverse \"husky\": chassis.mass_kg is changed to 80 but inertia_kg_m2 still belongs"],
+    );
+    // Two weak claims of one family, and a strong one beside an equivalence, which Holm's steps leave alone.
+    let mixed = text.replace("count = 5", "count = 4")
+        + "\n[[hypothesis]]\nid = \"as-fast\"\nstatistic = \"time_s\"\ngroups = [\"smooth\", \"rough\"]\ntest = \"equivalence\"\nmargin = 2.0\n";
+    told("mixed.toml", &mixed, &[]);
+    // One shard is a part of the whole, with what it needs.
+    let count = |arguments: &[&str]| {
+        let call = sastrugi_in(path, arguments);
+        let plan: Value = serde_json::from_str(&call.stdout).unwrap();
+        plan["items"].as_u64().unwrap()
+    };
+    let whole = count(&["plan", "enough.toml", "--json"]);
+    let parts = ["1/2", "2/2"].map(|part| count(&["plan", "enough.toml", "--json", "--shard", part]));
+    assert!(parts.iter().all(|part| *part < whole) && parts.iter().sum::<u64>() >= whole, "{parts:?} of {whole}");
+}
+
+/// A vehicle as `kinds` prints it is a vehicle file; a file with a base has what it does not change from there.
+#[test]
+fn val_vehicle_files_inherit() {
+    let folder = area();
+    let path = folder.path();
+    let text = sastrugi_in(path, &["kinds", "husky_a200"]).stdout;
+    for words in ["chassis.mass_kg", "46.034", "URDF, base_link inertial", "drive.torque_limit_n_m"] {
+        assert!(text.contains(words), "{words}: {text}");
+    }
+    write(path, "printed.json", &sastrugi_in(path, &["kinds", "husky_a200", "--json"]).stdout);
+    write(path, "based.toml", "base = \"husky_a200\"\n[parameters.drive]\nspeed_limit_m_s = 0.8\n");
+    write(path, "nothing.toml", "base = \"husky_a200\"\n");
+    write(path, "unknown.toml", "base = \"husky\"\n[parameters.drive]\nspeed_limit_m_s = 0.8\n");
+    let terrain = ["terrain", "weierstrass_mandelbrot", "--set", "size_px=[200,200]", "-o", "t.tif"];
+    assert_eq!(sastrugi_in(path, &terrain).code, 0);
+    let drive = |vehicle: &str| {
+        let arguments = ["traverse", "t.tif", "--vehicle", vehicle, "--missions", "1", "-o", "drive", "--quiet"];
+        let more = ["--set-missions", "length_m=3.0", "--set-missions", "border_m=1.5"];
+        let call = sastrugi_in(path, &[&arguments[..], &more].concat());
+        let rows = (call.code == 0).then(|| sastrugi_tests::rows(&path.join("drive"), "parameters"));
+        let _ = std::fs::remove_dir_all(path.join("drive"));
+        let _ = std::fs::remove_dir_all(path.join("drive.work"));
+        (call, rows.unwrap_or_default())
+    };
+    let value = |rows: &[sastrugi_tests::Row], name: &str| {
+        let row = rows.iter().find(|row| row["parameter"] == name).unwrap_or_else(|| panic!("{name}"));
+        row["value"].clone()
+    };
+    let (call, shipped) = drive("husky_a200");
+    assert_eq!(call.code, 0, "{}", call.stderr);
+    let (call, printed) = drive("printed.json");
+    assert_eq!(call.code, 0, "{}", call.stderr);
+    let (call, based) = drive("based.toml");
+    assert_eq!(call.code, 0, "{}", call.stderr);
+    for name in ["vehicle.chassis.mass_kg", "vehicle.tyre.rays", "vehicle.drive.torque_limit_n_m"] {
+        let expected = value(&shipped, name);
+        assert!(value(&printed, name) == expected && value(&based, name) == expected, "{name}");
+    }
+    assert_eq!(
+        (value(&shipped, "vehicle.drive.speed_limit_m_s"), value(&based, "vehicle.drive.speed_limit_m_s")),
+        ("1.0".into(), "0.8".into())
+    );
+    for (file, words) in [("nothing.toml", "missing table `parameters`"), ("unknown.toml", "`husky` is no vehicle")] {
+        let (call, _) = drive(file);
+        assert!(call.code == 2 && call.stderr.contains(words), "{file}: {}", call.stderr);
+    }
+}
+
+/// Twice the amplitude is twice the height of every cell, in a study and by the verb.
+#[test]
+fn val_textures_take_an_amplitude() {
+    let folder = area();
+    let path = folder.path();
+    let study = |more: &str| {
+        format!(
+            "[study]\nname = \"x\"\nseed = 1\ndate = \"2026-01-01\"\n[[texture]]\nid = \"a\"\nseed = 4\n\
+             fit = {{ model = \"exponential\", sigma_m = 0.03, range_m = 0.5 }}\nsize_m = [6.0, 6.0]\ncell_m = 0.1\n{more}"
+        )
+    };
+    let roughness = |name: &str, more: &str| {
+        write(path, "study.toml", &study(more));
+        let call = sastrugi_in(path, &["run", "study.toml", "-o", name, "--quiet"]);
+        assert_eq!(call.code, 0, "{}", call.stderr);
+        let row = &sastrugi_tests::rows(&path.join(name), "terrains")[0];
+        assert_eq!(row["group"], "a", "labelled by its id");
+        row["rms_height_m"].as_f64().unwrap()
+    };
+    let (plain, twice) = (roughness("plain", ""), roughness("twice", "amplitude = 2.0\n"));
+    assert!((twice / plain - 2.0).abs() < 1e-6, "{plain} {twice}");
+    write(path, "fit.json", "{ \"model\": \"exponential\", \"parameters\": { \"sigma_m\": 0.03, \"range_m\": 0.5 } }");
+    let verb = [
+        "texture",
+        "fit.json",
+        "--size",
+        "6x6",
+        "--cell",
+        "0.1",
+        "--seed",
+        "4",
+        "--amplitude",
+        "2",
+        "-o",
+        "verb.tif",
+        "--json",
+    ];
+    let call = sastrugi_in(path, &verb);
+    assert_eq!(call.code, 0, "{}", call.stderr);
+    let of_study = std::fs::read(path.join("twice/texture/a.tif")).unwrap();
+    assert!(std::fs::read(path.join("verb.tif")).unwrap().len() > 1000 && !of_study.is_empty());
+    for (more, words) in
+        [("amplitude = 0.0\n", "above 0"), ("amplitude = 2.0\nmethods = \"all\"\n", "cannot be combined")]
+    {
+        write(path, "study.toml", &study(more));
+        let call = sastrugi_in(path, &["plan", "study.toml"]);
+        assert!(call.code == 2 && call.stderr.contains(words), "{more}: {}", call.stderr);
+    }
+    assert!(sums(&path.join("plain")).contains_key("texture/a.tif"));
+}
