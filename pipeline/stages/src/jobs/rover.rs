@@ -198,16 +198,20 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
 fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildError> {
     let (envelope, params): (RoverItem, Value) = entry.read()?;
     let Some(schema) = schema(&envelope.kind) else { return Err(unknown(entry, &envelope.kind).into()) };
-    entry.check_keys::<RoverItem>(&params, &schema)?;
+    let check_keys = |params: &Value| -> Result<(), BuildError> {
+        // First, since it knows why the keys of the navigators are none of a planner's.
+        if envelope.kind == Navigator::PLANNER {
+            check_planner_keys(params).map_err(|e| entry.refuse(e))?;
+        }
+        Ok(entry.check_keys::<RoverItem>(params, &schema)?)
+    };
+    check_keys(&params)?;
     let terrains = terrains(builder, entry, &envelope.terrains)?;
     let sample_m = envelope.sample_m.unwrap_or(SAMPLE_M);
     let record = envelope.record.unwrap_or(RECORD) as usize;
     ParameterError::not_negative("sample_m", sample_m).map_err(|e| entry.refuse(e))?;
     for one in entry.expand(&envelope.id, None, &envelope.sweep, &params)? {
-        if envelope.kind == Navigator::PLANNER {
-            check_planner_keys(&one.params).map_err(|e| entry.refuse(e))?;
-        }
-        entry.check_keys::<RoverItem>(&one.params, &schema)?;
+        check_keys(&one.params)?;
         builder.claim(entry, STAGE, &one.id)?;
         let (navigator, parameters) = prepare(&envelope.kind, &one.params).map_err(|e| entry.refuse(e))?;
         rover_designs::add(builder, entry, &envelope, &one, &terrains)?;
