@@ -103,6 +103,8 @@ def figures(path):
     name = metadata.get("sastrugi.table")
     for key in ["table", "study_sha256", "seed", "version", "license"]:
         expect(f"sastrugi.{key}" in metadata, f"{path} lacks the metadata sastrugi.{key}")
+    stated = {k.decode(): v.decode() for k, v in (file.schema_arrow.metadata or {}).items()}
+    expect(metadata.items() <= stated.items(), f"{path}: its Arrow schema does not state {metadata}")
     expect(file.metadata.created_by.startswith("sastrugi/"), f"{path} was created by {file.metadata.created_by}")
     columns = {}
     for field in table.schema:

@@ -1,7 +1,7 @@
 //! Parquet tables of a release: rows of `sastrugi-schemas` out and in.
 //!
 //! Units and descriptions stand in each field's metadata, provenance in the file's (`sastrugi.study_sha256`, `.seed`,
-//! `.version`, `.license`, `.table`). Rows are sorted by their keys, which are never null; a float that is `NaN` is
+//! `.version`, `.license`, `.table`) and, for readers that show the Arrow schema alone, in that of the schema. Rows are sorted by their keys, which are never null; a float that is `NaN` is
 //! stored as null, in a list too. Memory is bounded by one row group, whatever the number of rows.
 
 #[cfg(test)]
@@ -26,6 +26,7 @@ use parquet::schema::types::ColumnPath;
 use sastrugi_schemas::tables::compare_keys;
 use sastrugi_schemas::{Cell, Column, ColumnType, Record, Table};
 use std::cmp::Ordering;
+use std::collections::HashMap;
 use std::fs::File;
 use std::io;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -121,9 +122,9 @@ pub struct TableMetadata {
 }
 
 impl TableMetadata {
-    fn pairs(&self, table: &str) -> Vec<KeyValue> {
-        let pair = |key: &str, value: &str| KeyValue::new(format!("sastrugi.{key}"), value.to_owned());
-        vec![
+    fn pairs(&self, table: &str) -> [(String, String); 5] {
+        let pair = |key: &str, value: &str| (format!("sastrugi.{key}"), value.to_owned());
+        [
             pair("table", table),
             pair("study_sha256", &self.study_sha256),
             pair("seed", &self.seed.to_string()),
@@ -144,13 +145,14 @@ pub struct TableSummary {
     pub content_sha256: String,
 }
 
-/// The Arrow schema of a table.
-fn schema(table: &Table) -> SchemaRef {
+/// The Arrow schema of a table, with its provenance where it has one.
+fn schema(table: &Table, provenance: Option<&TableMetadata>) -> SchemaRef {
     let field = |column: &Column| {
         let metadata = [("unit", column.unit), ("description", column.description)];
         Field::new(column.name, data_type(column.column_type), !column.key).with_metadata(metadata)
     };
-    let metadata = [("description", table.description)];
+    let pairs = provenance.into_iter().flat_map(|p| p.pairs(table.name));
+    let metadata = pairs.chain([("description".to_owned(), table.description.to_owned())]).collect::<HashMap<_, _>>();
     Arc::new(Schema::new(table.columns.iter().map(field).collect::<Vec<_>>()).with_metadata(metadata))
 }
 
@@ -182,13 +184,14 @@ fn float_path(column: &Column) -> Option<ColumnPath> {
 }
 
 fn properties(table: &Table, metadata: Option<&TableMetadata>) -> Result<WriterProperties, ParquetError> {
+    let pairs = |m: &TableMetadata| m.pairs(table.name).map(|(key, value)| KeyValue::new(key, value)).to_vec();
     let sorting = |index: usize| SortingColumn { column_idx: index as i32, descending: false, nulls_first: false };
     let mut builder = WriterProperties::builder()
         .set_created_by(PROGRAM.to_owned())
         .set_compression(Compression::ZSTD(ZstdLevel::try_new(ZSTD_LEVEL)?))
         .set_max_row_group_row_count(Some(ROW_GROUP_ROWS))
         .set_sorting_columns(Some((0..table.key_count()).map(sorting).collect()))
-        .set_key_value_metadata(metadata.map(|m| m.pairs(table.name)));
+        .set_key_value_metadata(metadata.map(pairs));
     // Measured floats seldom repeat: byte planes compress better than a dictionary.
     for path in table.columns.iter().filter_map(float_path) {
         builder = builder
@@ -226,7 +229,7 @@ impl TableWriter {
         let target = target.into();
         let path = target.path;
         let encoding = |source| TableError::Encoding { path: path.to_owned(), source };
-        let schema = schema(table);
+        let schema = schema(table, metadata);
         let file = AtomicFile::create(target).map_err(|e| TableError::io(path, e))?;
         let refused = file.refused();
         let properties = properties(table, metadata).map_err(encoding)?;
@@ -508,7 +511,7 @@ fn open(path: &Path, table: &Table) -> Result<ParquetRecordBatchReaderBuilder<Fi
     let file = crate::file::open(path).map_err(|e| TableError::io(path, e))?;
     let builder = decoding(path, || ParquetRecordBatchReaderBuilder::try_new(file))?;
     let found = builder.schema();
-    for (column, expected) in schema(table).fields().iter().enumerate() {
+    for (column, expected) in schema(table, None).fields().iter().enumerate() {
         let Some(field) = found.fields().get(column) else {
             let reason = format!("table {} lacks the column {}", table.name, expected.name());
             return Err(TableError::unusable(path, reason));

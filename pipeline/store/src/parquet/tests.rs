@@ -225,9 +225,21 @@ fn prop_every_table_has_keys_first_and_a_schema() {
     for table in tables::ALL {
         let keys = table.key_count();
         assert!(keys > 0 && table.columns.iter().skip(keys).all(|c| !c.key), "{}", table.name);
-        assert_eq!(schema(table).fields().len(), table.columns.len());
+        assert_eq!(schema(table, None).fields().len(), table.columns.len());
         assert!(properties(table, Some(&metadata())).is_ok());
     }
+}
+
+/// What pyarrow shows as the metadata of a table's schema.
+#[test]
+fn val_the_schema_states_where_a_table_comes_from() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("t.parquet");
+    fs::write(&path, sample()).unwrap();
+    let found = open(&path, &CovarianceRow::TABLE).unwrap().schema().metadata().clone();
+    let expected = metadata().pairs(CovarianceRow::TABLE.name);
+    assert!(expected.iter().all(|(key, value)| found.get(key) == Some(value)), "{found:?}");
+    assert_eq!(found.get("description").map(String::as_str), Some(CovarianceRow::TABLE.description));
 }
 
 /// Bytes of a table: a change of encoder must not pass unnoticed.
