@@ -27,6 +27,13 @@ pub enum Block {
     Text(String),
     /// A sentence the reader must not miss.
     Warning(String),
+    /// Several such sentences, one click away under words that say what they are about.
+    Warnings {
+        /// What they are about.
+        summary: String,
+        /// Sentences.
+        sentences: Vec<String>,
+    },
     /// Figures side by side.
     Figures(Vec<Figure>),
     /// A table that is shown.
@@ -40,6 +47,7 @@ impl Block {
     pub fn is_empty(&self) -> bool {
         match self {
             Self::Heading(_) | Self::Text(_) | Self::Warning(_) => false,
+            Self::Warnings { sentences, .. } => sentences.is_empty(),
             Self::Figures(figures) => figures.is_empty(),
             Self::Table(table) | Self::FoldedTable(table) => table.numbers.rows.is_empty(),
         }

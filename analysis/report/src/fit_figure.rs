@@ -30,7 +30,7 @@ const HEAD: f64 = 52.0;
 const FOOT: f64 = 24.0;
 /// Highest model of the surface that the frame makes room for, over the largest of what is measured: a long range lifts it far
 /// above.
-const SURFACE_MAX: f64 = 2.0;
+pub(crate) const SURFACE_MAX: f64 = 2.0;
 /// Smallest measured increment that is drawn, over the largest.
 const INCREMENT_MIN: f64 = 1e-6;
 /// Marks that tell directions apart without colour.

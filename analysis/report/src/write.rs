@@ -111,7 +111,7 @@ impl Folder<'_> {
         match block {
             Block::Figures(figures) => figures.iter().try_for_each(|f| self.put_figure(f)),
             Block::Table(t) | Block::FoldedTable(t) => self.put_numbers(&t.id, &t.caption, &t.numbers),
-            Block::Heading(_) | Block::Text(_) | Block::Warning(_) => Ok(()),
+            Block::Heading(_) | Block::Text(_) | Block::Warning(_) | Block::Warnings { .. } => Ok(()),
         }
     }
 
@@ -150,7 +150,7 @@ fn name_once(sections: &mut [Section]) {
         match block {
             Block::Figures(figures) => figures.iter_mut().for_each(|f| rename(&mut f.id)),
             Block::Table(TableBlock { id, .. }) | Block::FoldedTable(TableBlock { id, .. }) => rename(id),
-            Block::Heading(_) | Block::Text(_) | Block::Warning(_) => {}
+            Block::Heading(_) | Block::Text(_) | Block::Warning(_) | Block::Warnings { .. } => {}
         }
     }
 }

@@ -10,6 +10,9 @@ use sastrugi_schemas::tables::{HeightDistributionRow, PsdRow, TerrainRow};
 /// Height of a chart, px.
 pub const HEIGHT: f64 = 280.0;
 
+/// Share of an end of a slope's band by which a spectrum may miss it.
+const END_MAX: f64 = 1.5;
+
 /// A curve.
 #[derive(Clone, Debug)]
 pub struct Curve {
@@ -64,6 +67,15 @@ pub fn ranges<'a>(curves: impl IntoIterator<Item = &'a Curve>) -> Ranges {
 pub fn slope_band(terrain: &TerrainRow) -> [f64; 2] {
     let side_m = (terrain.cols as f64 * terrain.cell_x_m).min(terrain.rows as f64 * terrain.cell_y_m);
     [4.0 / side_m, 0.25 / terrain.cell_x_m.max(terrain.cell_y_m)]
+}
+
+/// True where the curves cover the band of a fitted slope, but for the ends that their bins leave free: beyond, densities are rounding
+/// noise, which a slope was fitted to as well.
+pub fn covers(band: [f64; 2], curves: &[Curve]) -> bool {
+    let ends = |of: fn(f64, f64) -> f64, start: f64| {
+        curves.iter().flat_map(|c| c.points.iter()).map(|p| p.0).fold(start, of)
+    };
+    ends(f64::min, f64::INFINITY) <= END_MAX * band[0] && ends(f64::max, 0.0) >= band[1] / END_MAX
 }
 
 /// A fitted slope laid through the middle of the curves in its band; `None` when either is unknown.

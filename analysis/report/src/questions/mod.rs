@@ -21,6 +21,7 @@ pub mod rovers;
 pub mod scoreboard;
 pub mod sensitivity;
 mod sql;
+pub mod summary;
 mod team;
 pub mod terrain;
 pub mod texture;
@@ -44,7 +45,8 @@ pub struct Question {
 }
 
 /// All questions, in the order of the page.
-pub const ALL: [Question; 19] = [
+pub const ALL: [Question; 20] = [
+    summary::QUESTION,
     failures::QUESTION,
     terrain::QUESTION,
     images::QUESTION,

@@ -80,6 +80,7 @@ fn block(block: &Block) -> String {
         Block::Heading(text) => format!("<h3>{}</h3>\n", escape(text)),
         Block::Text(text) => paragraph("", text),
         Block::Warning(text) => paragraph("warning", text),
+        Block::Warnings { summary, sentences } => warnings(summary, sentences),
         Block::Figures(figures) => figure_grid(figures),
         Block::Table(t) => table_block(t),
         Block::FoldedTable(t) => {
@@ -87,6 +88,15 @@ fn block(block: &Block) -> String {
             folded(&summary, &t.id, &table_block(t))
         }
     }
+}
+
+/// One sentence is shown, several are folded under their summary.
+fn warnings(summary: &str, sentences: &[String]) -> String {
+    if let [only] = sentences {
+        return paragraph("warning", only);
+    }
+    let items: String = sentences.iter().map(|s| format!("<li>{}</li>\n", escape(s))).collect();
+    format!("<details class=\"warning\"><summary>{}</summary>\n<ul>\n{items}</ul></details>\n", escape(summary))
 }
 
 fn paragraph(class: &str, text: &str) -> String {

@@ -40,16 +40,27 @@ pub fn blocks<'a>(data: &'a Data, groups: &'a [Group<'a, MissionRow>], pairing: 
     if data.study.hypotheses.is_empty() {
         return Vec::new();
     }
-    let claims = &data.study.hypotheses;
-    let family = |of: &HypothesisItem| claims.iter().filter(|h| h.family == of.family).count();
-    let mut tested: Vec<Tested> = claims.iter().map(|h| test(data, h, family(h), groups, pairing)).collect();
-    adjust(&mut tested);
+    let tested = tested(data, groups, pairing);
     vec![
         Block::Heading("Declared before the run: confirmatory".into()),
         Block::Text(in_words(&tested)),
         Block::Table(table(data, &tested)),
         Block::Text(introduction(data)),
     ]
+}
+
+/// How many of the claims hold, in a sentence.
+pub fn sentence<'a>(data: &'a Data, groups: &'a [Group<'a, MissionRow>], pairing: &Pairing<'a>) -> String {
+    in_words(&tested(data, groups, pairing))
+}
+
+/// Every hypothesis with its test, adjusted over its family.
+fn tested<'a>(data: &'a Data, groups: &'a [Group<'a, MissionRow>], pairing: &Pairing<'a>) -> Vec<Tested<'a>> {
+    let claims = &data.study.hypotheses;
+    let family = |of: &HypothesisItem| claims.iter().filter(|h| h.family == of.family).count();
+    let mut tested: Vec<Tested> = claims.iter().map(|h| test(data, h, family(h), groups, pairing)).collect();
+    adjust(&mut tested);
+    tested
 }
 
 fn test<'a>(

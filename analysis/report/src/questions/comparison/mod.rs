@@ -35,6 +35,16 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     Ok(blocks)
 }
 
+/// What came of the declared hypotheses; `None` where there is nothing to compare.
+pub(super) fn claims(data: &Data) -> Option<String> {
+    let groups = data.mission_groups();
+    let none = "The study declared no hypothesis, so every comparison of groups is exploratory.";
+    match (data.study.hypotheses.is_empty(), groups.len() > 1) {
+        (false, _) => Some(declared::sentence(data, &groups, &Pairing::among(&groups))),
+        (true, more) => more.then(|| none.to_owned()),
+    }
+}
+
 /// Everything that no hypothesis of the study asked for.
 fn exploratory(data: &Data, groups: &[Group<MissionRow>], pairing: &Pairing) -> Vec<Block> {
     let heading = |_| Block::Heading("Everything else is exploratory".into());

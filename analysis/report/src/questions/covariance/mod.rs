@@ -11,6 +11,7 @@ use super::curves::HEIGHT;
 use super::relief::{Style, Words, deviations, exaggeration_words, limit_m, relief};
 use super::sql::quoted;
 use crate::ReportError;
+use crate::fit_figure::SURFACE_MAX;
 use crate::content::{Block, Figure, Numbers, TableBlock, number, slug, text};
 use crate::data::Data;
 use crate::render::axis::Axis;
@@ -44,7 +45,9 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
             let file = file(data, fit)?;
             blocks.push(Block::Text(verdict::paragraph(fit, &models::of_fit(data, fit), file.as_ref())));
         }
-        blocks.extend(warnings(data, &fits)?.into_iter().map(Block::Warning));
+        let sentences = warnings(data, &fits)?;
+        let summary = format!("{} warnings about {}", set::count(sentences.len()), set::counted(fits.len(), "fit"));
+        blocks.push(Block::Warnings { summary, sentences });
         blocks.push(Block::Figures(covariances(data, &fits)));
         blocks.push(Block::Table(verdict::intervals(dem, &fits)));
         blocks.push(Block::Figures(fits.iter().flat_map(|fit| models::figures(data, fit)).collect()));
@@ -83,11 +86,15 @@ fn warnings(data: &Data, fits: &[&FitRow]) -> Result<Vec<String>, ReportError> {
     Ok(sentences.into_iter().map(|(sentence, of)| format!("{}: {sentence}", of.join(", "))).collect())
 }
 
-/// The words with a capital and a full stop.
+/// The words with a capital and a full stop; a symbol at the start stays as it is.
 fn sentence(words: &str) -> String {
     let words = words.trim();
+    let symbol = words.chars().nth(1).is_none_or(|second| !second.is_alphabetic());
     let mut chars = words.chars();
-    let start: String = chars.next().map(|c| c.to_uppercase().collect()).unwrap_or_default();
+    let start: String = match chars.next() {
+        Some(first) if symbol => first.to_string(),
+        first => first.map(|c| c.to_uppercase().collect()).unwrap_or_default(),
+    };
     let stop = if words.ends_with(['.', '!', '?']) { "" } else { "." };
     format!("{start}{}{stop}", chars.as_str())
 }
@@ -106,16 +113,22 @@ fn covariances(data: &Data, fits: &[&FitRow]) -> Vec<Figure> {
     let all = || drawn.iter().flat_map(|(_, bins)| bins.iter());
     let finite = |values: Vec<f64>| values.into_iter().filter(|v| v.is_finite());
     let values = || {
-        let of_bin = |r: &&CovarianceRow| {
-            vec![r.covariance_m2, r.model_m2, r.surface_model_m2, r.covariance_low_m2, r.covariance_high_m2]
-        };
+        let of_bin =
+            |r: &&CovarianceRow| vec![r.covariance_m2, r.model_m2, r.covariance_low_m2, r.covariance_high_m2];
         all().flat_map(move |r| finite(of_bin(r)))
     };
     let x = Axis::linear(0.0, 1.03 * all().map(|r| r.lag_m).fold(0.0, f64::max));
-    let high = values().fold(0.0, f64::max);
+    let measured = values().fold(0.0, f64::max);
+    let fits_in = |high: &f64| *high <= SURFACE_MAX * measured;
+    let high = drawn.iter().map(|(_, bins)| surface_high(bins)).filter(fits_in).fold(measured, f64::max);
     let low = values().fold(0.0, f64::min);
     let y = Axis::linear(low - 0.04 * (high - low), high + 0.06 * (high - low));
     drawn.iter().map(|(fit, bins)| covariance(fit, bins, x, y)).collect()
+}
+
+/// Largest value of the model of the surface, m².
+fn surface_high(bins: &[&CovarianceRow]) -> f64 {
+    bins.iter().map(|b| b.surface_model_m2).filter(|v| v.is_finite()).fold(0.0, f64::max)
 }
 
 fn covariance(fit: &FitRow, bins: &[&CovarianceRow], x: Axis, y: Axis) -> Figure {
@@ -151,6 +164,10 @@ fn covariance(fit: &FitRow, bins: &[&CovarianceRow], x: Axis, y: Axis) -> Figure
     plot.svg.close();
     plot.note(0, &format!("σ = {}", set::with_unit(fit.sigma_m, 3, "m")));
     plot.note(1, &format!("b = {}", set::with_unit(fit.range_m, 3, "m")));
+    let above = surface_high(bins);
+    if above > plot.y.range().1 {
+        plot.note(2, &format!("surface: {}, above the frame", set::with_unit(above, 3, "m²")));
+    }
     figure(id, fit, bins, plot, banded)
 }
 
@@ -307,7 +324,8 @@ mod tests {
 
     #[test]
     fn val_sentences() {
-        assert_eq!(sentence(" b is not identifiable "), "B is not identifiable.");
+        assert_eq!(sentence(" b is not identified "), "b is not identified.");
+        assert_eq!(sentence("not stationary"), "Not stationary.");
         assert_eq!(sentence("Done."), "Done.");
         assert_eq!(sentence(""), ".");
     }

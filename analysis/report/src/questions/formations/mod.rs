@@ -82,7 +82,7 @@ fn unfinished(data: &Data) -> Option<String> {
 }
 
 /// Whether errors are tolerable, in a sentence; `None` where no run has followers.
-fn verdict(data: &Data) -> Option<String> {
+pub(super) fn verdict(data: &Data) -> Option<String> {
     let known: Vec<&FormationRow> = data.formations.iter().filter(|f| f.tolerable.is_finite()).collect();
     let share = |of: fn(&FormationRow) -> f64| sums::mean(&known.iter().map(|f| of(f)).collect::<Vec<_>>());
     (!known.is_empty()).then(|| {

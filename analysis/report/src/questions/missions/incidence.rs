@@ -28,15 +28,20 @@ struct Curves<'a> {
     bands: Vec<Vec<Option<Interval>>>,
 }
 
-/// Words and one figure per group; nothing when no mission failed or no distance is known.
+/// Words, and one figure for each group with failures; nothing when no distance is known.
 pub fn blocks(data: &Data, groups: &[Group<MissionRow>]) -> Vec<Block> {
     let lengths = groups.iter().flat_map(|g| g.rows.iter().map(|m| length(m))).filter(|l| l.is_finite());
     let length = lengths.fold(0.0, f64::max);
     let drawn = &groups[..groups.len().min(GROUPS_MAX)];
     let all: Vec<Curves> = drawn.iter().map(|g| curves(data, g, length)).collect();
     let top = all.iter().flat_map(tops).fold(0.0, f64::max);
-    if length <= 0.0 || top <= 0.0 {
+    if length <= 0.0 {
         return Vec::new();
+    }
+    let heading = Block::Heading("How far they came".into());
+    let (failing, whole): (Vec<&Curves>, Vec<&Curves>) = all.iter().partition(|c| c.fails());
+    if failing.is_empty() {
+        return vec![heading, Block::Text("No mission failed: all came to the end of their line.".into())];
     }
     let words = format!(
         "The share of missions that have failed in each way up to a distance along their line: competing risks, by Aalen and \
@@ -45,8 +50,21 @@ pub fn blocks(data: &Data, groups: &[Group<MissionRow>]) -> Vec<Block> {
          Bands are {} % at each distance, from {REPLICATES} redraws of whole terrains.",
         set::fixed(100.0 * LEVEL, 0)
     );
-    let figures = all.iter().map(|c| figure(data, c, length, top)).collect();
-    vec![Block::Heading("How far they came".into()), Block::Text(words), Block::Figures(figures)]
+    let figures = failing.iter().map(|c| figure(data, c, length, top)).collect();
+    let mut blocks = vec![heading, Block::Text(words), Block::Figures(figures)];
+    if !whole.is_empty() {
+        let named = |c: &&Curves| format!("{} ({})", c.group.name, set::counted(c.group.rows.len(), "mission"));
+        let list = whole.iter().map(named).collect::<Vec<_>>().join(", ");
+        blocks.push(Block::Text(format!("No mission failed in group {list}.")));
+    }
+    blocks
+}
+
+impl Curves<'_> {
+    /// True when a mission of the group failed.
+    fn fails(&self) -> bool {
+        self.incidence.shares.iter().any(|of_cause| of_cause.last().is_some_and(|share| *share > 0.0))
+    }
 }
 
 /// Length of a mission's line, m.

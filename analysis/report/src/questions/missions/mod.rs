@@ -3,7 +3,7 @@
 pub mod boxes;
 mod incidence;
 mod maps;
-mod outcomes;
+pub(super) mod outcomes;
 mod strip;
 mod survivors;
 

@@ -158,8 +158,8 @@ fn spacing(samples: &[SampleRow]) -> f64 {
 fn finish(id: String, mission: &MissionRow, samples: &[SampleRow], heaves: &[f64], svg: Svg) -> Figure {
     let outcome = ALL[outcome::index(mission)].name;
     let caption = format!(
-        "{} on {}. Pitch and roll above; vertical acceleration below, with the roughness class under the vehicle along its \
-         foot. Recording: {}.",
+        "{} on {}. Pitch and roll above; vertical acceleration below. Along its foot the roughness class under the vehicle, cell by cell as \
+         it was before the class map was closed. Recording: {}.",
         mission.mission_id, mission.terrain_id, mission.path
     );
     let largest = heaves.iter().filter(|v| v.is_finite()).fold(0.0, |a: f64, v| a.max(v.abs()));

@@ -75,6 +75,12 @@ interval, exact for normal values); the design effect is the factor on the varia
 const EFFORT: &str = "Contacts are rocks higher than the clearance that came under the rover, centre contacts those under its centre line. Means are over all rovers, those that \
 were stopped included.";
 
+/// How far the rovers got; `None` without rovers.
+pub(super) fn in_words(data: &Data) -> Option<String> {
+    let sets = sets::plain(data);
+    (!sets.is_empty()).then(|| verdict(&sets))
+}
+
 /// What the sets say, in a sentence each.
 fn verdict(sets: &[Set]) -> String {
     let sentence = |set: &Set| {

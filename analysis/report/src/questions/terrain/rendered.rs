@@ -15,13 +15,15 @@ use crate::render::picture::{self, Picture};
 use crate::render::svg::{Anchor, Paint, Svg, fitted};
 use crate::render::{number as set, thin};
 use sastrugi_imaging::{RenderParameters, Rendering, Scene, Sun, display, render};
-use sastrugi_numeric::{Grid, Streams};
+use sastrugi_numeric::{Grid, Streams, sums};
 use sastrugi_schemas::tables::TerrainRow;
 
 /// Kinds of terrain with an albedo of their own.
 const KINDS: [&str; 2] = ["planetary", "elaborate"];
 /// Low in the north-west, so that rocks and rims throw shadows.
 const SUN: Sun = Sun { azimuth_deg: 315.0, elevation_deg: 25.0 };
+/// Scatter of brightness over its mean below which a picture shows nothing but paper.
+const CONTRAST_MIN: f64 = 0.1;
 /// Largest number of rows or columns of a large picture.
 const PIXELS: usize = 480;
 /// The same of a thumbnail.
@@ -86,7 +88,7 @@ struct View {
     with_albedo: bool,
 }
 
-/// Renders a terrain with at most `most` pixels along a side; `None` without its heights.
+/// Renders a terrain with at most `most` pixels along a side; `None` without its heights, and where the sun shows nothing of them.
 fn view(data: &Data, terrain: &TerrainRow, most: usize) -> Result<Option<View>, ReportError> {
     let Some(heights) = data.files.grid(&terrain.path)? else { return Ok(None) };
     let map = terrain.path.strip_suffix(".tif").map(|path| format!("{path}.albedo.tif"));
@@ -99,6 +101,9 @@ fn view(data: &Data, terrain: &TerrainRow, most: usize) -> Result<Option<View>, 
     // Without noise nothing is drawn at random.
     let Ok(rendering) = render(&scene, &parameters, &Streams::for_seed(0, KINDS[0])) else { return Ok(None) };
     let image = rendering.image();
+    if contrast(&image) < CONTRAST_MIN {
+        return Ok(None);
+    }
     let picture = picture::brightness(&image, display::white(&image), most)?;
     Ok(Some(View {
         rendering,
@@ -109,6 +114,12 @@ fn view(data: &Data, terrain: &TerrainRow, most: usize) -> Result<Option<View>, 
         pixel_m: thinned.geometry.mean_cell(),
         with_albedo: albedo.is_some(),
     }))
+}
+
+/// Standard deviation of an image over its mean.
+fn contrast(image: &Grid) -> f64 {
+    let values = sums::finite(&image.values);
+    sums::variance(&values).sqrt() / sums::mean(&values)
 }
 
 const COLUMN_NAMES: [(&str, &str); 6] =

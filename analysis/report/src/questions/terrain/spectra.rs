@@ -31,13 +31,22 @@ pub fn spectra(data: &Data, groups: &[Group<TerrainRow>]) -> Vec<Figure> {
     let figure = |(group, curves): &Drawn| {
         let id = file_id("psd", group);
         let middle = median(&group.rows, |t| t.psd_slope);
-        let slope = curves::slope(middle, curves::slope_band(group.rows[0]), curves);
+        let band = curves::slope_band(group.rows[0]);
+        let covered = curves::covers(band, curves);
+        let slope = curves::slope(middle, band, curves).filter(|_| covered);
         let mut plot = curves::spectra(&id, curves, ranges, slope);
         if slope.is_some() {
             plot.note(0, &format!("slope {}", set::fixed(middle, 2)));
         }
-        let caption = "Radially averaged two-dimensional power spectral density, one line per terrain; dashed, the median \
-                       of their fitted slopes, over the band of the fit.";
+        let ends = format!("{} to {}", set::significant(band[0], 2), set::with_unit(band[1], 2, "cycles/m"));
+        let of_slope = match (covered, slope.is_some()) {
+            (true, true) => format!("; dashed, the median of their slopes, fitted from {ends}."),
+            (true, false) => ".".to_owned(),
+            (false, _) => format!(
+                ". Where the lines end, the rest is rounding noise, so that the slope fitted from {ends} describes no ground and is not drawn."
+            ),
+        };
+        let caption = format!("Radially averaged two-dimensional power spectral density, one line per terrain{of_slope}");
         let description = format!(
             "Log-log spectra of {}; median slope {}.",
             set::counted(curves.len(), "terrain"),
@@ -50,7 +59,7 @@ pub fn spectra(data: &Data, groups: &[Group<TerrainRow>]) -> Vec<Figure> {
             rows,
             &names,
         );
-        finish(id, format!("Spectra, group {}.", group.name), caption, description, plot, numbers)
+        finish(id, format!("Spectra, group {}.", group.name), &caption, description, plot, numbers)
     };
     drawn.iter().map(figure).collect()
 }

@@ -5,6 +5,7 @@
 //! the same (`<texture>.residual`).
 
 mod figures;
+mod verdict;
 
 use super::Question;
 use super::curves::{self, Curve};
@@ -42,8 +43,12 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
         let rows = figures(data, texture)?;
         if rows.iter().any(|row| !row.is_empty()) {
             blocks.push(Block::Heading(heading(texture)));
+            let fit = alone(texture);
+            let answer = fit.as_ref().and_then(|fit| verdict::of_texture(data, texture, fit));
+            if let Some((_, sentence)) = answer {
+                blocks.extend([sentence, verdict::method()].map(Block::Text));
+            }
             blocks.extend(rows.into_iter().map(Block::Figures));
-            let fit = data::parameter(texture, "fit").filter(|_| data::parameter(texture, "onto").is_none());
             blocks.extend(fit.map(|fit| Block::Table(figures::table(data, texture, &fit))));
         }
     }
@@ -52,6 +57,34 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     }
     blocks.push(Block::FoldedTable(all(data)));
     Ok(blocks)
+}
+
+/// The fit of a texture that stands alone.
+fn alone(texture: &TerrainRow) -> Option<String> {
+    data::parameter(texture, "fit").filter(|_| data::parameter(texture, "onto").is_none())
+}
+
+/// Textures that stand alone, each with its fit.
+fn standing_alone(data: &Data) -> impl Iterator<Item = (&TerrainRow, String)> {
+    data.of_stage("texture").filter_map(|texture| Some((texture, alone(texture)?)))
+}
+
+/// Whether the textures are like the measured surfaces, by id; `None` where none can be compared.
+pub(super) fn in_words(data: &Data) -> Option<String> {
+    let answers: Vec<(&TerrainRow, String)> = standing_alone(data)
+        .filter_map(|(texture, fit)| Some((texture, verdict::of_texture(data, texture, &fit)?.1)))
+        .collect();
+    let (first, rest) = answers.split_first()?;
+    let more = match rest.len() {
+        0 => String::new(),
+        n => format!(" {} more are judged below.", set::count(n)),
+    };
+    Some(format!("Is texture {} like the surface it was fitted to? {}{more}", first.0.terrain_id, first.1))
+}
+
+/// The first texture that stands alone, beside the residual of its fit; none where the release has none.
+pub(super) fn side_by_side(data: &Data) -> Result<Vec<Figure>, ReportError> {
+    standing_alone(data).next().map_or(Ok(Vec::new()), |(texture, fit)| patches(data, texture, &fit))
 }
 
 fn heading(texture: &TerrainRow) -> String {
