@@ -141,6 +141,11 @@ fn val_terrains_are_split_the_same_everywhere() {
     for mission in missions {
         assert_eq!(mission["split"], parts[&text(&mission["terrain_id"])], "{mission:?}");
     }
+    let samples = rows(&release, "samples");
+    assert!(!samples.is_empty());
+    for sample in samples {
+        assert_eq!(sample["split"], parts[&text(&sample["terrain_id"])], "{sample:?}");
+    }
     ok(&["verify", "release", "--recompute", "20", "--quiet"]);
     for shard in ["1/2", "2/2"] {
         ok(&["run", "study.toml", "-o", &format!("part{}", &shard[..1]), "--shard", shard, "--quiet"]);

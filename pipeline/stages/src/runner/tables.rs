@@ -377,8 +377,11 @@ mod tests {
             .map(|path| path.file_name().unwrap().to_string_lossy().into_owned())
             .collect();
         assert_eq!(names, ["part-a.parquet", "part-b.parquet"]);
-        let missions: Vec<String> = release.rows::<SampleRow>().unwrap().into_iter().map(|r| r.mission_id).collect();
+        let samples: Vec<SampleRow> = release.rows().unwrap();
+        let missions: Vec<&str> = samples.iter().map(|r| r.mission_id.as_str()).collect();
         assert_eq!(missions, ["run-0001", "walk-0001", "run-0001"]);
+        let splits: Vec<Option<&str>> = samples.iter().map(|r| r.split.as_deref()).collect();
+        assert_eq!(splits, [Some("test"), Some("test"), None]);
         let splits: Vec<Option<String>> = release.rows::<TerrainRow>().unwrap().into_iter().map(|r| r.split).collect();
         assert_eq!(splits, [Some("test".to_owned()), None]);
     }
