@@ -146,6 +146,14 @@ fn val_terrains_are_split_the_same_everywhere() {
     for sample in samples {
         assert_eq!(sample["split"], parts[&text(&sample["terrain_id"])], "{sample:?}");
     }
+    let card = read(&release, "README.md");
+    for words in [
+        "  - config_name: missions\n    default: true\n    data_files:\n      - split: train\n        path:\n          - \"tables/missions/part-train.parquet\"\n",
+        "      - split: other\n        path:\n          - \"tables/terrains/part-other.parquet\"\n",
+        "  - config_name: samples\n    data_files:\n      - split: train\n        path:\n          - \"tables/samples/part-a-000",
+    ] {
+        assert!(card.contains(words), "{card}");
+    }
     ok(&["verify", "release", "--recompute", "20", "--quiet"]);
     for shard in ["1/2", "2/2"] {
         ok(&["run", "study.toml", "-o", &format!("part{}", &shard[..1]), "--shard", shard, "--quiet"]);

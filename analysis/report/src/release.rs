@@ -7,7 +7,7 @@ use sastrugi_schemas::Record;
 use sastrugi_schemas::fit::FitFile;
 use sastrugi_schemas::manifest::{self, Manifest};
 use sastrugi_schemas::study::{HypothesisItem, RoughnessSection};
-use sastrugi_schemas::tables::{FormationSampleRow, LogRow, RoutePointRow, RoverSampleRow, SampleRow};
+use sastrugi_schemas::tables::{FormationSampleRow, LogRow, RoutePointRow, RoverSampleRow, SampleRow, in_order};
 use sastrugi_store::release::{MANIFEST, SHARD, TABLES};
 use sastrugi_store::{dem, digest, parquet};
 use std::fmt::Display;
@@ -173,13 +173,14 @@ impl Release {
         Ok(self.read(&path, parquet::read_table)?.unwrap_or_default())
     }
 
-    /// All rows of a table; none when the release does not have it.
+    /// All rows of a table, sorted by key; none when the release does not have it.
     fn rows<R: Record>(&self) -> Result<Vec<R>, ReportError> {
         let mut rows = Vec::new();
-        for path in self.files_below(&format!("{TABLES}/{}", R::TABLE.name))? {
-            rows.extend(self.read(&path, parquet::read_table::<R>)?.unwrap_or_default());
+        let files = self.files_below(&format!("{TABLES}/{}", R::TABLE.name))?;
+        for path in &files {
+            rows.extend(self.read(path, parquet::read_table::<R>)?.unwrap_or_default());
         }
-        Ok(rows)
+        Ok(if files.len() > 1 { in_order(rows) } else { rows })
     }
 
     fn artifacts(&self) -> Result<Vec<Artifact>, ReportError> {

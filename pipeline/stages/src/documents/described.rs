@@ -2,6 +2,7 @@
 
 use super::spdx_list;
 use crate::runner::execute::Failure;
+use crate::splits::{self, OTHER, PARTS, Splits};
 use sastrugi_schemas::manifest::{Artifact, Source};
 use sastrugi_schemas::study::StudyHead;
 use sastrugi_schemas::tables::{self, Table};
@@ -45,6 +46,8 @@ pub struct Described<'a> {
     pub sources: &'a [Source],
     /// Files of the release, sorted by path: all but the documents, the report and what seals it.
     pub artifacts: &'a [Artifact],
+    /// Which terrains are for training, validation and test.
+    pub splits: &'a Splits,
     /// Items without a result.
     pub failures: &'a [Failure],
 }
@@ -59,6 +62,16 @@ impl<'a> Described<'a> {
     pub fn parts(&self, table: &str) -> impl Iterator<Item = &'a Artifact> {
         let folder = format!("tables/{table}/");
         self.artifacts.iter().filter(move |artifact| artifact.path.starts_with(&folder))
+    }
+
+    /// Paths of a table's files by the part that their rows are in, those in none last; empty where the files do not tell parts apart.
+    pub fn by_part(&self, table: &Table) -> Vec<(&'static str, Vec<&'a str>)> {
+        let part = |path: &str| splits::of_file(table, part_name(path)?, self.splits);
+        let of = |wanted: &'static str| {
+            let paths = self.parts(table.name).map(|artifact| artifact.path.as_str());
+            (wanted, paths.filter(|path| part(path) == Some(wanted)).collect::<Vec<&'a str>>())
+        };
+        PARTS.into_iter().chain([OTHER]).map(of).filter(|(_, paths)| !paths.is_empty()).collect()
     }
 
     /// Who made the release: names, and their types in the words of schema.org.
@@ -77,6 +90,11 @@ impl<'a> Described<'a> {
     pub fn has(&self, folder: &str) -> bool {
         folder == "report/" || self.artifacts.iter().any(|artifact| artifact.path.starts_with(folder))
     }
+}
+
+/// Name of a file of a table: `a` of `tables/samples/part-a.parquet`.
+fn part_name(path: &str) -> Option<&str> {
+    path.rsplit('/').next()?.strip_prefix("part-")?.strip_suffix(".parquet")
 }
 
 /// Whether a file of the release is that map of a terrain. No id ends so.
