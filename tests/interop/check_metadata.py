@@ -2,7 +2,7 @@
 
     python check_metadata.py RELEASE    croissant.json with mlcroissant (every record of every record set, against the rows of the
                                         tables), ro-crate-metadata.json with rocrate, CITATION.cff with cffconvert, the head of
-                                        README.md as a dataset hub reads it
+                                        README.md as a dataset hub reads it, .zenodo.json
 """
 
 import fnmatch
@@ -223,8 +223,31 @@ def check_citation(release):
         expect(name == creator["name"], f"CITATION.cff: {author} is not {creator}")
     bibtex = citation.as_bibtex()
     for author in file["authors"]:
-        expect(all(part in bibtex for part in author.values()), f"cffconvert does not name {author}: {bibtex}")
+        names = [part for key, part in author.items() if key not in ("orcid", "affiliation")]
+        expect(all(part in bibtex for part in names), f"cffconvert does not name {author}: {bibtex}")
     return {"bibtex": bibtex, "license": named, "license-url": file.get("license-url")}
+
+
+def check_zenodo(release):
+    """The creators of Croissant with their ORCID iDs and affiliations; all that Zenodo asks for on deposit, licence and grants as it names them."""
+    deposit = json.loads((release / ".zenodo.json").read_text())
+    known = {
+        "title", "upload_type", "description", "creators", "access_right", "license", "publication_date", "version", "keywords",
+        "grants", "references", "related_identifiers", "notes",
+    }
+    expect(set(deposit) <= known and deposit["upload_type"] == "dataset", f".zenodo.json has {sorted(deposit)}")
+    dataset = json.loads((release / "croissant.json").read_text())
+    expect(deposit["title"] == dataset["name"] and deposit["publication_date"] == dataset["datePublished"], f"{deposit}")
+    expect(deposit.get("keywords") == dataset.get("keywords"), f".zenodo.json has the keywords {deposit.get('keywords')}")
+    for theirs, ours in zip(dataset["creator"], deposit["creators"], strict=True):
+        page = f"https://orcid.org/{ours['orcid']}" if "orcid" in ours else None
+        named = (ours["name"], page, ours.get("affiliation"))
+        expect(named == (theirs["name"], theirs.get("sameAs"), theirs.get("affiliation", {}).get("name")), f"{ours} is not {theirs}")
+    stated = manifest(release)["license"].lower()
+    expect(deposit["license"] in (stated, "other-open"), f".zenodo.json: license {deposit['license']} for {stated}")
+    for grant in deposit.get("grants", []):
+        expect(re.fullmatch(r"(10\.13039/\d+::)?\S+", grant["id"]), f".zenodo.json: the grant {grant}")
+    return {"license": deposit["license"], "grants": len(deposit.get("grants", []))}
 
 
 def check_card(release):
@@ -263,6 +286,7 @@ def check_release(release):
         "croissant": check_croissant(release),
         "crate": check_crate(release),
         "citation": check_citation(release),
+        "zenodo": check_zenodo(release),
         "card": check_card(release),
     }
 

@@ -29,6 +29,9 @@ pub const SHARD: &str = "shard.json";
 /// Folder of the tables in a release.
 pub const TABLES: &str = "tables";
 
+/// The one hidden file of a release: what an archive asks for on deposit.
+pub const ZENODO: &str = ".zenodo.json";
+
 /// Why a release was not made, opened or checked.
 #[derive(Debug, thiserror::Error)]
 pub enum ReleaseError {
@@ -218,7 +221,7 @@ pub fn check_path(path: &str) -> Result<(), ReleaseError> {
     if path.chars().any(|c| c.is_control() || c == '\\') {
         return refuse("it has a control character or backslash");
     }
-    if path.split('/').any(|part| part.is_empty() || part.starts_with('.')) {
+    if path != ZENODO && path.split('/').any(|part| part.is_empty() || part.starts_with('.')) {
         return refuse("it has an empty or hidden part");
     }
     Ok(())

@@ -6,7 +6,7 @@
 //! subfields of one field, `<table>/row`, and the id of the terrain is read from the name of the file, which is what mlcroissant can
 //! filter by: `records("samples", filters={"samples/terrain_id": "<id>"})` opens that file alone.
 
-use super::described::{Described, add_terms, citation_line, map_files, map_words, page};
+use super::described::{Described, Maker, ORGANIZATION, add_terms, citation_line, map_files, map_words, page};
 use super::spdx_list;
 use crate::jobs::{exports, original};
 use crate::splits::PARTS;
@@ -85,6 +85,7 @@ const DOCUMENTS: [(&str, &[&str], &[&str], &str); 2] = [
             "study.toml",
             "croissant.json",
             "ro-crate-metadata.json",
+            ".zenodo.json",
             "manifest.json",
             "SHA256SUMS",
         ],
@@ -137,14 +138,24 @@ pub fn text(described: &Described<'_>) -> String {
     if let Some(version) = &head.version {
         dataset["version"] = json!(version);
     }
+    if !head.keywords.is_empty() {
+        dataset["keywords"] = json!(head.keywords);
+    }
     if !described.sources.is_empty() {
         dataset["isBasedOn"] = described.sources.iter().map(work).collect();
     }
     format!("{dataset:#}\n")
 }
 
-fn creator((name, kind): (&str, &str)) -> Value {
-    json!({ "@type": format!("sc:{kind}"), "name": name })
+fn creator(maker: Maker<'_>) -> Value {
+    let mut creator = json!({ "@type": format!("sc:{}", maker.kind()), "name": maker.name });
+    if let Some(page) = maker.page() {
+        creator["sameAs"] = json!(page);
+    }
+    if let Some(affiliation) = maker.affiliation {
+        creator["affiliation"] = json!({ "@type": format!("sc:{ORGANIZATION}"), "name": affiliation });
+    }
+    creator
 }
 
 /// Measured data as a work of its own.

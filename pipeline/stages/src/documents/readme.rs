@@ -54,6 +54,9 @@ pub fn text(described: &Described<'_>) -> String {
         head.license,
         env!("CARGO_PKG_VERSION")
     );
+    if !head.funding.is_empty() {
+        let _ = writeln!(text, "Funding: {}\n", folded(&head.funding.join("; ")));
+    }
     text.push_str("| where | what |\n|---|---|\n| `study.toml` | the study: everything here follows from it |\n");
     for (folder, what) in FOLDERS.iter().filter(|(folder, _)| described.has(folder)) {
         let _ = writeln!(text, "| `{folder}` | {what} |");
@@ -64,6 +67,7 @@ pub fn text(described: &Described<'_>) -> String {
     text.push_str(
         "| `croissant.json` | the tables in Croissant, for data loaders |\n\
          | `ro-crate-metadata.json` | which stage made what from what |\n\
+         | `.zenodo.json` | title, creators, licence, keywords and grants for a deposit on Zenodo |\n\
          | `manifest.json`, `SHA256SUMS` | what each file is made from, and its checksum |\n\n\
          | table | a row is |\n|---|---|\n",
     );
