@@ -71,6 +71,11 @@ fn val_what_the_data_asks_for_goes_with_everything_made_from_it() {
     let crate_graph = json("ro-crate-metadata.json")["@graph"].clone();
     let group = crate_graph.as_array().unwrap().iter().find(|entity| entity["name"] == "A group").unwrap();
     assert_eq!(group["@type"], "Organization");
+    let info = sastrugi_in(folder.path(), &["info", "release", "--json"]);
+    assert_eq!(info.code, 0, "{}", info.stderr);
+    let info: Value = serde_json::from_str(&info.stdout).unwrap();
+    assert_eq!((&info["version"], &info["doi"]), (&"2.1".into(), &"10.5281/zenodo.1234567".into()));
+    assert!(info["program"].as_str().unwrap().starts_with("sastrugi "), "{info}");
     let person = crate_graph.as_array().unwrap().iter().find(|entity| entity["name"] == "Person, A.").unwrap();
     assert_eq!(person["@id"], "https://orcid.org/0000-0002-1825-0097");
     let lab = crate_graph.as_array().unwrap().iter().find(|entity| entity["name"] == "A <lab>").unwrap();
