@@ -37,6 +37,7 @@ fn val_a_release_has_its_layout() {
         "LICENSE",
         "croissant.json",
         "ro-crate-metadata.json",
+        ".zenodo.json",
         "study.toml",
         "manifest.json",
         "dem/site.tif",
