@@ -252,6 +252,8 @@ fn rows() -> Vec<SampleRow> {
             wheel_contact_x_m: wheels(&mut || in_steps(value(), 16384.0)),
             wheel_contact_y_m: wheels(&mut || in_steps(value(), 16384.0)),
             wheel_contact_z_m: wheels(&mut || in_steps(value(), 16384.0)),
+            outcome: "success".to_owned(),
+            split: None,
         })
         .collect()
 }

@@ -150,8 +150,17 @@ pub fn read_all<T: DeserializeOwned>(mut value: Value) -> Result<T, Vec<Paramete
 /// Takes out what lies at a path of names; false when nothing lies there.
 pub fn remove(value: &mut Value, path: &[String]) -> bool {
     let Some((last, parents)) = path.split_last() else { return false };
-    let parent = parents.iter().try_fold(value, |at, word| at.as_object_mut()?.get_mut(word));
+    let parent = parents.iter().try_fold(value, |at, word| below(at, word));
     parent.and_then(Value::as_object_mut).is_some_and(|map| map.remove(last).is_some())
+}
+
+/// What a table has under a key, or a list at a position.
+fn below<'a>(value: &'a mut Value, word: &str) -> Option<&'a mut Value> {
+    match value {
+        Value::Object(map) => map.get_mut(word),
+        Value::Array(list) => list.get_mut(word.parse::<usize>().ok()?),
+        _ => None,
+    }
 }
 
 /// The path with a dot before every name and index, as the keys of a study are written.

@@ -36,12 +36,19 @@ pub struct StudyHead {
     /// Licence of the release as an SPDX expression; it must be one that the licences of its DEMs permit.
     #[serde(default = "default_license")]
     pub license: String,
-    /// People and organisations that made the study; write people as `Family, Given` so that citations can tell the parts of a name apart.
+    /// People and organisations that made the study: names, or tables `{ name = "Family, Given", orcid = "...", affiliation = "..." }`. Write people
+    /// as `Family, Given` so that citations can tell the parts of a name apart.
     #[serde(default)]
-    pub creators: Vec<String>,
+    pub creators: Vec<Creator>,
     /// Those of `creators` that are organisations.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub organizations: Vec<String>,
+    /// Words to find the dataset by.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub keywords: Vec<String>,
+    /// Grants that paid for it: identifiers as Zenodo has them (`<DOI of the funder>::<number of the grant>`), or any text.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub funding: Vec<String>,
     /// Start of every mission's clock in MCAP files, ns since 1970-01-01 UTC.
     #[serde(default = "default_epoch_ns")]
     pub epoch_ns: u64,
@@ -58,6 +65,54 @@ pub struct StudyHead {
     /// `[0.8, 0.2]`; they add up to 1. Terrains without a group take no part where others have one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub split: Option<Shares>,
+}
+
+/// Who made a study, or took part in it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(
+    untagged,
+    deny_unknown_fields,
+    expecting = "a creator is a name, or a table `{ name = \"Family, Given\", orcid = \"...\", affiliation = \"...\" }`"
+)]
+pub enum Creator {
+    /// A name and what identifies its bearer.
+    Described {
+        /// Name; people as `Family, Given`.
+        name: String,
+        /// ORCID iD of a person, as `0000-0002-1825-0097`.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        orcid: Option<String>,
+        /// Organisation that a person works for.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        affiliation: Option<String>,
+    },
+    /// A name.
+    Name(String),
+}
+
+impl Creator {
+    /// The name.
+    pub fn name(&self) -> &str {
+        match self {
+            Self::Name(name) | Self::Described { name, .. } => name,
+        }
+    }
+
+    /// The ORCID iD.
+    pub fn orcid(&self) -> Option<&str> {
+        match self {
+            Self::Name(_) => None,
+            Self::Described { orcid, .. } => orcid.as_deref(),
+        }
+    }
+
+    /// The organisation that a person works for.
+    pub fn affiliation(&self) -> Option<&str> {
+        match self {
+            Self::Name(_) => None,
+            Self::Described { affiliation, .. } => affiliation.as_deref(),
+        }
+    }
 }
 
 /// Shares of the parts of a dataset.
@@ -94,6 +149,8 @@ impl Default for StudyHead {
             license: default_license(),
             creators: Vec::new(),
             organizations: Vec::new(),
+            keywords: Vec::new(),
+            funding: Vec::new(),
             epoch_ns: default_epoch_ns(),
             mcap: McapFlavour::default(),
             geotiff: GeoTiff::default(),

@@ -33,11 +33,23 @@ fn val_a_licence_that_the_data_does_not_permit_is_refused() {
     }
 }
 
+/// A wrong ORCID iD is told before anything runs, at its place.
+#[test]
+fn val_an_orcid_that_cannot_be_is_refused_at_plan() {
+    let folder = area();
+    let head = "creators = [{ name = \"Person, A.\", orcid = \"0000-0002-1825-0079\" }]\n";
+    write(folder.path(), "study.toml", &study(head, ""));
+    let call = sastrugi_in(folder.path(), &["plan", "study.toml"]);
+    let said = call.stderr.split_whitespace().collect::<Vec<_>>().join(" ").replace(" │ ", " ");
+    assert!(call.code == 2 && said.contains("checksum is wrong"), "{} {}", call.code, call.stderr);
+}
+
 #[test]
 fn val_what_the_data_asks_for_goes_with_everything_made_from_it() {
     let folder = area();
-    let head = "version = \"2.1\"\ndoi = \"10.5281/zenodo.1234567\"\nurl = \"https://example.org/rough\"\ncreators = [\"A. Person\", \"A group\"]\n\
-        organizations = [\"A group\"]\n";
+    let head = "version = \"2.1\"\ndoi = \"10.5281/zenodo.1234567\"\nurl = \"https://example.org/rough\"\n\
+        creators = [{ name = \"Person, A.\", orcid = \"0000-0002-1825-0097\", affiliation = \"A <lab>\" }, \"A group\"]\n\
+        organizations = [\"A group\"]\nkeywords = [\"snow\"]\nfunding = [\"10.13039/501100000780::101122956\", \"A fund\"]\n";
     let dem =
         "license = \"Terms of the agency\"\nattribution = \"The agency\"\ncitation = \"Agency (2000), Heights\"\n";
     write(folder.path(), "study.toml", &study(head, dem));
@@ -59,7 +71,28 @@ fn val_what_the_data_asks_for_goes_with_everything_made_from_it() {
     let crate_graph = json("ro-crate-metadata.json")["@graph"].clone();
     let group = crate_graph.as_array().unwrap().iter().find(|entity| entity["name"] == "A group").unwrap();
     assert_eq!(group["@type"], "Organization");
+    let info = sastrugi_in(folder.path(), &["info", "release", "--json"]);
+    assert_eq!(info.code, 0, "{}", info.stderr);
+    let info: Value = serde_json::from_str(&info.stdout).unwrap();
+    assert_eq!((&info["version"], &info["doi"]), (&"2.1".into(), &"10.5281/zenodo.1234567".into()));
+    assert!(info["program"].as_str().unwrap().starts_with("sastrugi "), "{info}");
+    let person = crate_graph.as_array().unwrap().iter().find(|entity| entity["name"] == "Person, A.").unwrap();
+    assert_eq!(person["@id"], "https://orcid.org/0000-0002-1825-0097");
+    let lab = crate_graph.as_array().unwrap().iter().find(|entity| entity["name"] == "A <lab>").unwrap();
+    assert_eq!(person["affiliation"]["@id"], lab["@id"]);
+    let deposit = json(".zenodo.json");
+    assert_eq!(
+        deposit["creators"],
+        serde_json::json!([
+            { "name": "Person, A.", "orcid": "0000-0002-1825-0097", "affiliation": "A <lab>" },
+            { "name": "A group" },
+        ])
+    );
+    assert_eq!(deposit["grants"], serde_json::json!([{ "id": "10.13039/501100000780::101122956" }]));
+    assert_eq!((&deposit["license"], &deposit["version"]), (&"cc-by-4.0".into(), &"2.1".into()));
+    assert_eq!((&deposit["keywords"][0], &deposit["notes"]), (&"snow".into(), &"Funding: A fund.".into()));
     let citation = read(&release, "CITATION.cff");
+    assert!(citation.contains("    orcid: \"https://orcid.org/0000-0002-1825-0097\"\n    affiliation: \"A <lab>\"\n"));
     for line in ["version: \"2.1\"", "doi: \"10.5281/zenodo.1234567\"", "url: \"https://example.org/rough\""] {
         assert!(citation.contains(line), "{citation}");
     }
@@ -141,6 +174,19 @@ fn val_terrains_are_split_the_same_everywhere() {
     for mission in missions {
         assert_eq!(mission["split"], parts[&text(&mission["terrain_id"])], "{mission:?}");
     }
+    let samples = rows(&release, "samples");
+    assert!(!samples.is_empty());
+    for sample in samples {
+        assert_eq!(sample["split"], parts[&text(&sample["terrain_id"])], "{sample:?}");
+    }
+    let card = read(&release, "README.md");
+    for words in [
+        "  - config_name: missions\n    default: true\n    data_files:\n      - split: train\n        path:\n          - \"tables/missions/part-train.parquet\"\n",
+        "      - split: other\n        path:\n          - \"tables/terrains/part-other.parquet\"\n",
+        "  - config_name: samples\n    data_files:\n      - split: train\n        path:\n          - \"tables/samples/part-a-000",
+    ] {
+        assert!(card.contains(words), "{card}");
+    }
     ok(&["verify", "release", "--recompute", "20", "--quiet"]);
     for shard in ["1/2", "2/2"] {
         ok(&["run", "study.toml", "-o", &format!("part{}", &shard[..1]), "--shard", shard, "--quiet"]);
@@ -185,6 +231,7 @@ fn val_a_citation_drives_no_mission_again() {
         "LICENSE",
         "croissant.json",
         "ro-crate-metadata.json",
+        ".zenodo.json",
         "manifest.json",
     ];
     for name in documents {

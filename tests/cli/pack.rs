@@ -54,6 +54,18 @@ fn gold_an_archive_has_the_same_bytes_wherever_it_is_packed() {
     assert!(call.stdout.starts_with(first["sha256"].as_str().unwrap()), "{}", call.stdout);
 }
 
+/// Where stderr is no terminal: what is checked, what is packed, and how long it takes where it takes long; no line for each file.
+#[test]
+fn val_packing_tells_its_progress_in_a_few_lines() {
+    let folder = area();
+    release(folder.path());
+    let call = sastrugi_in(folder.path(), &["pack", "release", "-o", "a.tar"]);
+    assert_eq!(call.code, 0, "{}", call.stderr);
+    let lines: Vec<&str> = call.stderr.lines().collect();
+    assert!((2..=3).contains(&lines.len()) && lines[0] == "checking files", "{lines:?}");
+    assert!(lines[1].starts_with("packing ") && lines[1].ends_with(" files"), "{lines:?}");
+}
+
 /// GNU tar and Python's tarfile read the archive, and what they unpack is the release.
 #[test]
 fn val_others_unpack_the_release() {

@@ -2,7 +2,7 @@
 
     python check_metadata.py RELEASE    croissant.json with mlcroissant (every record of every record set, against the rows of the
                                         tables), ro-crate-metadata.json with rocrate, CITATION.cff with cffconvert, the head of
-                                        README.md as a dataset hub reads it
+                                        README.md as a dataset hub reads it, .zenodo.json
 """
 
 import fnmatch
@@ -25,6 +25,8 @@ from common import expect, manifest, run
 # Stages that only take files into the release.
 COPIES = {"original", "mask"}
 PARTS = ["train", "validation", "test"]
+# Tables with a file for each terrain.
+LONG = {"samples", "formation_samples", "rover_samples"}
 # Rasters beside the heights.
 MAPS = ["albedo", "class", "flux", "rms-measured", "rms-predicted", "rock-potential"]
 # Tables of more files are a set of files only; their hashes are in the manifest.
@@ -59,8 +61,14 @@ def tables(release):
     return rows
 
 
+def flat(record, name):
+    """A record without the field that holds the columns of a long table."""
+    top = {key: value for key, value in record.items() if key != f"{name}/row"}
+    return {**top, **record.get(f"{name}/row", {})}
+
+
 def check_records(dataset, name, rows):
-    records = list(dataset.records(name))
+    records = [flat(record, name) for record in dataset.records(name)]
     expect(len(records) == len(rows), f"croissant.json, {name}: {len(records)} records instead of {len(rows)}")
     columns = list(rows[0])
     keys = [f"{name}/{column}" for column in columns]
@@ -80,6 +88,8 @@ def check_croissant(release):
     sets = {record_set.id for record_set in dataset.metadata.record_sets}
     expect(sets - {"splits"} == set(expected), f"croissant.json: record sets {sorted(sets)}")
     counts = {name: check_records(dataset, name, rows) for name, rows in expected.items()}
+    for name in sets & LONG:
+        check_terrain(release, name, expected[name])
     if "splits" in sets:
         parts = [record["splits/name"] for record in dataset.records("splits")]
         expect(sorted(map(plain, parts)) == sorted(PARTS), f"croissant.json: splits {parts}")
@@ -88,8 +98,17 @@ def check_croissant(release):
     return {"records": counts, "warnings": sorted(issues.warnings)}
 
 
+def check_terrain(release, name, rows):
+    """The file of one terrain alone. (A filter changes the data set it is asked of.)"""
+    terrain = rows[-1]["terrain_id"]
+    wanted = [row for row in rows if row["terrain_id"] == terrain]
+    found = list(mlcroissant.Dataset(release / "croissant.json").records(name, filters={f"{name}/terrain_id": terrain}))
+    named = {plain(record[f"{name}/terrain_id"]) for record in found}
+    expect(len(found) == len(wanted) and named == {terrain}, f"croissant.json, {name}: {len(found)} records of {named}")
+
+
 def check_references(release, sets):
-    """Every column that names a part refers to the record set of the parts."""
+    """Every column that names a part refers to the record set of the parts, but for tables with a file for each terrain."""
     described = json.loads((release / "croissant.json").read_text())["recordSet"]
     fields = {field["@id"]: field for record_set in described for field in record_set["field"]}
     expect("cr:Split" in fields["splits/url"]["dataType"], "croissant.json: the parts are no cr:Split")
@@ -204,8 +223,31 @@ def check_citation(release):
         expect(name == creator["name"], f"CITATION.cff: {author} is not {creator}")
     bibtex = citation.as_bibtex()
     for author in file["authors"]:
-        expect(all(part in bibtex for part in author.values()), f"cffconvert does not name {author}: {bibtex}")
+        names = [part for key, part in author.items() if key not in ("orcid", "affiliation")]
+        expect(all(part in bibtex for part in names), f"cffconvert does not name {author}: {bibtex}")
     return {"bibtex": bibtex, "license": named, "license-url": file.get("license-url")}
+
+
+def check_zenodo(release):
+    """The creators of Croissant with their ORCID iDs and affiliations; all that Zenodo asks for on deposit, licence and grants as it names them."""
+    deposit = json.loads((release / ".zenodo.json").read_text())
+    known = {
+        "title", "upload_type", "description", "creators", "access_right", "license", "publication_date", "version", "keywords",
+        "grants", "references", "related_identifiers", "notes",
+    }
+    expect(set(deposit) <= known and deposit["upload_type"] == "dataset", f".zenodo.json has {sorted(deposit)}")
+    dataset = json.loads((release / "croissant.json").read_text())
+    expect(deposit["title"] == dataset["name"] and deposit["publication_date"] == dataset["datePublished"], f"{deposit}")
+    expect(deposit.get("keywords") == dataset.get("keywords"), f".zenodo.json has the keywords {deposit.get('keywords')}")
+    for theirs, ours in zip(dataset["creator"], deposit["creators"], strict=True):
+        page = f"https://orcid.org/{ours['orcid']}" if "orcid" in ours else None
+        named = (ours["name"], page, ours.get("affiliation"))
+        expect(named == (theirs["name"], theirs.get("sameAs"), theirs.get("affiliation", {}).get("name")), f"{ours} is not {theirs}")
+    stated = manifest(release)["license"].lower()
+    expect(deposit["license"] in (stated, "other-open"), f".zenodo.json: license {deposit['license']} for {stated}")
+    for grant in deposit.get("grants", []):
+        expect(re.fullmatch(r"(10\.13039/\d+::)?\S+", grant["id"]), f".zenodo.json: the grant {grant}")
+    return {"license": deposit["license"], "grants": len(deposit.get("grants", []))}
 
 
 def check_card(release):
@@ -219,12 +261,24 @@ def check_card(release):
     defaults = [config["config_name"] for config in card["configs"] if config.get("default")]
     expect(len(defaults) == 1, f"the card has the default configurations {defaults}")
     for config in card["configs"]:
-        found = {path for path in there if fnmatch.fnmatch(path, config["data_files"])}
-        name = config["config_name"]
-        expect(found and all(path.split("/")[1] == name for path in found), f"README.md: {name} names {sorted(found)}")
-        there -= found
+        name, files = config["config_name"], config["data_files"]
+        parts = {None: [files]} if isinstance(files, str) else {entry["split"]: entry["path"] for entry in files}
+        for part, patterns in parts.items():
+            found = {path for path in there if any(fnmatch.fnmatch(path, pattern) for pattern in patterns)}
+            expect(found and all(path.split("/")[1] == name for path in found), f"README.md: {name} names {sorted(found)}")
+            check_part(release, part, found)
+            there -= found
     expect(not there, f"README.md does not name {sorted(there)}")
     return {"configs": len(card["configs"]), "license": card["license"]}
+
+
+def check_part(release, part, paths):
+    """Every row of the files of a split is in that part; `other` holds those that are in none."""
+    if part is None:
+        return
+    expect(part in [*PARTS, "other"], f"README.md has the split {part}")
+    named = {row for path in paths for row in pq.read_table(release / path, columns=["split"])["split"].to_pylist()}
+    expect(named == {None if part == "other" else part}, f"README.md: the split {part} holds rows of {named}")
 
 
 def check_release(release):
@@ -232,6 +286,7 @@ def check_release(release):
         "croissant": check_croissant(release),
         "crate": check_crate(release),
         "citation": check_citation(release),
+        "zenodo": check_zenodo(release),
         "card": check_card(release),
     }
 

@@ -156,6 +156,8 @@ def check_samples(release):
             samples.setdefault((row["terrain_id"], row["mission_id"]), []).append(row)
         for key, rows in samples.items():
             mission = missions[key]
+            labels = {(row["outcome"], row["split"]) for row in rows}
+            expect(labels == {(mission["outcome"], mission["split"])}, f"{file}: {key} has {labels}, table missions {mission}")
             check_weight(file, mission, rows[0])
             if mission["path"] and key[0] not in compared:
                 compared.add(key[0])

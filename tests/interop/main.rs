@@ -282,7 +282,9 @@ const MANY_TERRAINS: &str = "[study]\nname = \"many\"\nseed = 7\ndate = \"2026-1
 /// exports.
 fn described_study() -> String {
     let head = "seed = 7\ntitle = \"Small: \\\"rough\\\" & smooth\"\nversion = \"1.0.0\"\ndoi = \"10.5281/zenodo.1234567\"\n\
-        creators = [\"Person, A.\", \"A group\"]\norganizations = [\"A group\"]\nsplit = [0.4, 0.3, 0.3]\n";
+        creators = [{ name = \"Person, A.\", orcid = \"0000-0002-1825-0097\", affiliation = \"A group\" }, \"A group\"]\n\
+        organizations = [\"A group\"]\nkeywords = [\"snow\", \"gravel\"]\n\
+        funding = [\"10.13039/501100001711::200021_192342\", \"A fund\"]\nsplit = [0.4, 0.3, 0.3]\n";
     let dem =
         "id = \"site\"\nlicense = \"public domain\"\nattribution = \"NASA and USGS\"\ncitation = \"SRTM (2000)\"\n";
     let study = small_study().replace("seed = 7\n", head).replace("id = \"site\"\n", dem);

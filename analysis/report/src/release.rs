@@ -7,7 +7,7 @@ use sastrugi_schemas::Record;
 use sastrugi_schemas::fit::FitFile;
 use sastrugi_schemas::manifest::{self, Manifest};
 use sastrugi_schemas::study::{HypothesisItem, RoughnessSection};
-use sastrugi_schemas::tables::{FormationSampleRow, LogRow, RoutePointRow, RoverSampleRow, SampleRow};
+use sastrugi_schemas::tables::{FormationSampleRow, LogRow, RoutePointRow, RoverSampleRow, SampleRow, in_order};
 use sastrugi_store::release::{MANIFEST, SHARD, TABLES};
 use sastrugi_store::{dem, digest, parquet};
 use std::fmt::Display;
@@ -173,13 +173,14 @@ impl Release {
         Ok(self.read(&path, parquet::read_table)?.unwrap_or_default())
     }
 
-    /// All rows of a table; none when the release does not have it.
+    /// All rows of a table, sorted by key; none when the release does not have it.
     fn rows<R: Record>(&self) -> Result<Vec<R>, ReportError> {
         let mut rows = Vec::new();
-        for path in self.files_below(&format!("{TABLES}/{}", R::TABLE.name))? {
-            rows.extend(self.read(&path, parquet::read_table::<R>)?.unwrap_or_default());
+        let files = self.files_below(&format!("{TABLES}/{}", R::TABLE.name))?;
+        for path in &files {
+            rows.extend(self.read(path, parquet::read_table::<R>)?.unwrap_or_default());
         }
-        Ok(rows)
+        Ok(if files.len() > 1 { in_order(rows) } else { rows })
     }
 
     fn artifacts(&self) -> Result<Vec<Artifact>, ReportError> {
@@ -223,9 +224,6 @@ fn study(toml: &str) -> Result<Study, String> {
     let document: toml_edit::DocumentMut = toml.parse().map_err(|e: toml_edit::TomlError| e.to_string())?;
     let item = |key: &str| document.get("study").and_then(|s| s.get(key));
     let text = |key: &str| item(key).and_then(|v| v.as_str()).unwrap_or_default().to_owned();
-    let list = |key: &str| {
-        item(key).and_then(|v| v.as_array()).map(|a| a.iter().filter_map(|v| v.as_str()).map(str::to_owned).collect())
-    };
     Ok(Study {
         name: text("name"),
         title: text("title"),
@@ -233,10 +231,21 @@ fn study(toml: &str) -> Result<Study, String> {
         seed: item("seed").and_then(|v| v.as_integer()).and_then(|n| u64::try_from(n).ok()).unwrap_or_default(),
         date: text("date"),
         license: text("license"),
-        creators: list("creators").unwrap_or_default(),
+        creators: item("creators").map(creators).unwrap_or_default(),
         hypotheses: hypotheses(&document)?,
         roughness: roughness(&document)?,
     })
+}
+
+/// Names of creators, which are texts or tables.
+fn creators(item: &toml_edit::Item) -> Vec<String> {
+    let name = |value: &toml_edit::Value| {
+        let named = value.as_inline_table().and_then(|table| table.get("name"));
+        named.unwrap_or(value).as_str().map(str::to_owned)
+    };
+    let values = item.as_array().into_iter().flatten().filter_map(name);
+    let tables = item.as_array_of_tables().into_iter().flatten();
+    values.chain(tables.filter_map(|table| Some(table.get("name")?.as_str()?.to_owned()))).collect()
 }
 
 /// `[roughness]` of a study file; keys that it does not state are the defaults.

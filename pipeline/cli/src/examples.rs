@@ -1,7 +1,7 @@
 //! Examples for the page on study files.
 
 /// Examples of keys that have no default and stand in no study to start from, by name or the last word of it, after `section: ` where sections differ.
-pub const EXAMPLES: [(&str, &str); 139] = [
+pub const EXAMPLES: [(&str, &str); 144] = [
     ("basic_spacing_m", "0.01"),
     ("pixel_m", "0.64"),
     ("elevation_deg", "45.0"),
@@ -12,7 +12,12 @@ pub const EXAMPLES: [(&str, &str); 139] = [
     ("study: version", r#""1.0.0""#),
     ("url", r#""https://example.org/dataset""#),
     ("doi", r#""10.5281/zenodo.1234567""#),
+    ("creators[].name", r#""Doe, Jane""#),
+    ("creators[].orcid", r#""0000-0002-1825-0097""#),
+    ("creators[].affiliation", r#""Snow Lab""#),
     ("organizations", r#"["Snow Lab"]"#),
+    ("keywords", r#"["snow", "roughness"]"#),
+    ("funding", r#"["10.13039/501100001711::200021_192342"]"#),
     ("split", "[0.7, 0.15, 0.15]"),
     ("group", r#""rough""#),
     ("window", "[500.0, 500.0, 700.0, 650.0]"),

@@ -10,6 +10,8 @@ use std::time::Instant;
 
 /// Steps of the bar per estimated second.
 const TICKS_PER_SECOND: f64 = 1000.0;
+/// Time after which the speed of a copy is known, s.
+const KNOWN_AFTER_S: f64 = 2.0;
 
 /// The listener of a run.
 pub struct Teller {
@@ -25,6 +27,8 @@ struct State {
     ended: usize,
     seconds_total: f64,
     seconds_done: f64,
+    /// When a copy began whose speed is not told yet.
+    copy_start: Option<Instant>,
 }
 
 impl Teller {
@@ -75,6 +79,23 @@ impl Teller {
         }
     }
 
+    /// Tells once how long a copy will take, from what is done of it.
+    fn tell_copy(&self, done: u64, total: u64) {
+        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        if done == 0 {
+            state.copy_start = Some(Instant::now());
+        }
+        let elapsed = state.copy_start.map_or(0.0, |start| start.elapsed().as_secs_f64());
+        if elapsed < KNOWN_AFTER_S || done == 0 || done >= total {
+            return;
+        }
+        state.copy_start = None;
+        let (part, whole) = (done as f64, total as f64);
+        let left = crate::output::seconds(elapsed * (whole / part - 1.0));
+        let [part, whole] = [part, whole].map(crate::output::bytes);
+        self.say(&format!("{part} of {whole}, about {left} left"));
+    }
+
     /// Time left, from the share of the estimated work that is done.
     fn remaining(&self, state: &State) -> String {
         if state.seconds_done <= 0.0 || state.ended >= state.total {
@@ -89,7 +110,7 @@ impl Teller {
 impl Progress for Teller {
     fn begin(&self, total: usize, ready: usize, seconds: f64) {
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
-        *state = State { total: total - ready, ended: 0, seconds_total: seconds, seconds_done: 0.0 };
+        *state = State { total: total - ready, seconds_total: seconds, ..State::default() };
         drop(state);
         if let Some(bar) = &self.bar {
             bar.set_length((seconds * TICKS_PER_SECOND) as u64);
@@ -104,6 +125,15 @@ impl Progress for Teller {
             End::Skipped(parent) => self.print(&format!("sastrugi: {item} not tried, because {parent} failed")),
         }
         self.advance(item, seconds);
+    }
+
+    fn copied(&self, done: u64, total: u64) {
+        let Some(bar) = &self.bar else { return self.tell_copy(done, total) };
+        if done == 0 {
+            bar.set_length(total);
+            bar.reset_eta();
+        }
+        bar.set_position(done);
     }
 
     fn phase(&self, text: &str) {

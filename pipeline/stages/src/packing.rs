@@ -1,18 +1,13 @@
 //! A release as one archive with reproducible bytes.
 
 use crate::error::Error;
-use crate::job::ItemRef;
-use crate::registry;
-use crate::runner::progress::{End, Progress};
-use crate::studies::resolved;
-use crate::study::Study;
+use crate::runner::progress::Progress;
+use crate::studies::{head_of, resolved};
 use crate::verification::{Difference, differences};
 use sastrugi_store::release::{self, Packed, Release};
 use serde::Serialize;
+use std::cell::Cell;
 use std::path::{Path, PathBuf};
-
-/// Bytes copied per second, for the progress bar.
-const BYTES_PER_SECOND: f64 = 3e8;
 
 /// What packing came to.
 #[derive(Debug, Serialize)]
@@ -43,12 +38,14 @@ pub fn pack(folder: &Path, output: &Path, progress: &dyn Progress) -> Result<Pac
         return Ok(packing);
     }
     let release = Release::open(folder)?;
-    let time_s = unix_seconds(&date_of(folder)?);
-    let files = release.manifest().artifacts.len() + 2;
-    progress.begin(files, 0, report.bytes as f64 / BYTES_PER_SECOND);
-    let added = |path: &str, bytes: u64| {
-        let item = ItemRef::new(&release.manifest().name, path);
-        progress.ended(&item, &End::Done(Vec::new()), bytes as f64 / BYTES_PER_SECOND);
+    let time_s = unix_seconds(&head_of(folder)?.date);
+    progress.phase(&format!("packing {} files", release.manifest().artifacts.len() + 2));
+    let done = Cell::new(0);
+    progress.copied(0, report.bytes);
+    let added = |_: &str, bytes: u64| {
+        // The list of checksums is not among the bytes that were checked.
+        done.set((done.get() + bytes).min(report.bytes));
+        progress.copied(done.get(), report.bytes);
     };
     let Packed { files, bytes, sha256 } = release::pack(&release, output, time_s, &added)?;
     (packing.files, packing.bytes, packing.sha256) = (files, bytes, Some(sha256));
@@ -68,15 +65,6 @@ fn check_output(folder: &Path, output: &Path) -> Result<(), Error> {
         return Err(Error::Usage(format!("{}: {advice}", output.display())));
     }
     Ok(())
-}
-
-/// The date of a release, as its study says.
-fn date_of(folder: &Path) -> Result<String, Error> {
-    let path = folder.join("study.toml");
-    let refuse = |why: &dyn std::fmt::Display| Error::Input(format!("{}: {why}", path.display()));
-    let text = sastrugi_store::file::read_text(&path).map_err(|e| refuse(&e))?;
-    let study = Study::parse(&text, folder, &registry::section_names()).map_err(|e| refuse(&e))?;
-    Ok(study.head.date)
 }
 
 /// Midnight UTC of a day YYYY-MM-DD, s since 1970-01-01; days before that count as it, since archives know no earlier ones.

@@ -17,6 +17,12 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// Names of the parts, in the order of `[study] split`.
 pub const PARTS: [&str; 3] = ["train", "validation", "test"];
+/// What stands for a part where a row is in none.
+pub const OTHER: &str = "other";
+/// Column that names the part of a row.
+const COLUMN: &str = "split";
+/// Column that names the terrain of a row.
+const TERRAIN: &str = "terrain_id";
 /// First word of the random streams after the seed.
 const STAGE: &str = "split";
 
@@ -26,12 +32,43 @@ pub type Splits = BTreeMap<String, String>;
 /// Writes the part into a row that names a terrain and has the column `split`: items are made without it, so that another
 /// split makes nothing again.
 pub fn fill(table: &Table, cells: &mut [Cell], splits: &Splits) {
-    let (Some(split), Some(terrain)) = (table.position("split"), table.position("terrain_id")) else { return };
+    let (Some(split), Some(terrain)) = (table.position(COLUMN), table.position(TERRAIN)) else { return };
     let part = match &cells[terrain] {
         Cell::Text(id) => splits.get(id).cloned(),
         _ => None,
     };
     cells[split] = part.to_cell();
+}
+
+/// Whether every file of a table holds rows of one part: the study has parts, and the table names them.
+fn is_parted(table: &Table, splits: &Splits) -> bool {
+    !splits.is_empty() && table.position(COLUMN).is_some() && table.position(TERRAIN).is_some()
+}
+
+/// Names of the files of a table that has one for each part; none where it has one in all, or one for each terrain.
+pub fn files(table: &Table, splits: &Splits) -> Vec<&'static str> {
+    let parted = is_parted(table, splits) && table.file_per.is_none();
+    PARTS.into_iter().chain([OTHER]).filter(|_| parted).collect()
+}
+
+/// Whether a row, whose part is filled, belongs to the file of that name.
+pub fn is_in_file(table: &Table, cells: &[Cell], file: &str) -> bool {
+    match table.position(COLUMN).map(|split| &cells[split]) {
+        Some(Cell::Text(part)) => part == file,
+        _ => file == OTHER,
+    }
+}
+
+/// The part that all rows of a table's file are in, by the file's name ([`OTHER`] for none of them); nothing where rows of several parts
+/// may be in it.
+pub fn of_file(table: &Table, file: &str, splits: &Splits) -> Option<&'static str> {
+    let part = match table.file_per {
+        Some(TERRAIN) => splits.get(file).map(String::as_str),
+        Some(_) => return None,
+        None => Some(file),
+    };
+    let known = PARTS.into_iter().find(|known| Some(*known) == part);
+    is_parted(table, splits).then_some(known.unwrap_or(OTHER))
 }
 
 /// Terrains that stay together.
@@ -260,6 +297,21 @@ mod tests {
         assert_eq!(number(&drawn, "a"), [8, 0, 2]);
         let error = splits(&format!("{HEAD}split = [1.0]\n{}", terrain("a", "a", 10))).unwrap_err();
         assert!(error.contains("two or three parts"), "{error}");
+    }
+
+    /// Tables of runs have a file for each part, their samples one for each terrain; other tables hold what they hold.
+    #[test]
+    fn val_every_file_of_a_parted_table_is_of_one_part() {
+        use sastrugi_schemas::tables::by_name;
+        let [missions, samples, psd] = ["missions", "samples", "psd"].map(|name| by_name(name).unwrap());
+        let drawn: Splits = [("a".to_owned(), "test".to_owned())].into();
+        assert_eq!(files(missions, &drawn), ["train", "validation", "test", "other"]);
+        assert!(files(samples, &drawn).is_empty() && files(psd, &drawn).is_empty());
+        assert!(files(missions, &Splits::new()).is_empty());
+        let of = |table: &Table, file: &str| of_file(table, file, &drawn);
+        assert_eq!((of(missions, "train"), of(missions, "other")), (Some("train"), Some("other")));
+        assert_eq!((of(samples, "a"), of(samples, "b"), of(psd, "0000")), (Some("test"), Some("other"), None));
+        assert_eq!(of_file(samples, "a", &Splits::new()), None);
     }
 
     #[test]

@@ -11,6 +11,7 @@ use crate::runner::plan::{PlanSummary, plan};
 use crate::runner::progress::Progress;
 use crate::runner::shard::{self, Part};
 use crate::study::Study;
+use sastrugi_schemas::study::StudyHead;
 use sastrugi_store::release;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -146,6 +147,18 @@ fn check_destination(request: &RunRequest<'_>) -> Result<(), Error> {
         return Err(Error::Usage("the output is the current folder; name a folder to make with -o".to_owned()));
     }
     Ok(())
+}
+
+/// What the study of a release says of it as a whole.
+///
+/// # Errors
+/// A study that is missing or wrong.
+pub fn head_of(release: &Path) -> Result<StudyHead, Error> {
+    let path = release.join("study.toml");
+    let refuse = |why: &dyn std::fmt::Display| Error::Input(format!("{}: {why}", path.display()));
+    let text = sastrugi_store::file::read_text(&path).map_err(|e| refuse(&e))?;
+    let study = Study::parse(&text, release, &registry::section_names()).map_err(|e| refuse(&e))?;
+    Ok(study.head)
 }
 
 /// A path with links and dots resolved as far as it exists.

@@ -15,6 +15,7 @@ use crate::digest;
 use crate::parquet::{self, TableError};
 use sastrugi_schemas::Record;
 use sastrugi_schemas::manifest::{Artifact, FORMAT, Manifest, PROGRAM};
+use sastrugi_schemas::tables::in_order;
 use std::collections::BTreeSet;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -27,6 +28,9 @@ pub const SUMS: &str = "SHA256SUMS";
 pub const SHARD: &str = "shard.json";
 /// Folder of the tables in a release.
 pub const TABLES: &str = "tables";
+
+/// The one hidden file of a release: what an archive asks for on deposit.
+pub const ZENODO: &str = ".zenodo.json";
 
 /// Why a release was not made, opened or checked.
 #[derive(Debug, thiserror::Error)]
@@ -150,14 +154,15 @@ impl Release {
         self.manifest.artifacts.iter().filter(move |artifact| table_of(&artifact.path) == Some(table))
     }
 
-    /// All rows of a table.
+    /// All rows of a table, sorted by key.
     ///
     /// # Errors
     /// A file cannot be read, is not the one that was sealed, or has other columns.
     pub fn rows<R: Record>(&self) -> Result<Vec<R>, ReleaseError> {
         let mut rows = vec![];
         self.for_each_row(|row| rows.push(row))?;
-        Ok(rows)
+        let several = self.parts(R::TABLE.name).nth(1).is_some();
+        Ok(if several { in_order(rows) } else { rows })
     }
 
     /// Calls `f` with every row of a table, file by file.
@@ -216,7 +221,7 @@ pub fn check_path(path: &str) -> Result<(), ReleaseError> {
     if path.chars().any(|c| c.is_control() || c == '\\') {
         return refuse("it has a control character or backslash");
     }
-    if path.split('/').any(|part| part.is_empty() || part.starts_with('.')) {
+    if path != ZENODO && path.split('/').any(|part| part.is_empty() || part.starts_with('.')) {
         return refuse("it has an empty or hidden part");
     }
     Ok(())

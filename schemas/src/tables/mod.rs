@@ -197,6 +197,18 @@ pub fn compare_keys(a: &[Cell], b: &[Cell]) -> Ordering {
     pairs.fold(Ordering::Equal, Ordering::then)
 }
 
+/// Rows of several files of a table, each sorted, in the order of their keys.
+pub fn in_order<R: Record>(rows: Vec<R>) -> Vec<R> {
+    let keys = |row: &R| {
+        let mut cells = row.cells();
+        cells.truncate(R::TABLE.key_count());
+        cells
+    };
+    let mut keyed: Vec<(Vec<Cell>, R)> = rows.into_iter().map(|row| (keys(&row), row)).collect();
+    keyed.sort_by(|(a, _), (b, _)| compare_keys(a, b));
+    keyed.into_iter().map(|(_, row)| row).collect()
+}
+
 /// A row type.
 pub trait Record: Clone + Send {
     /// Its table.

@@ -83,5 +83,9 @@ super::table! {
         wheel_contact_y_m: Vec<f64> ["m"],
         /// Height of each wheel's contact point, in steps of 1/1024; null without contact.
         wheel_contact_z_m: Vec<f64> ["m"],
+        /// How the mission ends: `success`, `tipped`, `stuck`, `out_of_bounds` or `timeout`.
+        outcome: String [""],
+        /// `train`, `validation` or `test` (`[study] split`); null where the study does not split its terrains, or leaves this one out.
+        split: Option<String> [""],
     }
 }

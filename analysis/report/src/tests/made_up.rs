@@ -435,6 +435,8 @@ fn missions(data: &mut Data, shelf: &mut Shelf, terrain_id: &str, g: usize, terr
                 wheel_contact_x_m: vec![],
                 wheel_contact_y_m: vec![],
                 wheel_contact_z_m: vec![],
+                outcome: outcome.into(),
+                split: None,
             });
         }
     }

@@ -6,6 +6,7 @@ use crate::args::{self, Common, Convert, Info};
 use crate::failure::{Code, Failure};
 use crate::output::{columns, print};
 use sastrugi_stages::operations::dem::to_metres;
+use sastrugi_stages::studies;
 use sastrugi_stages::verbs::{self, Read, Reading, describe_grid, numbers, read_as_it_is, transects};
 use sastrugi_store::dem::simulators::{self, Fit};
 use sastrugi_store::dem::{self, Dem, DemError, Values};
@@ -166,15 +167,22 @@ fn fit(path: &Path) -> Result<Value, Failure> {
 fn release(path: &Path) -> Result<Value, Failure> {
     let release = Release::open(path).map_err(Failure::input)?;
     let manifest = release.manifest();
+    let head = studies::head_of(path);
+    let notes: Vec<String> = head.as_ref().err().map(ToString::to_string).into_iter().collect();
+    let head = head.ok();
     Ok(json!({
         "what": "release",
         "name": manifest.name,
-        "version": manifest.version,
+        "version": head.as_ref().and_then(|head| head.version.as_deref()),
+        "date": head.as_ref().map(|head| &head.date),
+        "doi": head.as_ref().and_then(|head| head.doi.as_deref()),
+        "program": format!("{} {}", manifest.program, manifest.version),
         "seed": manifest.seed,
         "license": manifest.license,
         "study_sha256": manifest.study_sha256,
         "files": manifest.artifacts.len(),
         "bytes": manifest.artifacts.iter().map(|a| a.bytes).sum::<u64>(),
         "failed_items": manifest.failed.len(),
+        "notes": notes,
     }))
 }

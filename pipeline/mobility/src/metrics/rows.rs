@@ -63,7 +63,7 @@ pub fn mission_row(
         goal_y_m: mission.goal_m[1],
         heading_deg: mission.heading_rad.to_degrees(),
         draws: i64::from(mission.draws),
-        outcome: outcome.map_or("", |event| event.kind.name()).to_owned(),
+        outcome: outcome_of(recording).to_owned(),
         time_s: outcome.map_or(f64::NAN, |event| event.time_s),
         path_length_m: metrics.path_length_m,
         progress_m: progress_m(mission, recording),
@@ -110,7 +110,7 @@ pub fn replicate_row(
         start_x_m: start.start_m[0],
         start_y_m: start.start_m[1],
         start_heading_deg: start.heading_rad.to_degrees(),
-        outcome: outcome.map_or("", |event| event.kind.name()).to_owned(),
+        outcome: outcome_of(recording).to_owned(),
         time_s: outcome.map_or(f64::NAN, |event| event.time_s),
         progress_m: progress_m(start, recording),
         rms_vertical_acceleration_m_s2: metrics.rms_vertical_acceleration_m_s2,
@@ -133,12 +133,26 @@ pub fn progress_m(mission: &Mission, recording: &Recording) -> f64 {
 /// under base_link.
 pub fn sample_rows(terrain_id: &str, mission: &Mission, recording: &Recording, classes: &Grid<u8>) -> Vec<SampleRow> {
     let mission_id = mission.id();
+    let labels = SampleLabels { terrain_id, mission_id: &mission_id, outcome: outcome_of(recording) };
     let row = |(sample, state): (usize, &StateSample)| {
         let class = class_at(classes, state.position_m[0], state.position_m[1]).map(|class| class as i64);
         let instant = Instant { state, command: recording.commands.get(sample), wheels: recording.wheels.get(sample) };
-        sample_row(terrain_id, &mission_id, sample as i64, instant, class)
+        sample_row(labels, sample as i64, instant, class)
     };
     recording.states.iter().enumerate().map(row).collect()
+}
+
+/// The outcome of a recorded mission; empty where nothing ended it.
+fn outcome_of(recording: &Recording) -> &'static str {
+    recording.events.last().map_or("", |event| event.kind.name())
+}
+
+/// What all samples of a mission share.
+#[derive(Clone, Copy)]
+struct SampleLabels<'a> {
+    terrain_id: &'a str,
+    mission_id: &'a str,
+    outcome: &'a str,
 }
 
 /// What a recording holds of one instant.
@@ -174,7 +188,7 @@ fn in_steps(value: f64, steps: f64) -> f64 {
     (value * steps).round() / steps + 0.0
 }
 
-fn sample_row(terrain_id: &str, mission_id: &str, sample: i64, instant: Instant<'_>, class: Option<i64>) -> SampleRow {
+fn sample_row(labels: SampleLabels<'_>, sample: i64, instant: Instant<'_>, class: Option<i64>) -> SampleRow {
     let Instant { state, command, wheels } = instant;
     let angles = EulerAngles::of(state.orientation);
     let [qx, qy, qz, qw] = state.orientation;
@@ -182,8 +196,8 @@ fn sample_row(terrain_id: &str, mission_id: &str, sample: i64, instant: Instant<
     let [vx_m_s, vy_m_s, vz_m_s] = state.velocity_m_s;
     let [roll_rate, pitch_rate, yaw_rate] = state.angular_velocity_rad_s;
     SampleRow {
-        terrain_id: terrain_id.to_owned(),
-        mission_id: mission_id.to_owned(),
+        terrain_id: labels.terrain_id.to_owned(),
+        mission_id: labels.mission_id.to_owned(),
         sample,
         time_s: state.time_s,
         x_m,
@@ -219,5 +233,8 @@ fn sample_row(terrain_id: &str, mission_id: &str, sample: i64, instant: Instant<
         wheel_contact_x_m: instant.contacts(0),
         wheel_contact_y_m: instant.contacts(1),
         wheel_contact_z_m: instant.contacts(2),
+        outcome: labels.outcome.to_owned(),
+        // Filled when the release is assembled.
+        split: None,
     }
 }

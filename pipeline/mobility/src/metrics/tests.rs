@@ -1,7 +1,7 @@
 use super::*;
 use crate::missions::{Mission, Polyline};
 use sastrugi_numeric::{Geometry, Grid};
-use sastrugi_schemas::topics::{CommandSample, Recording, VehicleOutline, WheelSample, WheelState};
+use sastrugi_schemas::topics::{CommandSample, Event, EventKind, Recording, VehicleOutline, WheelSample, WheelState};
 use std::f64::consts::{SQRT_2, TAU};
 
 const RATE_HZ: f64 = 20.0;
@@ -131,7 +131,7 @@ fn val_samples_hold_wheels_and_controller() {
         imu: vec![],
         wheels: vec![WheelSample { time_s: 0.0, wheels: vec![wheel, lifted], chassis_force_n: 0.2 }],
         commands: vec![command],
-        events: vec![],
+        events: vec![Event { time_s: 0.05, kind: EventKind::Tipped, text: String::new() }],
     };
     let classes = Grid::new(Geometry::square(1, 1, 1.0), vec![0]);
     let rows = sample_rows("a", &Mission::between(0, [0.0; 2], [40.0, 0.0]), &recording, &classes);
@@ -150,6 +150,7 @@ fn val_samples_hold_wheels_and_controller() {
     assert_eq!((first.wheel_contact_y_m[0], first.wheel_contact_z_m[0]), (2.0, 3.0));
     assert!(last.cross_track_m.is_nan() && last.chassis_force_n.is_nan());
     assert!(last.wheel_normal_force_n.is_empty() && last.wheel_contact_z_m.is_empty());
+    assert!(rows.iter().all(|row| row.outcome == "tipped" && row.split.is_none()));
 }
 
 /// A vehicle that weaves about its line as a sine, and one beside it; beyond the ends the error is the distance to them.

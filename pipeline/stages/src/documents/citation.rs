@@ -1,6 +1,6 @@
 //! `CITATION.cff`: how to cite the release, in the Citation File Format 1.2.0.
 
-use super::described::{Described, ORGANIZATION, quoted, source_line};
+use super::described::{Described, Maker, quoted, source_line};
 use super::spdx_list;
 use sastrugi_schemas::manifest::Source;
 use std::collections::BTreeSet;
@@ -28,6 +28,10 @@ pub fn text(described: &Described<'_>) -> String {
     line("doi", head.doi.as_deref());
     line("url", head.url.as_deref());
     text.push_str(&cited(&head.license));
+    if !head.keywords.is_empty() {
+        text.push_str("keywords:\n");
+        head.keywords.iter().for_each(|word| text.push_str(&format!("  - {}\n", quoted(word))));
+    }
     text.push_str("authors:\n");
     text.extend(described.creators().map(author));
     if !sources.is_empty() {
@@ -73,20 +77,40 @@ fn reference(source: &Source) -> String {
 
 /// An author of `CITATION.cff`: `name` is for organisations. Which part of a person's name is which only `Family, Given`
 /// tells; a name in one piece is what they are called.
-fn author((name, kind): (&str, &str)) -> String {
+fn author(maker: Maker<'_>) -> String {
+    let name = maker.name;
+    if maker.is_organization {
+        return format!("  - name: {}\n", quoted(name));
+    }
     let parts = name.split_once(',').map(|(family, given)| (family.trim(), given.trim()));
-    match parts {
-        _ if kind == ORGANIZATION => format!("  - name: {}\n", quoted(name)),
+    let mut text = match parts {
         Some((family, given)) if !family.is_empty() && !given.is_empty() => {
             format!("  - family-names: {}\n    given-names: {}\n", quoted(family), quoted(given))
         }
         _ => format!("  - alias: {}\n", quoted(name)),
+    };
+    let more = [("orcid", maker.page()), ("affiliation", maker.affiliation.map(str::to_owned))];
+    for (key, value) in more.into_iter().filter_map(|(key, value)| Some((key, value?))) {
+        let _ = writeln!(text, "    {key}: {}", quoted(&value));
     }
+    text
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn val_people_are_cited_with_what_identifies_them() {
+        let orcid = Some("0000-0002-1825-0097");
+        let jane = Maker { name: "Doe, Jane", is_organization: false, orcid, affiliation: Some("Snow Lab") };
+        assert_eq!(
+            author(jane),
+            "  - family-names: \"Doe\"\n    given-names: \"Jane\"\n    orcid: \"https://orcid.org/0000-0002-1825-0097\"\n    affiliation: \"Snow Lab\"\n"
+        );
+        let lab = Maker { name: "Snow Lab", is_organization: true, orcid: None, affiliation: Some("A university") };
+        assert_eq!(author(lab), "  - name: \"Snow Lab\"\n");
+    }
 
     #[test]
     fn val_what_a_citation_says_of_a_licence() {

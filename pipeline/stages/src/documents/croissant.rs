@@ -1,7 +1,12 @@
 //! `croissant.json`: every table in Croissant 1.1 (MLCommons, "Croissant Format Specification", version 1.1), so that data
 //! loaders find its columns with type, unit and description, and its files with their hashes.
+//!
+//! Tables with a file for each terrain are long, and mlcroissant (1.1) makes a record in Python, one field at a time, looking each up in
+//! the list of the record set's fields: for 37 columns of `samples` more than half of the time went there. Their columns are therefore
+//! subfields of one field, `<table>/row`, and the id of the terrain is read from the name of the file, which is what mlcroissant can
+//! filter by: `records("samples", filters={"samples/terrain_id": "<id>"})` opens that file alone.
 
-use super::described::{Described, add_terms, citation_line, map_files, map_words, page};
+use super::described::{Described, Maker, ORGANIZATION, add_terms, citation_line, map_files, map_words, page};
 use super::spdx_list;
 use crate::jobs::{exports, original};
 use crate::splits::PARTS;
@@ -18,6 +23,8 @@ const PARQUET: &str = "application/x-parquet";
 /// Most files of a table that are described one by one; more are one set, and their hashes are in the manifest alone, so
 /// that this file, which loaders read whole, stays small.
 const DESCRIBED_FILES: usize = 64;
+/// Field that holds the columns of a long table.
+const ROW: &str = "row";
 /// Set of the generated heightfields.
 const HEIGHTS: &str = "terrain-files";
 /// Files beside the tables, which the manifest lists with their hashes: id of the set, folder, ending, media type, what they are.
@@ -78,6 +85,7 @@ const DOCUMENTS: [(&str, &[&str], &[&str], &str); 2] = [
             "study.toml",
             "croissant.json",
             "ro-crate-metadata.json",
+            ".zenodo.json",
             "manifest.json",
             "SHA256SUMS",
         ],
@@ -130,14 +138,24 @@ pub fn text(described: &Described<'_>) -> String {
     if let Some(version) = &head.version {
         dataset["version"] = json!(version);
     }
+    if !head.keywords.is_empty() {
+        dataset["keywords"] = json!(head.keywords);
+    }
     if !described.sources.is_empty() {
         dataset["isBasedOn"] = described.sources.iter().map(work).collect();
     }
     format!("{dataset:#}\n")
 }
 
-fn creator((name, kind): (&str, &str)) -> Value {
-    json!({ "@type": format!("sc:{kind}"), "name": name })
+fn creator(maker: Maker<'_>) -> Value {
+    let mut creator = json!({ "@type": format!("sc:{}", maker.kind()), "name": maker.name });
+    if let Some(page) = maker.page() {
+        creator["sameAs"] = json!(page);
+    }
+    if let Some(affiliation) = maker.affiliation {
+        creator["affiliation"] = json!({ "@type": format!("sc:{ORGANIZATION}"), "name": affiliation });
+    }
+    creator
 }
 
 /// Measured data as a work of its own.
@@ -155,7 +173,7 @@ fn distribution(described: &Described<'_>) -> Vec<Value> {
     let given = described.artifacts.iter().filter(|a| original::only_copies(&a.origin.stage));
     let mut files: Vec<Value> = given.map(|artifact| file_object(artifact, media_of(&artifact.path))).collect();
     files.extend(tables::ALL.iter().filter(few).flat_map(parts).map(|artifact| file_object(artifact, PARQUET)));
-    let several = tables::ALL.iter().filter(|table| described.parts(table.name).count() > 1);
+    let several = tables::ALL.iter().filter(|table| is_set(table, described));
     files.extend(several.map(|table| {
         let includes = format!("tables/{}/*.parquet", table.name);
         file_set(&set_id(table), &[&includes], &[PARQUET], table.description)
@@ -227,27 +245,49 @@ fn one_or_many(values: &[&str]) -> Value {
     }
 }
 
+/// Whether the files of a table are described as a set: several, or one for each terrain.
+fn is_set(table: &Table, described: &Described<'_>) -> bool {
+    described.parts(table.name).count() > usize::from(table.file_per.is_none())
+}
+
 fn set_id(table: &Table) -> String {
     format!("{}-files", table.name)
 }
 
 /// A table's columns; nothing for a table without a file.
 fn record_set(table: &Table, described: &Described<'_>) -> Option<Value> {
-    let mut parts = described.parts(table.name);
-    let first = parts.next()?;
-    let source = match parts.next() {
-        None => json!({ "fileObject": { "@id": first.path } }),
-        Some(_) => json!({ "fileSet": { "@id": set_id(table) } }),
+    let first = described.parts(table.name).next()?;
+    let source = match is_set(table, described) {
+        false => json!({ "fileObject": { "@id": first.path } }),
+        true => json!({ "fileSet": { "@id": set_id(table) } }),
     };
     let keys = table.columns.iter().filter(|column| column.key);
+    let fields = table.columns.iter().map(|column| field(described, table, column, &source)).collect();
     Some(json!({
         "@type": "cr:RecordSet",
         "@id": table.name,
         "name": table.name,
         "description": table.description,
         "key": keys.map(|column| json!({ "@id": field_id(table, column) })).collect::<Vec<_>>(),
-        "field": table.columns.iter().map(|column| field(described, table, column, &source)).collect::<Vec<_>>(),
+        "field": nested(table, fields),
     }))
+}
+
+/// The fields of a record set: of a table with a file for each terrain, the column that names the file and one field for the others.
+fn nested(table: &Table, fields: Vec<Value>) -> Vec<Value> {
+    let Some(file_per) = table.file_per.and_then(|key| table.position(key)) else { return fields };
+    let mut rest = fields;
+    let mut named = rest.remove(file_per);
+    named["source"]["extract"] = json!({ "fileProperty": "filename" });
+    named["source"]["transform"] = json!({ "regex": "^part-(.+)\\.parquet$" });
+    let row = json!({
+        "@type": "cr:Field",
+        "@id": format!("{}/{ROW}", table.name),
+        "name": ROW,
+        "description": "The other columns of the row",
+        "subField": rest,
+    });
+    vec![named, row]
 }
 
 fn field_id(table: &Table, column: &Column) -> String {
@@ -278,7 +318,8 @@ fn field(described: &Described<'_>, table: &Table, column: &Column, source: &Val
     }
     if column.name == SPLIT_COLUMN {
         field["dataType"] = json!(["sc:Text", "cr:Split"]);
-        if described.head.split.is_some() {
+        // A reference is a join, which loads all files of a table before the first record.
+        if described.head.split.is_some() && table.file_per.is_none() {
             field["references"] = json!({ "field": { "@id": SPLIT_NAME } });
         }
     }

@@ -2,8 +2,9 @@
 
 use super::spdx_list;
 use crate::runner::execute::Failure;
+use crate::splits::{self, OTHER, PARTS, Splits};
 use sastrugi_schemas::manifest::{Artifact, Source};
-use sastrugi_schemas::study::StudyHead;
+use sastrugi_schemas::study::{Creator, StudyHead};
 use sastrugi_schemas::tables::{self, Table};
 use sastrugi_terrain::{MAPS, MapKind};
 use serde_json::Value;
@@ -36,6 +37,33 @@ pub const FOLDERS: [(&str, &str); 14] = [
 ];
 /// Type of a creator that is not a person, in the words of schema.org.
 pub const ORGANIZATION: &str = "Organization";
+/// Name of a creator who has none.
+const UNNAMED: &str = "unnamed";
+
+/// Who made the release, or took part in it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Maker<'a> {
+    /// Name.
+    pub name: &'a str,
+    /// True for an organisation, false for a person.
+    pub is_organization: bool,
+    /// ORCID iD.
+    pub orcid: Option<&'a str>,
+    /// Organisation that a person works for.
+    pub affiliation: Option<&'a str>,
+}
+
+impl Maker<'_> {
+    /// Type in the words of schema.org.
+    pub fn kind(&self) -> &'static str {
+        if self.is_organization { ORGANIZATION } else { "Person" }
+    }
+
+    /// Page of the ORCID iD.
+    pub fn page(&self) -> Option<String> {
+        self.orcid.map(|orcid| format!("https://orcid.org/{orcid}"))
+    }
+}
 
 /// What the documents tell of.
 pub struct Described<'a> {
@@ -45,6 +73,8 @@ pub struct Described<'a> {
     pub sources: &'a [Source],
     /// Files of the release, sorted by path: all but the documents, the report and what seals it.
     pub artifacts: &'a [Artifact],
+    /// Which terrains are for training, validation and test.
+    pub splits: &'a Splits,
     /// Items without a result.
     pub failures: &'a [Failure],
 }
@@ -61,11 +91,28 @@ impl<'a> Described<'a> {
         self.artifacts.iter().filter(move |artifact| artifact.path.starts_with(&folder))
     }
 
-    /// Who made the release: names, and their types in the words of schema.org.
-    pub fn creators(&self) -> impl Iterator<Item = (&'a str, &'static str)> {
+    /// Paths of a table's files by the part that their rows are in, those in none last; empty where the files do not tell parts apart.
+    pub fn by_part(&self, table: &Table) -> Vec<(&'static str, Vec<&'a str>)> {
+        let part = |path: &str| splits::of_file(table, part_name(path)?, self.splits);
+        let of = |wanted: &'static str| {
+            let paths = self.parts(table.name).map(|artifact| artifact.path.as_str());
+            (wanted, paths.filter(|path| part(path) == Some(wanted)).collect::<Vec<&'a str>>())
+        };
+        PARTS.into_iter().chain([OTHER]).map(of).filter(|(_, paths)| !paths.is_empty()).collect()
+    }
+
+    /// Who made the release.
+    pub fn creators(&self) -> impl Iterator<Item = Maker<'a>> {
         let head = self.head;
-        let names = head.creators.iter().map(String::as_str).chain(head.creators.is_empty().then_some("unnamed"));
-        names.map(|name| (name, if head.organizations.iter().any(|o| o == name) { ORGANIZATION } else { "Person" }))
+        let is_organization = move |name: &str| head.organizations.iter().any(|organization| organization == name);
+        let maker = move |creator: &'a Creator| Maker {
+            name: creator.name(),
+            is_organization: is_organization(creator.name()),
+            orcid: creator.orcid(),
+            affiliation: creator.affiliation(),
+        };
+        let unnamed = Maker { name: UNNAMED, is_organization: false, orcid: None, affiliation: None };
+        head.creators.iter().map(maker).chain(head.creators.is_empty().then_some(unnamed))
     }
 
     /// Tables that have a file.
@@ -77,6 +124,11 @@ impl<'a> Described<'a> {
     pub fn has(&self, folder: &str) -> bool {
         folder == "report/" || self.artifacts.iter().any(|artifact| artifact.path.starts_with(folder))
     }
+}
+
+/// Name of a file of a table: `a` of `tables/samples/part-a.parquet`.
+fn part_name(path: &str) -> Option<&str> {
+    path.rsplit('/').next()?.strip_prefix("part-")?.strip_suffix(".parquet")
 }
 
 /// Whether a file of the release is that map of a terrain. No id ends so.
@@ -110,7 +162,8 @@ pub fn citation_line(head: &StudyHead) -> String {
 
 /// Names of the creators in one text.
 pub fn authors(head: &StudyHead) -> String {
-    if head.creators.is_empty() { "unnamed".to_owned() } else { head.creators.join("; ") }
+    let names: Vec<&str> = head.creators.iter().map(Creator::name).collect();
+    if names.is_empty() { UNNAMED.to_owned() } else { names.join("; ") }
 }
 
 /// One line on measured data: whose it is, under which licence, how to cite it.

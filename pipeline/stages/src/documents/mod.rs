@@ -12,6 +12,7 @@ pub mod sources;
 mod spdx_list;
 pub mod terms;
 mod viewer_layout;
+mod zenodo;
 
 pub use described::Described;
 pub use license::license_warning;
@@ -24,6 +25,7 @@ pub fn all(described: &Described<'_>) -> Vec<(&'static str, String)> {
         ("LICENSE", license::text(described)),
         ("croissant.json", croissant::text(described)),
         ("ro-crate-metadata.json", ro_crate::text(described)),
+        (".zenodo.json", zenodo::text(described)),
     ];
     let layout = viewer_layout::text(described).map(|text| ("mcap/foxglove-layout.json", text));
     documents.into_iter().chain(layout).collect()

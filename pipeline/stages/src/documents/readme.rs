@@ -2,6 +2,7 @@
 
 use super::described::{Described, FOLDERS, folded, map_files, map_words, page, quoted, source_line};
 use super::spdx_list;
+use sastrugi_schemas::Table;
 use sastrugi_schemas::manifest::Source;
 use std::fmt::Write as _;
 
@@ -53,6 +54,9 @@ pub fn text(described: &Described<'_>) -> String {
         head.license,
         env!("CARGO_PKG_VERSION")
     );
+    if !head.funding.is_empty() {
+        let _ = writeln!(text, "Funding: {}\n", folded(&head.funding.join("; ")));
+    }
     text.push_str("| where | what |\n|---|---|\n| `study.toml` | the study: everything here follows from it |\n");
     for (folder, what) in FOLDERS.iter().filter(|(folder, _)| described.has(folder)) {
         let _ = writeln!(text, "| `{folder}` | {what} |");
@@ -63,6 +67,7 @@ pub fn text(described: &Described<'_>) -> String {
     text.push_str(
         "| `croissant.json` | the tables in Croissant, for data loaders |\n\
          | `ro-crate-metadata.json` | which stage made what from what |\n\
+         | `.zenodo.json` | title, creators, licence, keywords and grants for a deposit on Zenodo |\n\
          | `manifest.json`, `SHA256SUMS` | what each file is made from, and its checksum |\n\n\
          | table | a row is |\n|---|---|\n",
     );
@@ -90,16 +95,31 @@ fn card(described: &Described<'_>) -> String {
     let head = described.head;
     let mut text = format!("---\npretty_name: {}\n{}", quoted(&head.title), hub_license(&head.license));
     text.push_str("tags:\n  - terrain\n  - elevation\n  - robotics\n  - synthetic\n  - sastrugi\n");
-    let tables: Vec<&str> = described.tables().map(|table| table.name).collect();
+    let tables: Vec<&Table> = described.tables().collect();
     if !tables.is_empty() {
         text.push_str("configs:\n");
     }
-    let default = FIRST_TABLES.into_iter().find(|name| tables.contains(name)).or_else(|| tables.first().copied());
-    for name in tables {
-        let is_default = if default == Some(name) { "    default: true\n" } else { "" };
-        let _ = writeln!(text, "  - config_name: {name}\n{is_default}    data_files: \"tables/{name}/*.parquet\"");
+    let names = || tables.iter().map(|table| table.name);
+    let default = FIRST_TABLES.into_iter().find(|first| names().any(|name| name == *first)).or_else(|| names().next());
+    for table in &tables {
+        let is_default = if default == Some(table.name) { "    default: true\n" } else { "" };
+        let _ = write!(text, "  - config_name: {}\n{is_default}{}", table.name, data_files(table, described));
     }
     text + "---\n\n"
+}
+
+/// The files of a table for data loaders: by part where each is of one, else in all, which loaders call `train`.
+fn data_files(table: &Table, described: &Described<'_>) -> String {
+    let parts = described.by_part(table);
+    if parts.is_empty() {
+        return format!("    data_files: \"tables/{}/*.parquet\"\n", table.name);
+    }
+    let mut text = "    data_files:\n".to_owned();
+    for (part, paths) in parts {
+        let _ = writeln!(text, "      - split: {part}\n        path:");
+        paths.iter().for_each(|path| text.push_str(&format!("          - {}\n", quoted(path))));
+    }
+    text
 }
 
 /// Hubs know a list of licences by names of their own; others are named beside `other`.

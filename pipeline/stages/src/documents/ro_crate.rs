@@ -3,7 +3,7 @@
 //! made. Measured data and masks were there before, so that no action makes them. Folders stand for their files; `manifest.json`
 //! has the parents, stream and hash of each.
 
-use super::described::{Described, FOLDERS, add_terms, citation_line, page};
+use super::described::{Described, FOLDERS, Maker, ORGANIZATION, add_terms, citation_line, page};
 use super::spdx_list;
 use crate::job::ItemRef;
 use crate::jobs::original;
@@ -17,10 +17,11 @@ const PROFILE: &str = "https://w3id.org/ro/wfrun/process/0.5";
 const PROGRAM: &str = "#sastrugi";
 const STUDY: &str = "study.toml";
 /// Files of the release itself: path, media type, what it is.
-const OWN_FILES: [(&str, &str, &str); 7] = [
+const OWN_FILES: [(&str, &str, &str); 8] = [
     (STUDY, "application/toml", "The study: everything else follows from it"),
     ("README.md", "text/markdown", "What the release holds"),
     ("CITATION.cff", "application/yaml", "How to cite it"),
+    (".zenodo.json", "application/json", "What an archive asks for on deposit"),
     ("LICENSE", "text/plain", "Its licence, and those of the measured data in it"),
     ("croissant.json", "application/ld+json", "Its tables in Croissant"),
     ("manifest.json", "application/json", "Every file with its parents, random stream and hashes"),
@@ -37,12 +38,14 @@ pub fn text(described: &Described<'_>) -> String {
     graph.push(json!({ "@id": PROFILE, "@type": "CreativeWork", "name": "Process Run Crate", "version": "0.5" }));
     graph.push(program());
     graph.extend(license_entity(&described.head.license));
-    let creator = |(n, (name, kind))| json!({ "@id": creator_id(n), "@type": kind, "name": name });
     graph.extend(described.creators().enumerate().map(creator));
+    graph.extend(affiliations(described).into_iter().map(affiliation));
+    graph.extend(described.head.funding.iter().enumerate().map(grant));
     graph.extend(described.sources.iter().map(work));
     graph.extend(stages.actions());
     // Words of schema.org that came after the crate's context was frozen.
-    let later = json!({ "sha256": "https://schema.org/sha256", "creditText": "https://schema.org/creditText" });
+    let words = ["sha256", "creditText", "funding", "Grant"].map(|word| (word, format!("https://schema.org/{word}")));
+    let later: BTreeMap<&str, String> = words.into();
     let metadata = json!({ "@context": [format!("{CRATE}/context"), later], "@graph": graph });
     format!("{metadata:#}\n")
 }
@@ -65,7 +68,7 @@ fn root(described: &Described<'_>, parts: &[Value], stages: &Stages) -> Value {
         "description": if head.description.is_empty() { &head.title } else { &head.description },
         "datePublished": head.date,
         "license": { "@id": license_id(&head.license) },
-        "author": described.creators().enumerate().map(|(n, _)| json!({ "@id": creator_id(n) })).collect::<Vec<_>>(),
+        "author": described.creators().enumerate().map(|one| json!({ "@id": creator_id(&one) })).collect::<Vec<_>>(),
         "creditText": citation_line(head),
         "conformsTo": { "@id": PROFILE },
         "hasPart": parts.iter().map(|part| json!({ "@id": part["@id"] })).collect::<Vec<_>>(),
@@ -81,6 +84,12 @@ fn root(described: &Described<'_>, parts: &[Value], stages: &Stages) -> Value {
         if let Some(value) = value {
             root[key] = json!(value);
         }
+    }
+    if !head.keywords.is_empty() {
+        root["keywords"] = json!(head.keywords.join(", "));
+    }
+    if !head.funding.is_empty() {
+        root["funding"] = (0..head.funding.len()).map(|n| json!({ "@id": grant_id(n) })).collect();
     }
     root
 }
@@ -110,9 +119,41 @@ fn program() -> Value {
     })
 }
 
-/// Names would have to be spelled anew to be part of an identifier, and two could become one.
-fn creator_id(position: usize) -> String {
-    format!("#creator-{}", position + 1)
+/// The page of an ORCID iD, else the position: names would have to be spelled anew to be part of an identifier, and two could become one.
+fn creator_id((position, maker): &(usize, Maker<'_>)) -> String {
+    maker.page().unwrap_or_else(|| format!("#creator-{}", position + 1))
+}
+
+fn creator(one: (usize, Maker<'_>)) -> Value {
+    let maker = one.1;
+    let mut creator = json!({ "@id": creator_id(&one), "@type": maker.kind(), "name": maker.name });
+    if let Some(affiliation) = maker.affiliation {
+        creator["affiliation"] = json!({ "@id": affiliation_id(affiliation) });
+    }
+    creator
+}
+
+/// Organisations that the creators work for, each once.
+fn affiliations<'a>(described: &Described<'a>) -> BTreeSet<&'a str> {
+    described.creators().filter_map(|maker| maker.affiliation).collect()
+}
+
+/// Letters and digits stand for themselves, all else for its number, so that no two become one.
+fn affiliation_id(name: &str) -> String {
+    let letter = |c: char| if c.is_ascii_alphanumeric() { c.to_string() } else { format!("-{:x}-", u32::from(c)) };
+    format!("#affiliation-{}", name.chars().map(letter).collect::<String>())
+}
+
+fn affiliation(name: &str) -> Value {
+    json!({ "@id": affiliation_id(name), "@type": ORGANIZATION, "name": name })
+}
+
+fn grant_id(position: usize) -> String {
+    format!("#grant-{}", position + 1)
+}
+
+fn grant((position, text): (usize, &String)) -> Value {
+    json!({ "@id": grant_id(position), "@type": "Grant", "name": text })
 }
 
 fn source_id(source: &Source) -> String {

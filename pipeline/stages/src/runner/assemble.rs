@@ -203,7 +203,8 @@ fn add_artifacts(builder: &mut ReleaseBuilder, record: &Record, folder: &Path, s
 
 fn add_documents(builder: &mut ReleaseBuilder, contents: &Contents<'_>, sources: &Sources) -> Result<(), Error> {
     let (head, failures) = (&contents.study.head, contents.failures);
-    let described = Described { head, sources: &sources.list, artifacts: builder.artifacts(), failures };
+    let (splits, artifacts) = (contents.splits, builder.artifacts());
+    let described = Described { head, sources: &sources.list, artifacts, splits, failures };
     let study = ("study.toml", contents.text.to_owned());
     for (path, text) in [study].into_iter().chain(documents::all(&described)) {
         builder.write_text(path, &text, Origin::default())?;

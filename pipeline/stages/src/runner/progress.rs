@@ -12,6 +12,10 @@ pub trait Progress: Sync {
     fn ended(&self, item: &ItemRef, end: &End, seconds: f64) {
         let _ = (item, end, seconds);
     }
+    /// So many bytes of one long work are done; called with 0 when it begins.
+    fn copied(&self, done: u64, total: u64) {
+        let _ = (done, total);
+    }
     /// A phase after the items began: assembling, report, checksums.
     fn phase(&self, text: &str) {
         let _ = text;

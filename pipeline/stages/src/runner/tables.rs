@@ -2,7 +2,7 @@
 //!
 //! Each item writes one sorted file of rows for a table, its fragment. Fragments with disjoint ranges of keys are copied one after the
 //! other, a batch at a time; overlapping ones are loaded together and sorted. Fragments with the same rows (the parameters of one run on
-//! many terrains) count once.
+//! many terrains) count once. Where the study splits its terrains, tables that name the part of each row have a file for each part.
 
 use super::cache::Record;
 use super::damage::damaged;
@@ -43,6 +43,13 @@ struct Found {
     ends: [Vec<Cell>; 2],
 }
 
+/// A file of a table: the fragments that its rows come from.
+struct OfFile {
+    fragments: Arc<Vec<Found>>,
+    /// The part whose rows it takes alone.
+    part: Option<&'static str>,
+}
+
 /// A result.
 struct Made {
     folder: PathBuf,
@@ -81,18 +88,18 @@ impl Fragments {
     /// Fragments that cannot be read or contradict each other; a file that cannot be written.
     pub fn write(mut self, builder: &mut ReleaseBuilder, splits: &Splits) -> Result<(), Error> {
         let mut parts = Vec::new();
-        let mut fragments = BTreeMap::new();
+        let mut files = BTreeMap::new();
         for table in tables::ALL {
             let Some(of_table) = self.0.remove(table.name) else { continue };
             let origin = of_table.origin();
-            for (name, of_part) in of_table.parts(table) {
+            for (name, file) in of_table.files(table, splits) {
                 parts.push(TablePart { table, name: name.clone(), origin: origin.clone() });
-                fragments.insert((table.name, name), of_part);
+                files.insert((table.name, name), file);
             }
         }
-        builder.write_tables(parts, |part, writer| {
-            let of_part = fragments.get(&(part.table.name, part.name.clone()));
-            merge(part.table, of_part.map_or(&[], Vec::as_slice), splits, writer)
+        builder.write_tables(parts, |part, writer| match files.get(&(part.table.name, part.name.clone())) {
+            Some(file) => merge(part.table, file, splits, writer),
+            None => Ok(()),
         })
     }
 }
@@ -104,7 +111,20 @@ impl OfTable {
         Origin { stage: stages.join("+"), parents, ..Origin::default() }
     }
 
-    /// The fragments of each file of the table, sorted by their keys, each once.
+    /// The files of the table by name.
+    fn files(self, table: &Table, splits: &Splits) -> Vec<(String, OfFile)> {
+        let named = splits::files(table, splits);
+        let file = |(name, fragments): (String, Vec<Found>)| {
+            let fragments = Arc::new(fragments);
+            let whole = named.is_empty().then(|| (name, OfFile { fragments: Arc::clone(&fragments), part: None }));
+            let of_part =
+                |part: &'static str| (part.to_owned(), OfFile { fragments: Arc::clone(&fragments), part: Some(part) });
+            whole.into_iter().chain(named.iter().copied().map(of_part)).collect::<Vec<_>>()
+        };
+        self.parts(table).into_iter().flat_map(file).collect()
+    }
+
+    /// The fragments of the table, or of each terrain's file, sorted by their keys, each once.
     fn parts(mut self, table: &Table) -> BTreeMap<String, Vec<Found>> {
         self.fragments.sort_by(Found::compare);
         self.fragments.dedup_by(|a, b| a.compare(b) == Ordering::Equal);
@@ -157,13 +177,16 @@ impl Found {
     }
 }
 
-/// Writes the rows of fragments that are sorted by their first keys.
-fn merge(table: &Table, fragments: &[Found], splits: &Splits, writer: &mut PartWriter<'_>) -> Result<(), Error> {
+/// Writes the rows of a file, whose fragments are sorted by their first keys.
+fn merge(table: &Table, file: &OfFile, splits: &Splits, writer: &mut PartWriter<'_>) -> Result<(), Error> {
     let mut push = |mut cells: Vec<Cell>| {
         splits::fill(table, &mut cells, splits);
-        writer.push(cells).map_err(Error::from)
+        match file.part.is_none_or(|part| splits::is_in_file(table, &cells, part)) {
+            true => writer.push(cells).map_err(Error::from),
+            false => Ok(()),
+        }
     };
-    let mut rest = fragments;
+    let mut rest = file.fragments.as_slice();
     while !rest.is_empty() {
         let (overlapping, others) = rest.split_at(overlapping(rest));
         match overlapping {
@@ -371,16 +394,19 @@ mod tests {
         area.leave("roughness", vec![terrain("b")], true);
         area.leave("roughness", vec![terrain("a")], true);
         let release = area.release_with(&[("a".to_owned(), "test".to_owned())].into()).unwrap();
-        let names: Vec<String> = release
-            .table_files("samples")
-            .iter()
-            .map(|path| path.file_name().unwrap().to_string_lossy().into_owned())
-            .collect();
-        assert_eq!(names, ["part-a.parquet", "part-b.parquet"]);
-        let missions: Vec<String> = release.rows::<SampleRow>().unwrap().into_iter().map(|r| r.mission_id).collect();
+        let names = |table: &str| -> Vec<String> {
+            let files = release.table_files(table);
+            files.iter().map(|path| path.file_name().unwrap().to_string_lossy().into_owned()).collect()
+        };
+        assert_eq!(names("samples"), ["part-a.parquet", "part-b.parquet"]);
+        let samples: Vec<SampleRow> = release.rows().unwrap();
+        let missions: Vec<&str> = samples.iter().map(|r| r.mission_id.as_str()).collect();
         assert_eq!(missions, ["run-0001", "walk-0001", "run-0001"]);
+        let splits: Vec<Option<&str>> = samples.iter().map(|r| r.split.as_deref()).collect();
+        assert_eq!(splits, [Some("test"), Some("test"), None]);
         let splits: Vec<Option<String>> = release.rows::<TerrainRow>().unwrap().into_iter().map(|r| r.split).collect();
         assert_eq!(splits, [Some("test".to_owned()), None]);
+        assert_eq!(names("terrains"), ["part-other.parquet", "part-test.parquet"]);
     }
 
     /// A file that changed since it was made is dropped with its item's result, so that the next run makes it again.

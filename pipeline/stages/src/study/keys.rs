@@ -30,9 +30,11 @@ impl UnknownKey {
 }
 
 /// Words that people try, and the key that they mean.
-const SYNONYMS: [(&[&str], &str); 19] = [
+const SYNONYMS: [(&[&str], &str); 21] = [
     (&["author", "authors", "people"], "creators"),
     (&["institution", "institutions", "affiliation"], "organizations"),
+    (&["tags", "subjects"], "keywords"),
+    (&["grant", "grants", "funder", "funders"], "funding"),
     (&["path", "filename", "dem_file", "input", "source"], "file"),
     (&["n", "number", "replicates", "repetitions", "copies"], "count"),
     (&["n", "number", "replicates", "count"], "pairs"),

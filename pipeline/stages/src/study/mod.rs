@@ -2,6 +2,7 @@
 
 pub mod entry;
 pub mod keys;
+mod orcid;
 pub mod text;
 
 pub use entry::{Entry, Expanded};
@@ -12,6 +13,7 @@ use sastrugi_schemas::ParameterError;
 use sastrugi_schemas::kind::{read_all, remove, schema_of};
 use sastrugi_schemas::study::{McapFlavour, RoughnessSection, Shares, StudyHead};
 use serde_json::{Map, Value};
+use std::collections::BTreeSet;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -109,6 +111,9 @@ fn read_head(root: &Map<String, Value>, text: &StudyText, errors: &mut Vec<Study
         check_split(head.split),
         check_creators(&head),
         check_organizations(&head),
+        check_orcids(&head),
+        check_words("keywords", &head.keywords),
+        check_words("funding", &head.funding),
         check_epoch(&head),
     ];
     errors.extend(checks.into_iter().filter_map(Result::err).map(|e| section_error(text, "study", e)));
@@ -288,8 +293,8 @@ fn check_epoch(head: &StudyHead) -> Result<(), ParameterError> {
 
 /// Creators have names, and each is named once.
 fn check_creators(head: &StudyHead) -> Result<(), ParameterError> {
-    let plain = |name: &String| name.split(',').map(str::trim).collect::<Vec<_>>().join(", ").to_lowercase();
-    let names: Vec<String> = head.creators.iter().map(plain).collect();
+    let plain = |name: &str| name.split(',').map(str::trim).collect::<Vec<_>>().join(", ").to_lowercase();
+    let names: Vec<String> = head.creators.iter().map(|creator| plain(creator.name())).collect();
     for (k, name) in names.iter().enumerate() {
         let wrong = match () {
             () if name.trim_matches([',', ' ']).is_empty() => "is empty; a creator has a name",
@@ -303,12 +308,48 @@ fn check_creators(head: &StudyHead) -> Result<(), ParameterError> {
 
 /// Organisations are among the creators.
 fn check_organizations(head: &StudyHead) -> Result<(), ParameterError> {
-    match head.organizations.iter().find(|name| !head.creators.contains(name)) {
+    let is_creator = |name: &str| head.creators.iter().any(|creator| creator.name() == name);
+    match head.organizations.iter().find(|name| !is_creator(name)) {
         Some(name) => {
             Err(ParameterError::new("organizations", format!("names \"{name}\", which is not in `creators`")))
         }
         None => Ok(()),
     }
+}
+
+/// ORCID iDs are right, of people, and each of one of them; affiliations are not empty.
+fn check_orcids(head: &StudyHead) -> Result<(), ParameterError> {
+    let mut seen = BTreeSet::new();
+    for (k, creator) in head.creators.iter().enumerate() {
+        let refuse = |key: &str, why: String| Err(ParameterError::new(format!("creators.{k}.{key}"), why));
+        if creator.affiliation().is_some_and(|affiliation| affiliation.trim().is_empty()) {
+            return refuse("affiliation", "is empty; leave it out, or name an organisation".to_owned());
+        }
+        let Some(orcid) = creator.orcid() else { continue };
+        if let Err(wrong) = orcid::check(orcid) {
+            return refuse("orcid", format!("is {wrong}"));
+        }
+        if head.organizations.iter().any(|name| name == creator.name()) {
+            return refuse("orcid", format!("is of \"{}\", an organisation; ORCID iDs are of people", creator.name()));
+        }
+        if !seen.insert(orcid) {
+            return refuse("orcid", format!("is \"{orcid}\", which another creator has"));
+        }
+    }
+    Ok(())
+}
+
+/// Words of a list are not empty, and each is there once.
+fn check_words(key: &str, words: &[String]) -> Result<(), ParameterError> {
+    for (k, word) in words.iter().enumerate() {
+        let wrong = match () {
+            () if word.trim().is_empty() => "is empty".to_owned(),
+            () if words[..k].contains(word) => format!("\"{word}\" is there twice"),
+            () => continue,
+        };
+        return Err(ParameterError::new(format!("{key}.{k}"), wrong));
+    }
+    Ok(())
 }
 
 /// DOIs are `10.`, four to nine digits, at most one more part of digits, `/`, and a suffix (the pattern of the Citation File Format).
@@ -361,6 +402,16 @@ mod tests {
     }
 
     #[test]
+    fn val_creators_are_names_or_tables() {
+        let more = "creators = [\"Snow Lab\", { name = \"Doe, Jane\", orcid = \"0000-0002-1825-0097\", affiliation = \"Snow Lab\" }]\n\
+            organizations = [\"Snow Lab\"]\nkeywords = [\"snow\"]\nfunding = [\"a fund\"]\n";
+        let head = parse(&format!("{HEAD}{more}")).unwrap().head;
+        let told: Vec<_> = head.creators.iter().map(|c| (c.name(), c.orcid(), c.affiliation())).collect();
+        let jane = ("Doe, Jane", Some("0000-0002-1825-0097"), Some("Snow Lab"));
+        assert_eq!(told, [("Snow Lab", None, None), jane]);
+    }
+
+    #[test]
     fn val_refusals_name_the_place() {
         let at = |text: &str, words: &str, place: &str| {
             let (message, span) = refusal(text);
@@ -384,6 +435,14 @@ mod tests {
             at(&format!("{HEAD}doi = \"{doi}\"\n"), "plain DOI", &format!("\"{doi}\""));
         }
         at(&format!("{HEAD}creators = [\"a\"]\norganizations = [\"b\"]\n"), "not in `creators`", "[\"b\"]");
+        let creator = |table: &str| format!("{HEAD}creators = [\"Roe, R.\", {{ name = \"Doe, J.\", {table} }}]\n");
+        at(&creator("orcid = \"0000-0002-1825-0079\""), "checksum is wrong", "\"0000-0002-1825-0079\"");
+        at(&creator("orcid = \"0000-0002-1825\""), "plain ORCID iD", "\"0000-0002-1825\"");
+        at(&creator("affiliation = \" \""), "is empty", "\" \"");
+        at(&creator("orchid = \"0000-0002-1825-0097\""), "unknown key `creators.1.orchid`", "orchid");
+        let of_group = creator("orcid = \"0000-0002-1825-0097\"") + "organizations = [\"Doe, J.\"]\n";
+        at(&of_group, "an organisation", "\"0000-0002-1825-0097\"");
+        at(&format!("{HEAD}keywords = [\"snow\", \"snow\"]\n"), "twice", "\"snow\"");
         at(&format!("{HEAD}[roughness]\nlow_max = 2.0\n"), "above low_max", "[roughness]");
         at(&format!("{HEAD}[[terain]]\nid = \"a\"\n"), "unknown section `terain`", "terain");
         at(&format!("{HEAD}[extra]\n"), "unknown section", "extra");

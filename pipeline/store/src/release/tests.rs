@@ -188,7 +188,8 @@ fn val_rows_of_a_changed_table_are_not_read() {
 fn val_paths_stay_inside() {
     let folder = tempfile::tempdir().unwrap();
     let mut builder = ReleaseBuilder::beside(&folder.path().join("s"), head()).unwrap();
-    for path in ["../x", "/x", "a//b", ".hidden", MANIFEST, "a/../b", "a\nb", ""] {
+    assert!(check_path(ZENODO).is_ok());
+    for path in ["../x", "/x", "a//b", ".hidden", "a/.zenodo.json", MANIFEST, "a/../b", "a\nb", ""] {
         let result = builder.write_text(path, "", Origin::default());
         assert!(matches!(result, Err(ReleaseError::Path { .. })), "{path:?}");
     }

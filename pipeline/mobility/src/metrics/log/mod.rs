@@ -6,8 +6,9 @@
 //!
 //! Second differences of heights at 20 Hz raise noise: 1 mm of white noise gives 0.98 m/s2. A floor stands beside each root
 //! mean square: what white noise gives, of the smaller of two upper bounds of its density: the top eighth of the spectrum, and
-//! the quietest second of a vehicle at rest. Below three floors the answer is "cannot tell". Our own recordings hold what was
-//! simulated, without noise: their floors are 0.
+//! the quietest second of a vehicle at rest. Below three floors the answer is "cannot tell". Recordings of our own
+//! messages hold what was simulated, but for its rounding to 2^-20 m (2.7e-4 m/s2): their floors are 0. Our ROS 2 bags hold the same
+//! poses, but their messages do not say so: their floors are estimated as for any log.
 //!
 //! Beside the second difference, the vertical acceleration in one band (0.2 to 8 Hz unless told otherwise), from the spectrum of
 //! the heights and, where there is an inertial measurement unit, from its specific force turned upright by the poses: the same
