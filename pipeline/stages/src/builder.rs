@@ -104,8 +104,11 @@ pub struct Heightfield {
     pub cells: u64,
     /// Smaller side of a cell, m, where it is known before the run.
     pub cell_m: Option<f64>,
-    /// Shape and place, where they are known before the run.
+    /// Shape and place of a surface that is made on cells of its own, where they are known before the run.
     pub geometry: Option<Geometry>,
+    /// Shape and place, of measured surfaces and of what lies on them as well, where parameters and the headers of files tell them before
+    /// the run.
+    pub expected: Option<Geometry>,
 }
 
 impl Heightfield {
@@ -138,6 +141,8 @@ pub struct Builder<'a> {
     pub families: BTreeMap<String, Vec<String>>,
     /// Ids of fits.
     pub fits: Vec<String>,
+    /// Cells of the DEM, east-west and north-south, m, of each fit that stores the measured covariance, where they are known before the run.
+    pub measured_cells: BTreeMap<String, [f64; 2]>,
     /// Missions by id: what is drawn on which heightfields.
     pub missions: BTreeMap<String, Drawn>,
     /// Routes by id; a swept id stands for several searches.
@@ -174,6 +179,7 @@ impl<'a> Builder<'a> {
             heightfields: BTreeMap::new(),
             families: BTreeMap::new(),
             fits: Vec::new(),
+            measured_cells: BTreeMap::new(),
             missions: BTreeMap::new(),
             routes: BTreeMap::new(),
             images: BTreeMap::new(),

@@ -137,6 +137,9 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>, recovered: bool) -> R
                 .with_noise(&Noise { white_sigma_m: f64::MIN_POSITIVE, ..Noise::default() })
                 .map_err(|e| entry.refuse(e))?;
         }
+        if let Some(place) = field.expected.filter(|_| settings.is_empirical()) {
+            builder.measured_cells.insert(one.id.clone(), place.cell);
+        }
         let job = FitJob {
             id: one.id.clone(),
             dem_id: item.dem.clone(),

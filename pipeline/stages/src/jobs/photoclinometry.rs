@@ -130,6 +130,7 @@ fn add_one(
         cells: job.cells,
         cell_m: job.settings.cell_m,
         geometry: None,
+        expected: None,
     };
     let images = job.images.iter().map(|i| &i.item);
     let known = [job.coarse.as_ref().map(|(item, _)| item), job.altimetry.as_ref().map(|points| &points.item)];

@@ -57,6 +57,7 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
         builder.claim(entry, STAGE, &one.id)?;
         let generator = sastrugi_terrain::prepare(&item.kind, &one.params).map_err(|e| entry.refuse(e))?;
         let inputs = Sources::find(builder, (entry, &item), generator.as_ref(), &mut copies)?;
+        generator.check_places(&inputs.places()).map_err(|e| entry.refuse(e))?;
         // Parameters name files as the release does, wherever they lie now.
         let released = inputs.as_released(&one.params);
         let generator = sastrugi_terrain::prepare(&item.kind, &released).map_err(|e| entry.refuse(e))?;
@@ -75,6 +76,7 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
             cells: generator.geometry().len() as u64,
             cell_m: Some(generator.geometry().cell.into_iter().fold(f64::INFINITY, f64::min)),
             geometry: Some(generator.geometry()),
+            expected: Some(generator.geometry()),
         };
         let geotiff = builder.study.head.geotiff;
         let exports = Exports::new(&item.exports, &generator.geometry()).map_err(|e| entry.error("exports", e))?;

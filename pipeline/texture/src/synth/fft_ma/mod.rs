@@ -153,7 +153,6 @@ pub fn texture(
 
 impl MethodParameters for FftMaParameters {
     const NAME: &'static str = "fft_ma";
-    const MAKES_MEASURED: bool = true;
     type Kernel = FftMa;
 
     fn is_periodic(&self) -> bool {
@@ -182,6 +181,10 @@ impl MethodParameters for FftMaParameters {
         let [rows, cols] = self.torus_of_any(tile);
         // As for a measured covariance or a residual, which takes most.
         cost(rows * cols, tile.geometry.len(), 1)
+    }
+
+    fn check_measured(&self, tile: &Tile, measured_m: [f64; 2]) -> Result<(), ParameterError> {
+        aim::multiples(tile.geometry.cell, measured_m).map(drop)
     }
 
     /// Refuses Eq. 10 of a covariance that is no isotropic exponential, a residual of a fit without a window, and cells that are no
