@@ -16,6 +16,7 @@ use sastrugi_store::dem::{self, Claimed, Dem, ReadOptions};
 use sastrugi_store::digest;
 use serde_json::{Value, json};
 use std::path::Path;
+use std::sync::Arc;
 
 /// Name of the stage.
 pub const STAGE: &str = "dem";
@@ -60,7 +61,7 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
         variant: None,
         replicate: None,
         kind: original::extension(&item.file),
-        parameters: recipe(&item),
+        parameters: Arc::new(recipe(&item)),
         streams: None,
         release_path: format!("dem/{id}.metric.tif"),
         cells: expected.map_or(claimed.cells, |geometry| geometry.len() as u64),

@@ -21,6 +21,7 @@ use sastrugi_schemas::tables::{PhotoclinometryBandRow, PhotoclinometryRow};
 use sastrugi_store::{dem, digest};
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 /// Name of the stage.
 pub const STAGE: &str = "photoclinometry";
@@ -124,7 +125,7 @@ fn add_one(
         variant: job.variant.clone().filter(|_| job.group.is_some()),
         replicate: truth.replicate,
         kind: STAGE.to_owned(),
-        parameters: job.recipe(),
+        parameters: Arc::new(job.recipe()),
         streams: Some(job.streams.clone()),
         release_path: job.released("tif"),
         cells: job.cells,

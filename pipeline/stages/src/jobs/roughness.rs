@@ -13,6 +13,7 @@ use sastrugi_schemas::study::RoughnessSection;
 use sastrugi_schemas::tables::TerrainRow;
 use sastrugi_store::{dem, digest};
 use serde_json::{Value, json};
+use std::sync::Arc;
 
 /// Name of the stage.
 pub const STAGE: &str = "roughness";
@@ -26,12 +27,14 @@ pub const CLASSES_RAW: &str = "classes.raw.tif";
 /// # Errors
 /// None of a study's own.
 pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
+    // One for all: what is known of each of many items is little.
+    let section = Arc::new(builder.study.roughness.clone());
     let node = |(id, field): (&String, &Heightfield)| Node {
         item: item(id),
         parents: vec![field.item.clone()],
         inputs: Vec::new(),
         stream: None,
-        job: Box::new(RoughnessJob { id: id.clone(), field: field.clone(), section: builder.study.roughness.clone() }),
+        job: Box::new(RoughnessJob { id: id.clone(), field: field.clone(), section: Arc::clone(&section) }),
     };
     let nodes: Vec<Node> = builder.heightfields.iter().map(node).collect();
     Ok(nodes.into_iter().try_for_each(|node| builder.node(node))?)
@@ -41,7 +44,7 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
 struct RoughnessJob {
     id: String,
     field: Heightfield,
-    section: RoughnessSection,
+    section: Arc<RoughnessSection>,
 }
 
 impl RoughnessJob {
@@ -84,11 +87,11 @@ impl RoughnessJob {
 impl Job for RoughnessJob {
     fn recipe(&self) -> Value {
         json!({
-            "section": self.section,
+            "section": *self.section,
             "group": self.field.group,
             "variant": self.field.variant,
             "kind": self.field.kind,
-            "params": self.field.parameters,
+            "params": *self.field.parameters,
             "path": self.field.release_path,
         })
     }

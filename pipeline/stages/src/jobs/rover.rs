@@ -456,7 +456,7 @@ impl Job for RoverJob {
                 json!({ "name": head.name, "seed": head.seed, "license": head.license, "epoch_ns": head.epoch_ns, "mcap": head.mcap })
             }),
             // The world goes on beyond the heights of the item.
-            "world": [self.field.parameters.clone(), json!(self.field.stream())],
+            "world": [*self.field.parameters, json!(self.field.stream())],
         })
     }
 

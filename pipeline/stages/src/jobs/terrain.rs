@@ -17,6 +17,7 @@ use sastrugi_store::{digest, geojson};
 use sastrugi_terrain::{Generator, Line, planetary};
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
 /// Name of the stage.
 pub const STAGE: &str = "terrain";
@@ -70,7 +71,7 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
             variant: one.sweep.filter(|_| item.group.is_some()),
             replicate: Some(one.replicate),
             kind: item.kind.clone(),
-            parameters: generator.parameters(),
+            parameters: Arc::new(generator.parameters()),
             streams: Some(streams.clone()),
             release_path: format!("terrain/{}.tif", one.id),
             cells: generator.geometry().len() as u64,

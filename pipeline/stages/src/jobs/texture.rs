@@ -24,6 +24,7 @@ use sastrugi_texture::synth::{conditional, fft_ma};
 use sastrugi_texture::{Cost, Method, SlopeFactors, TextureOutcome};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 /// Name of the stage.
 pub const STAGE: &str = "texture";
@@ -169,7 +170,7 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
                 variant: one.sweep.clone().filter(|_| item.group.is_some()),
                 replicate: Some(one.replicate),
                 kind: method.clone(),
-                parameters: parameters(&item, &matched, synthesis.as_ref()),
+                parameters: Arc::new(parameters(&item, &matched, synthesis.as_ref())),
                 streams: Some(streams.clone()),
                 release_path: format!("texture/{id}.tif"),
                 cells: match (&base, &fill) {
