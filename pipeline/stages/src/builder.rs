@@ -9,6 +9,7 @@ use sastrugi_imaging::Sun;
 use sastrugi_numeric::{Geometry, Streams};
 use sastrugi_schemas::fit::Source;
 use sastrugi_schemas::study::Pairing;
+use sastrugi_texture::Prospect;
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
@@ -127,6 +128,8 @@ pub struct Image {
     pub id: String,
     /// The item that makes it; its files are those of `jobs::image`.
     pub item: ItemRef,
+    /// Number of pixels, roughly.
+    pub pixels: u64,
     /// Id of the surface that it shows.
     pub surface: String,
     /// Sun that lights it.
@@ -143,8 +146,8 @@ pub struct Builder<'a> {
     pub families: BTreeMap<String, Vec<String>>,
     /// Ids of fits.
     pub fits: Vec<String>,
-    /// Cells of the DEM, east-west and north-south, m, of each fit that stores the measured covariance, where they are known before the run.
-    pub measured_cells: BTreeMap<String, [f64; 2]>,
+    /// What is known of the fits before the run, by id.
+    pub prospects: BTreeMap<String, Prospect>,
     /// Missions by id: what is drawn on which heightfields.
     pub missions: BTreeMap<String, Drawn>,
     /// Routes by id; a swept id stands for several searches.
@@ -185,7 +188,7 @@ impl<'a> Builder<'a> {
             heightfields: BTreeMap::new(),
             families: BTreeMap::new(),
             fits: Vec::new(),
-            measured_cells: BTreeMap::new(),
+            prospects: BTreeMap::new(),
             missions: BTreeMap::new(),
             routes: BTreeMap::new(),
             images: BTreeMap::new(),

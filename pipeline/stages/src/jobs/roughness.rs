@@ -22,6 +22,10 @@ pub const CLASSES: &str = "classes.tif";
 /// Class map before closing.
 pub const CLASSES_RAW: &str = "classes.raw.tif";
 
+/// Rough time of a cell, s: gradients, pair sums and spectra, and the class maps that are written. Cells are measured from 256 x 256 to
+/// 2048 x 2048.
+const SECONDS_PER_CELL: f64 = 6e-7;
+
 /// Adds one item for every heightfield of the study, which describes and classifies it.
 ///
 /// # Errors
@@ -106,7 +110,8 @@ impl Job for RoughnessJob {
     }
 
     fn estimate(&self) -> Estimate {
-        Estimate { seconds: 0.3, bytes: 300e3 }
+        let cells = self.field.cells as f64;
+        Estimate { seconds: 0.03 + SECONDS_PER_CELL * cells, bytes: 1e5 + 0.3 * cells }
     }
 
     fn run(&self, work: &Work<'_>) -> Result<Outcome, JobError> {

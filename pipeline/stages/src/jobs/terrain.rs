@@ -2,7 +2,7 @@
 
 use super::exports::Exports;
 use super::inputs::{Copies, Sources};
-use super::rasters::{raster_options, raster_packing};
+use super::rasters::{SECONDS_PER_WRITTEN_CELL, raster_options, raster_packing};
 use crate::builder::{BuildError, Builder, HEIGHTS, Heightfield, common};
 use crate::job::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work};
 use crate::operations::terrains::{generate, values_of, write_png16};
@@ -144,7 +144,8 @@ impl Job for TerrainJob {
 
     fn estimate(&self) -> Estimate {
         let cells = self.generator.geometry().len() as f64;
-        Estimate { seconds: self.generator.seconds(), bytes: 3.0 * cells + self.exports.bytes() }
+        let seconds = self.generator.seconds() + SECONDS_PER_WRITTEN_CELL * cells;
+        Estimate { seconds, bytes: 3.0 * cells + self.exports.bytes() }
     }
 
     fn run(&self, work: &Work<'_>) -> Result<Outcome, JobError> {

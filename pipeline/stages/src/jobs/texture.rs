@@ -3,7 +3,7 @@
 use super::dem as dem_job;
 use super::fit;
 use super::matched::Matched;
-use super::rasters::{raster_options, raster_packing};
+use super::rasters::{SECONDS_PER_WRITTEN_CELL, raster_options, raster_packing};
 use super::scoreboard::{self, Entrant, ScoreboardJob};
 use super::surface::{Surface, SurfaceRows};
 use crate::builder::{BuildError, Builder, HEIGHTS, Heightfield, unknown_id};
@@ -30,6 +30,18 @@ use std::sync::Arc;
 pub const STAGE: &str = "texture";
 /// Most realisations of a scoreboard.
 const REALISATIONS_MAX: u32 = 1000;
+
+/// Rough time of an arithmetic operation of a method, s: of transforms, of bumps that are added all over a field, of a dense factor.
+fn seconds_per_operation(method: &str) -> f64 {
+    match method {
+        "gaussians" | "quasi_wavelets" => 3.5e-9,
+        "cholesky" => 2e-10,
+        _ => 5e-10,
+    }
+}
+
+/// Rough time of a cell of a texture that is detrended, trimmed and described, s.
+const SECONDS_PER_DESCRIBED_CELL: f64 = 6e-7;
 
 /// Synthesis methods.
 pub fn kinds() -> Vec<Kind> {
@@ -146,7 +158,7 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
                 if !side_by_side && fill.is_none() {
                     check_before_run(builder, &matched, base.as_ref(), synthesis.as_ref())?;
                 }
-                Ok((matched.cost(synthesis.as_ref())?, synthesis))
+                Ok((matched.cost(synthesis.as_ref(), &builder.prospects)?, synthesis))
             });
             let cost = checked.as_ref().ok().map(|(cost, _)| *cost);
             entrants.push(Entrant { method: method.clone(), parameters: own, cost });
@@ -241,9 +253,9 @@ fn check_before_run(
     base: Option<&Base>,
     synthesis: &dyn Method,
 ) -> Result<(), ParameterError> {
-    let measured_m = matched.parent().and_then(|fit| builder.measured_cells.get(&fit.id));
-    if let Some(measured_m) = measured_m {
-        synthesis.check_measured(*measured_m)?;
+    let prospect = matched.parent().and_then(|fit| builder.prospects.get(&fit.id));
+    if let Some(measured_m) = prospect.filter(|fit| fit.is_measured).and_then(|fit| fit.cell_m) {
+        synthesis.check_measured(measured_m)?;
     }
     match base.and_then(|base| base.expected) {
         Some(place) => sastrugi_texture::check_cells(place.cell, synthesis.geometry().cell)
@@ -417,7 +429,14 @@ impl Job for TextureJob {
 
     fn estimate(&self) -> Estimate {
         let cells = self.synthesis.geometry().len() as f64;
-        Estimate { seconds: 0.02 + 3e-7 * cells, bytes: 3.5 * cells }
+        // What describes the residual of a texture from a fit is what describes a surface.
+        let described =
+            if self.matched.parent().is_some() && self.fill.is_none() { SECONDS_PER_DESCRIBED_CELL } else { 0.0 };
+        let seconds = 0.02
+            + seconds_per_operation(&self.method) * self.cost.operations
+            + SECONDS_PER_WRITTEN_CELL * self.cells as f64
+            + described * cells;
+        Estimate { seconds, bytes: 3.5 * self.cells as f64 }
     }
 
     fn run(&self, work: &Work<'_>) -> Result<Outcome, JobError> {

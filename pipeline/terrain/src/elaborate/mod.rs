@@ -53,7 +53,7 @@ pub use params::{Elaborate, RawElaborate};
 pub use windows::Elaborated;
 
 use crate::generator::{Generator, Input, Map, NamedInput, Terrain, TerrainError};
-use crate::planetary::{self, Assembly, Patch, Potential, RawProcess, Request, Window, World};
+use crate::planetary::{self, Assembly, Patch, Potential, RawProcess, Request, Window, Work, World};
 use altimetry::{AltimetryError, Correction, Points, Posts};
 use background::Background;
 use bounds::Bound;
@@ -573,7 +573,7 @@ impl Generator for Elaborate {
     }
 
     fn seconds(&self) -> f64 {
-        planetary::seconds(self.window.len(), self.work.visits)
+        planetary::seconds(self.window.len(), &Work { is_textured: self.raw.texture, ..self.work })
     }
 
     fn notes(&self) -> Vec<String> {

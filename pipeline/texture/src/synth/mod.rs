@@ -41,6 +41,9 @@ pub trait Method: Send + Sync {
     /// What a texture takes, as far as that is known without the covariance.
     fn cost(&self) -> Cost;
 
+    /// The same with the most memory that any result of a fit asks for.
+    fn cost_of(&self, prospect: &Prospect) -> Cost;
+
     /// Refuses what [`Self::bind`] would refuse of a fit with a covariance that was measured on cells of that size, east-west and
     /// north-south, m.
     ///
@@ -53,6 +56,17 @@ pub trait Method: Send + Sync {
     /// # Errors
     /// A fit without a covariance, or one that the method cannot make on this tile.
     fn bind(&self, fit: &FitFile) -> Result<Box<dyn Synthesis>, ParameterError>;
+}
+
+/// What is known of a fit before it is made.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Prospect {
+    /// Side of a torus that holds its covariance, whatever that will be, m.
+    pub torus_m: f64,
+    /// Cells of what is fitted, east-west and north-south, m.
+    pub cell_m: Option<[f64; 2]>,
+    /// Whether the measured covariance is stored.
+    pub is_measured: bool,
 }
 
 /// What a texture takes.
@@ -183,6 +197,11 @@ pub trait MethodParameters: DeserializeOwned + Serialize + JsonSchema + Clone + 
     /// What a tile takes, as far as that is known without the covariance.
     fn cost(&self, tile: &Tile) -> Cost;
 
+    /// The same with the most memory that any result of a fit asks for.
+    fn cost_of(&self, tile: &Tile, _prospect: &Prospect) -> Cost {
+        self.cost(tile)
+    }
+
     /// The method for one tile of `wanted`, which is the covariance of `fitted` with the anisotropy of the tile.
     ///
     /// # Errors
@@ -311,6 +330,10 @@ impl<P: MethodParameters> Method for Checked<P> {
 
     fn cost(&self) -> Cost {
         self.tile.repeated_cost(self.own.cost(&self.tile))
+    }
+
+    fn cost_of(&self, prospect: &Prospect) -> Cost {
+        self.tile.repeated_cost(self.own.cost_of(&self.tile, prospect))
     }
 
     fn check_measured(&self, measured_m: [f64; 2]) -> Result<(), ParameterError> {

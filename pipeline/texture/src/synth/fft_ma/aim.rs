@@ -116,6 +116,12 @@ impl Aim {
     }
 }
 
+/// How many cells no larger than a fit's one of a texture's takes, for the spectrum of a residual or of a measured covariance.
+pub fn finest(cell_m: [f64; 2], fitted_m: [f64; 2]) -> u64 {
+    let times = |k: usize| (cell_m[k] / fitted_m[k] * (1.0 - MULTIPLE_TOLERANCE)).ceil().max(1.0) as u64;
+    times(0).saturating_mul(times(1))
+}
+
 /// How many cells of a measured covariance make one of a texture, north-south and east-west.
 ///
 /// # Errors
