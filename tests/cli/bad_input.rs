@@ -101,6 +101,71 @@ fn val_exports_are_refused() {
     refused(path, &["convert", "holed.asc", "out"], USAGE, &["the ending names no DEM format", ".usda"]);
 }
 
+/// Windows beyond their surface and cells that do not go together are refused before anything runs, with the place in the study and what
+/// would be right.
+#[test]
+fn val_places_are_refused_before_the_run() {
+    let folder = area();
+    let path = folder.path();
+    let head = "ncols 10\nnrows 10\nxllcorner 100\nyllcorner 200\ncellsize 2\nnodata_value -9999\n";
+    write(path, "site.asc", &format!("{head}{}", "1 2 1.5 2.5 1 2 1 3 2 1\n".repeat(10)));
+    let told = |tables: &str| {
+        let study = "[study]\nname = \"places\"\nseed = 1\ndate = \"2026-01-01\"\n[[dem]]\nid = \"site\"\nfile = \"site.asc\"\n";
+        write(path, "study.toml", &format!("{study}{tables}"));
+        let call = sastrugi_in(path, &["plan", "study.toml"]);
+        (call.code, call.stderr.split_whitespace().collect::<Vec<_>>().join(" "))
+    };
+    let fine = |origin: &str| {
+        format!(
+            "[[terrain]]\nid = \"fine\"\nkind = \"elaborate\"\ndem = \"site\"\norigin_m = {origin}\nsize_px = [20, 20]\ncell_m = 0.5\n"
+        )
+    };
+    let joined = |origin: &str, of: &str| {
+        format!(
+            "[[terrain]]\nid = \"small\"\nkind = \"spheroids\"\nsize_px = [8, 8]\ncell_m = 1.0\n\
+             [[terrain]]\nid = \"joined\"\nkind = \"compose\"\nsize_px = [20, 20]\ncell_m = 0.5\norigin_m = {origin}\n\
+             processes = [{{ of = \"{of}\" }}]\n"
+        )
+    };
+    let texture = |model: &str, more: &str| {
+        format!(
+            "[[fit]]\nid = \"f\"\ndem = \"site\"\nmodel = \"{model}\"\nouter_scale_m = 6.0\n\
+             [[texture]]\nid = \"t\"\nfit = \"f\"\nsize_m = [60.0, 60.0]\n{more}\n"
+        )
+    };
+    let posts = "x 101 to 119, y 201 to 219 m";
+    for (tables, words) in [
+        (
+            "window = [0.0, 0.0, 10.0, 10.0]\n".to_owned(),
+            &["dem \"site\"", "which covers [100.0, 200.0, 120.0, 220.0]"],
+        ),
+        (fine("[90.0, 205.0]"), &["terrain \"fine\": `origin_m`", posts]),
+        (joined("[115.0, 205.0]", "site"), &["terrain \"joined\": `processes.0.of` names \"site\"", posts]),
+        (joined("[0.0, 0.0]", "small"), &["names \"small\"", "x 0.5 to 7.5, y 0.5 to 7.5 m"]),
+        (
+            texture("empirical", "cell_m = 3.0"),
+            &["texture \"t\": `cell_m`", "whole multiples of the measured covariance's, 2 x 2 m"],
+        ),
+        (texture("empirical", "cell_m = 2.0\nmethod = \"gaussians\""), &["`method`", "made by `fft_ma` only"]),
+        (
+            texture("exponential", "cell_m = 1.0\nonto = \"site\""),
+            &["`cell_m`", "make the texture at the base's cell size"],
+        ),
+    ] {
+        let (code, told) = told(&tables);
+        assert_eq!(code, USAGE, "{tables}: {told}");
+        words.iter().for_each(|word| assert!(told.contains(word), "{tables}: \"{word}\" is not in: {told}"));
+    }
+    for tables in [
+        fine("[105.0, 205.0]"),
+        joined("[105.0, 205.0]", "site"),
+        texture("empirical", "cell_m = 4.0"),
+        texture("exponential", "cell_m = 2.0\nonto = { background = \"f\" }"),
+    ] {
+        assert_eq!(told(&tables).0, 0, "{tables}: {}", told(&tables).1);
+    }
+}
+
 /// A wheel meets the longer side of a cell.
 #[test]
 fn val_oblong_cells_are_judged_by_their_longer_side() {

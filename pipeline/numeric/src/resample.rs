@@ -2,6 +2,7 @@
 
 use crate::grid::{Geometry, Grid};
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Semi-major axis of WGS 84, m.
 const SEMI_MAJOR_M: f64 = 6_378_137.0;
@@ -34,11 +35,26 @@ pub fn in_metres(g: &Geometry) -> Geometry {
 
 /// The cells whose centres lie in the closed rectangle `[x0, y0, x1, y1]`, or `None` when there is none.
 pub fn crop(grid: &Grid, rectangle: [f64; 4]) -> Option<Grid> {
-    let g = &grid.geometry;
-    let [x0, y0, x1, y1] = rectangle;
-    let cols: Vec<usize> = (0..g.cols).filter(|&c| g.x(c) >= x0 && g.x(c) <= x1).collect();
-    let rows: Vec<usize> = (0..g.rows).filter(|&r| g.y(r) >= y0 && g.y(r) <= y1).collect();
-    Some(grid.window(*rows.first()?, *cols.first()?, rows.len(), cols.len()))
+    let [rows, cols] = inside(&grid.geometry, rectangle)?;
+    Some(grid.window(rows.start, cols.start, rows.len(), cols.len()))
+}
+
+/// Shape and place of what [`crop`] leaves.
+pub fn cropped(g: &Geometry, rectangle: [f64; 4]) -> Option<Geometry> {
+    let [rows, cols] = inside(g, rectangle)?;
+    Some(g.window(rows.start, cols.start, rows.len(), cols.len()))
+}
+
+/// Rows and columns whose centres lie in the closed rectangle `[x0, y0, x1, y1]`; neither is empty.
+fn inside(g: &Geometry, [x0, y0, x1, y1]: [f64; 4]) -> Option<[Range<usize>; 2]> {
+    let run = |count: usize, is_in: &dyn Fn(usize) -> bool| {
+        let first = (0..count).find(|&k| is_in(k))?;
+        let last = (first..count).rev().find(|&k| is_in(k))?;
+        Some(first..last + 1)
+    };
+    let rows = run(g.rows, &|r| g.y(r) >= y0 && g.y(r) <= y1)?;
+    let cols = run(g.cols, &|c| g.x(c) >= x0 && g.x(c) <= x1)?;
+    Some([rows, cols])
 }
 
 /// Every `step`-th cell of every `step`-th row, from the centre of the first block on; for drawing, not for statistics.

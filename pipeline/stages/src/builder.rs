@@ -3,14 +3,17 @@
 use crate::job::ItemRef;
 use crate::operations::drawn::{Drawn, Routes};
 use crate::runner::graph::{Graph, InputFile, Node};
+use crate::study::entry::ITEMS_MAX;
 use crate::study::{Entry, Refusals, Study, StudyError, UNKNOWN_SECTION};
 use sastrugi_imaging::Sun;
 use sastrugi_numeric::{Geometry, Streams};
 use sastrugi_schemas::fit::Source;
 use sastrugi_schemas::study::Pairing;
+use sastrugi_texture::Prospect;
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
+use std::sync::Arc;
 
 /// Suffixes that files of the release add to an id.
 const RESERVED: [&str; 11] = [
@@ -95,7 +98,7 @@ pub struct Heightfield {
     /// Generator, method or file format.
     pub kind: String,
     /// Full parameters.
-    pub parameters: Value,
+    pub parameters: Arc<Value>,
     /// Its random streams; measured DEMs have none.
     pub streams: Option<Streams>,
     /// Its path in the release.
@@ -104,8 +107,11 @@ pub struct Heightfield {
     pub cells: u64,
     /// Smaller side of a cell, m, where it is known before the run.
     pub cell_m: Option<f64>,
-    /// Shape and place, where they are known before the run.
+    /// Shape and place of a surface that is made on cells of its own, where they are known before the run.
     pub geometry: Option<Geometry>,
+    /// Shape and place, of measured surfaces and of what lies on them as well, where parameters and the headers of files tell them before
+    /// the run.
+    pub expected: Option<Geometry>,
 }
 
 impl Heightfield {
@@ -122,6 +128,8 @@ pub struct Image {
     pub id: String,
     /// The item that makes it; its files are those of `jobs::image`.
     pub item: ItemRef,
+    /// Number of pixels, roughly.
+    pub pixels: u64,
     /// Id of the surface that it shows.
     pub surface: String,
     /// Sun that lights it.
@@ -138,6 +146,8 @@ pub struct Builder<'a> {
     pub families: BTreeMap<String, Vec<String>>,
     /// Ids of fits.
     pub fits: Vec<String>,
+    /// What is known of the fits before the run, by id.
+    pub prospects: BTreeMap<String, Prospect>,
     /// Missions by id: what is drawn on which heightfields.
     pub missions: BTreeMap<String, Drawn>,
     /// Routes by id; a swept id stands for several searches.
@@ -152,6 +162,10 @@ pub struct Builder<'a> {
     pub doubts: Vec<String>,
     ids: BTreeMap<String, Origin>,
     refused: Refused,
+    /// Most items.
+    items_max: usize,
+    /// True when an item was refused because there are too many.
+    is_full: bool,
 }
 
 /// The table of a study that an id comes from: its section, and its place in it.
@@ -174,6 +188,7 @@ impl<'a> Builder<'a> {
             heightfields: BTreeMap::new(),
             families: BTreeMap::new(),
             fits: Vec::new(),
+            prospects: BTreeMap::new(),
             missions: BTreeMap::new(),
             routes: BTreeMap::new(),
             images: BTreeMap::new(),
@@ -187,11 +202,13 @@ impl<'a> Builder<'a> {
                 errors,
                 ..Refused::default()
             },
+            items_max: ITEMS_MAX,
+            is_full: false,
         }
     }
 
     /// Adds the items of a section, table by table. What is wrong with one is kept for [`Self::check`] and keeps none of the others from
-    /// being read.
+    /// being read, except where there are too many items.
     ///
     /// # Errors
     /// A section that is not an array of tables.
@@ -201,12 +218,20 @@ impl<'a> Builder<'a> {
         mut add: impl FnMut(&mut Self, &Entry<'_>) -> Result<(), BuildError>,
     ) -> Result<(), BuildError> {
         for entry in self.study.entries(section)? {
-            if let Err(error) = add(self, &entry) {
-                self.refused.table(entry.id());
-                self.refused.add(error);
+            if self.is_full {
+                break;
             }
+            let Err(error) = add(self, &entry) else { continue };
+            self.refused.table(entry.id());
+            let error = if self.is_full { entry.error("count", too_many(self.items_max)).into() } else { error };
+            self.refused.add(error);
         }
         Ok(())
+    }
+
+    /// True when an item was refused because there are too many: what comes after it need not be read.
+    pub fn is_full(&self) -> bool {
+        self.is_full
     }
 
     /// Keeps what is wrong with a section as a whole.
@@ -256,9 +281,9 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// The table that each claimed id comes from.
-    pub fn origins(&self) -> &BTreeMap<String, Origin> {
-        &self.ids
+    /// The table that each claimed id comes from; they are there once.
+    pub fn take_origins(&mut self) -> BTreeMap<String, Origin> {
+        std::mem::take(&mut self.ids)
     }
 
     /// Streams of an item: the study's, or those of its explicit seed.
@@ -288,8 +313,12 @@ impl<'a> Builder<'a> {
     /// Adds an item to the graph.
     ///
     /// # Errors
-    /// When its name is taken or a parent is missing: a stage registered out of order.
+    /// When there are [`ITEMS_MAX`] already; when its name is taken or a parent is missing: a stage registered out of order.
     pub fn node(&mut self, node: Node) -> Result<(), StudyError> {
+        if self.graph.len() >= self.items_max {
+            self.is_full = true;
+            return Err(StudyError::at(None, too_many(self.items_max)));
+        }
         let name = node.item.to_string();
         let placed = self.graph.add(node);
         placed.then_some(()).ok_or_else(|| StudyError::at(None, format!("{name} cannot be placed in the graph")))
@@ -330,6 +359,14 @@ impl<'a> Builder<'a> {
     }
 }
 
+/// The sentence on a study with too many items.
+fn too_many(most: usize) -> String {
+    format!(
+        "the study stands for more than {most} items, the most that are possible; split it into several studies (every surface is two items: it is \
+         made, and described)"
+    )
+}
+
 /// The error for a reference to nothing.
 pub fn unknown_id<'s>(entry: &Entry<'_>, key: &str, id: &str, known: impl Iterator<Item = &'s String>) -> StudyError {
     let known: Vec<&str> = known.map(String::as_str).collect();
@@ -355,5 +392,45 @@ pub fn input_file(path: PathBuf) -> Result<(u64, InputFile), BuildError> {
             Err(BuildError::Input(format!("{}: no such file", path.display())))
         }
         Err(e) => Err(BuildError::Input(format!("{}: {e}", path.display()))),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::jobs;
+    use std::path::Path;
+
+    /// A study with tables of three and of two terrains, of which so many items are possible: what is refused, and how many items there are.
+    fn refused(items_max: usize) -> (String, usize) {
+        let table = |id: &str, count: u32| {
+            format!("[[terrain]]\nid = \"{id}\"\nkind = \"gap\"\nsize_px = [64, 64]\ncount = {count}\n")
+        };
+        let text = format!(
+            "[study]\nname = \"many\"\nseed = 1\ndate = \"2026-01-01\"\n{}{}{}",
+            table("a", 3),
+            table("b", 2),
+            table("c", 1)
+        );
+        let (study, errors) = Study::read(&text, Path::new(""), &crate::registry::section_names()).unwrap();
+        let mut builder = Builder { items_max, ..Builder::new(&study, errors) };
+        jobs::terrain::add(&mut builder).unwrap();
+        if !builder.is_full() {
+            jobs::roughness::add(&mut builder).unwrap_or_else(|error| builder.refuse(error));
+        }
+        let said = builder.check().map_or_else(|error| error.to_string(), |()| String::new());
+        (said, builder.graph.len())
+    }
+
+    /// Too many items in several tables are one error, with the table that is too many; tables after it are not expanded.
+    #[test]
+    fn val_items_of_all_tables_are_limited_together() {
+        assert_eq!(refused(12), (String::new(), 12));
+        let (said, items) = refused(4);
+        assert!(said.contains("terrain \"b\": the study stands for more than 4 items") && items == 4, "{said}");
+        assert!(!said.contains("terrain \"c\""), "{said}");
+        // Describing the surfaces is too much.
+        let (said, items) = refused(8);
+        assert!(said.contains("more than 8 items") && items == 8, "{said}");
     }
 }

@@ -114,13 +114,16 @@ struct Plan {
 fn build(study: &Study, errors: Vec<StudyError>) -> Result<Plan, BuildError> {
     let mut builder = Builder::new(study, errors);
     for section in &SECTIONS {
+        if builder.is_full() {
+            break;
+        }
         if let Err(error) = (section.add)(&mut builder) {
             builder.refuse(error);
         }
     }
     builder.check()?;
     let splits = splits::draw(study, &builder.heightfields, &builder.graph)?;
-    let origins = builder.origins().clone();
+    let origins = builder.take_origins();
     let mut doubts = std::mem::take(&mut builder.doubts);
     doubts.extend(hypotheses::doubts(&builder));
     let Builder { graph, inputs, heightfields, .. } = builder;

@@ -33,6 +33,16 @@ pub fn read(path: &Path) -> io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
+/// The first bytes of a regular file, at most so many.
+///
+/// # Errors
+/// As [`open`].
+pub fn head(path: &Path, bytes: u64) -> io::Result<Vec<u8>> {
+    let mut head = Vec::new();
+    open(path)?.take(bytes).read_to_end(&mut head)?;
+    Ok(head)
+}
+
 /// The text of a regular file.
 ///
 /// # Errors

@@ -1,6 +1,7 @@
 //! What every generator offers.
 
 use sastrugi_numeric::{Geometry, Grid, Streams};
+use sastrugi_schemas::ParameterError;
 use serde_json::Value;
 
 /// Rough time of a cell of most generators, s.
@@ -32,6 +33,15 @@ pub trait Generator: Send + Sync {
     /// What it takes as input, as its parameters name it.
     fn inputs(&self) -> Vec<NamedInput> {
         Vec::new()
+    }
+
+    /// Whether inputs of these shapes and places can serve, before their values are read. They are those of [`Self::inputs`], in that order;
+    /// `None` where shape and place are not known yet. [`Self::generate`] refuses the same in the same words.
+    ///
+    /// # Errors
+    /// An input that cannot serve, by the parameter that decides it.
+    fn check_places(&self, _places: &[Option<Geometry>]) -> Result<(), ParameterError> {
+        Ok(())
     }
 
     /// The heightfield, with what belongs to it. `inputs` are those of [`Self::inputs`], in that order.

@@ -28,6 +28,6 @@ pub mod synth;
 mod gstools_tests;
 
 pub use fit::{FitError, FitOutcome, FitParameters, FitSettings, Heights, LocalMaps, Profiles, fit};
-pub use onto::{OntoError, SlopeFactors, amplitude, modulated_onto, onto};
+pub use onto::{OntoError, SlopeFactors, amplitude, check_cells, modulated_onto, onto};
 pub use registry::{kinds, method, prepare};
-pub use synth::{Cost, Method, Synthesis, SynthesisError, TextureOutcome, fit_notes};
+pub use synth::{Cost, Method, Prospect, Synthesis, SynthesisError, TextureOutcome, fit_notes};

@@ -114,6 +114,17 @@ pub fn amplitude(base: &Grid, raster: &Grid) -> Result<Grid, OntoError> {
     Ok(Grid::new(g, (0..g.len()).map(factor).collect::<Result<_, _>>()?))
 }
 
+/// Whether a texture with cells of one size can lie on a base with cells of another, east-west and north-south, m.
+///
+/// # Errors
+/// Cell sizes that differ.
+pub fn check_cells(base_m: [f64; 2], texture_m: [f64; 2]) -> Result<(), OntoError> {
+    if (0..2).any(|k| (base_m[k] - texture_m[k]).abs() > CELL_TOLERANCE * base_m[k]) {
+        return Err(OntoError::Cells { texture_m, base_m });
+    }
+    Ok(())
+}
+
 /// Base plus texture, cell by cell on the base's own cells. The texture is repeated as often as the base needs from the
 /// south-west corner on, which is seamless for a periodic one. Cells of the base without data stay without.
 ///
@@ -128,10 +139,7 @@ pub fn onto(base: &Grid, texture: &Grid) -> Result<Grid, OntoError> {
 /// # Errors
 /// Cell sizes that differ.
 pub fn modulated_onto(base: &Grid, texture: &Grid, factors: Option<&Grid>) -> Result<Grid, OntoError> {
-    let (base_m, texture_m) = (base.geometry.cell, texture.geometry.cell);
-    if (0..2).any(|k| (base_m[k] - texture_m[k]).abs() > CELL_TOLERANCE * base_m[k]) {
-        return Err(OntoError::Cells { texture_m, base_m });
-    }
+    check_cells(base.geometry.cell, texture.geometry.cell)?;
     let (rows, tile_rows, tile_cols) = (base.rows(), texture.rows(), texture.cols());
     let mut sum = base.clone();
     for (r, line) in sum.values.chunks_exact_mut(base.cols()).enumerate() {

@@ -5,7 +5,7 @@ use super::rasters::{raster_options, raster_packing};
 use crate::builder::{BuildError, Builder, HEIGHTS, Heightfield, InputPlace};
 use crate::documents::terms::{self, Objection};
 use crate::job::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work};
-use crate::operations::dem::{input_error, to_metres, window_of};
+use crate::operations::dem::{expected, input_error, to_metres, window_of};
 use crate::operations::place::{PLACE, Place};
 use crate::revision::Room;
 use crate::runner::graph::Node;
@@ -16,6 +16,7 @@ use sastrugi_store::dem::{self, Claimed, Dem, ReadOptions};
 use sastrugi_store::digest;
 use serde_json::{Value, json};
 use std::path::Path;
+use std::sync::Arc;
 
 /// Name of the stage.
 pub const STAGE: &str = "dem";
@@ -49,7 +50,8 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
     let original = Original::of(&format!("dem/{id}"), &builder.study.folder, &item.file)?;
     let claimed = dem::claimed(&builder.study.folder.join(&item.file), &ReadOptions { cell_m: item.cell_m });
     // Other formats have a byte or more for a cell.
-    let claimed = claimed.unwrap_or(Claimed { cells: original.bytes(), points: 0, cell_m: None });
+    let claimed = claimed.unwrap_or_else(|| Claimed::size(original.bytes(), 0, None));
+    let expected = expected(&claimed, item.window).map_err(|message| entry.error("window", message))?;
     let key = entry.path_of("file");
     builder.inputs.push(InputPlace { key, release_path: original.release_path().to_owned() });
     let field = Heightfield {
@@ -59,12 +61,13 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
         variant: None,
         replicate: None,
         kind: original::extension(&item.file),
-        parameters: recipe(&item),
+        parameters: Arc::new(recipe(&item)),
         streams: None,
         release_path: format!("dem/{id}.metric.tif"),
-        cells: claimed.cells,
-        cell_m: claimed.cell_m,
+        cells: expected.map_or(claimed.cells, |geometry| geometry.len() as u64),
+        cell_m: expected.map_or(claimed.cell_m, |geometry| Some(geometry.cell[0].min(geometry.cell[1]))),
         geometry: None,
+        expected,
     };
     let (bytes, release_path, inputs) = (original.bytes(), original.release_path().to_owned(), original.inputs());
     let original = original.node(original::STAGE, &id);

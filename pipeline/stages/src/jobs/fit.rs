@@ -1,5 +1,6 @@
 //! Stage `fit`: the covariance of a measured DEM.
 
+use super::dem as measured;
 use super::mask::{self, Mask};
 use super::photoclinometry;
 use super::surface::{Surface, SurfaceRows};
@@ -15,7 +16,7 @@ use crate::operations::{coregistration, masks};
 use crate::revision::Room;
 use crate::runner::graph::Node;
 use crate::study::Entry;
-use sastrugi_numeric::{Grid, Streams};
+use sastrugi_numeric::{Geometry, Grid, Streams};
 use sastrugi_schemas::Kind;
 use sastrugi_schemas::coregistration::Minus;
 use sastrugi_schemas::fit::{MaskSource, Source};
@@ -39,6 +40,9 @@ const MASK: &str = "mask.tif";
 /// Covariance at every lag; the raster's coordinates are the lag.
 const MAP: &str = "covariance.tif";
 
+/// Rough time of a cell of the residual that is described, and of the rasters that are written, s.
+const SECONDS_PER_DESCRIBED_CELL: f64 = 1e-6;
+
 /// The one kind of fit.
 pub fn kinds() -> Vec<Kind> {
     sastrugi_texture::kinds().into_iter().filter(|k| k.family == STAGE).collect()
@@ -56,6 +60,10 @@ struct FitJob {
     streams: Streams,
     cells: u64,
     cell_m: Option<f64>,
+    /// Shape and place of the DEM, where they are known before the run.
+    place: Option<Geometry>,
+    /// Whether it was measured, and may have holes.
+    is_measured: bool,
 }
 
 /// A DEM that is co-registered to the fitted one and subtracted.
@@ -137,6 +145,7 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>, recovered: bool) -> R
                 .with_noise(&Noise { white_sigma_m: f64::MIN_POSITIVE, ..Noise::default() })
                 .map_err(|e| entry.refuse(e))?;
         }
+        builder.prospects.insert(one.id.clone(), settings.prospect(field.expected.map(|place| place.cell)));
         let job = FitJob {
             id: one.id.clone(),
             dem_id: item.dem.clone(),
@@ -149,6 +158,8 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>, recovered: bool) -> R
             streams: builder.streams(STAGE, &one.id, item.seed, 0),
             cells: field.cells,
             cell_m: field.cell_m,
+            place: field.expected,
+            is_measured: field.item.stage == measured::STAGE,
         };
         let node = Node {
             item: ItemRef::new(STAGE, &one.id),
@@ -187,10 +198,8 @@ impl Job for FitJob {
     }
 
     fn estimate(&self) -> Estimate {
-        // Of a measured DEM the cells are known when it is read; each replicate fits a surface of at most a million.
-        let replicate = 1.5e-6 * self.cells.min(1 << 20) as f64;
-        let replicates = f64::from(self.settings.parameters().bootstrap);
-        Estimate { seconds: 0.5 + replicate * replicates, bytes: 1e6 }
+        let fit = self.settings.seconds(self.cells, self.place.as_ref(), self.is_measured);
+        Estimate { seconds: fit + SECONDS_PER_DESCRIBED_CELL * self.cells as f64, bytes: 1e6 }
     }
 
     fn run(&self, work: &Work<'_>) -> Result<Outcome, JobError> {

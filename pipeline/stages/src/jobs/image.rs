@@ -29,7 +29,7 @@ const PICTURE: &str = "image.png";
 /// Map of a terrain beside its heights.
 const ALBEDO: &str = "albedo.tif";
 /// Rough time of a ray and its shadow, s.
-const SECONDS_PER_RAY: f64 = 4e-7;
+const SECONDS_PER_RAY: f64 = 5e-7;
 /// Memory of a pixel, bytes: what it sees, and the rasters made from it.
 const BYTES_PER_PIXEL: u64 = 120;
 /// Memory of a cell, bytes: heights, albedo, highest points of blocks.
@@ -73,7 +73,9 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
             // Images differ by their noise, also those of one sweep and one explicit seed.
             let number = (k * surfaces.len() + j) as u64;
             let streams = builder.streams(STAGE, &id, envelope.seed, number);
-            let image = Image { item: ItemRef::new(STAGE, &id), id, surface: surface.clone(), sun: parameters.sun };
+            let pixels = pixels(builder.surface(entry, "surface", surface)?, &parameters) as u64;
+            let image =
+                Image { item: ItemRef::new(STAGE, &id), id, pixels, surface: surface.clone(), sun: parameters.sun };
             add_one(builder, entry, &envelope, one, (image, parameters.clone(), streams))?;
         }
     }
@@ -108,6 +110,12 @@ fn add_one(
     Ok(())
 }
 
+/// Pixels of an image of a surface, roughly.
+fn pixels(field: &Heightfield, parameters: &RenderParameters) -> f64 {
+    let size = field.expected.map(|g| (g.size(), g.mean_cell()));
+    size.map_or(field.cells as f64, |(size, cell)| parameters.camera.pixels(size, cell))
+}
+
 impl ImageJob {
     /// Rays that it takes.
     fn rays(&self) -> f64 {
@@ -115,8 +123,7 @@ impl ImageJob {
     }
 
     fn pixels(&self) -> f64 {
-        let size = self.field.geometry.map(|g| (g.size(), g.mean_cell()));
-        size.map_or(self.field.cells as f64, |(size, cell)| self.parameters.camera.pixels(size, cell))
+        pixels(&self.field, &self.parameters)
     }
 
     fn ground(&self, work: &Work<'_>) -> Result<Ground, JobError> {

@@ -4,10 +4,11 @@
 
 use super::original::{self, INPUT_STAGE, Original};
 use super::terrain;
-use crate::builder::{BuildError, Builder, HEIGHTS, InputPlace, unknown_id};
+use crate::builder::{BuildError, Builder, HEIGHTS, Heightfield, InputPlace, unknown_id};
 use crate::job::{ItemRef, JobError, Product, Work};
 use crate::operations::inputs::{check_systems, kept, read};
 use crate::study::Entry;
+use sastrugi_numeric::Geometry;
 use sastrugi_schemas::study::TerrainItem;
 use sastrugi_store::atomic;
 use sastrugi_store::dem::{self, Crs, Format, ReadOptions};
@@ -28,6 +29,8 @@ pub struct Source {
     release_path: Option<String>,
     /// Cells, as far as they are known before the run.
     cells: u64,
+    /// Shape and place of a raster, as far as they are known before the run.
+    place: Option<Geometry>,
 }
 
 /// The inputs of a generator.
@@ -70,6 +73,11 @@ impl Sources {
     /// Cells of all.
     pub fn cells(&self) -> u64 {
         self.0.iter().map(|s| s.cells).sum()
+    }
+
+    /// Shapes and places, as far as they are known before the run.
+    pub fn places(&self) -> Vec<Option<Geometry>> {
+        self.0.iter().map(|s| s.place).collect()
     }
 
     /// The inputs, and the coordinate system of the first.
@@ -119,23 +127,24 @@ impl Source {
 
 /// The heights or a map of an earlier item, where the name is one.
 fn of_item(builder: &Builder<'_>, entry: &Entry<'_>, named: &NamedInput) -> Result<Option<Source>, BuildError> {
-    let source = |item: &ItemRef, file: String, cells: u64| Source {
+    let source = |field: &Heightfield, file: String| Source {
         named: named.clone(),
-        item: item.clone(),
+        item: field.item.clone(),
         file,
         release_path: None,
-        cells,
+        cells: field.cells,
+        place: field.expected,
     };
     match named.holds {
         Holds::Points => return Ok(None),
         Holds::Heights => {
             let field = builder.surface(entry, &named.key, &named.name)?;
-            return Ok(Some(source(&field.item, HEIGHTS.to_owned(), field.cells)));
+            return Ok(Some(source(field, HEIGHTS.to_owned())));
         }
         Holds::Values => {}
     }
     if let Some(field) = builder.heightfields.get(&named.name) {
-        return Ok(Some(source(&field.item, HEIGHTS.to_owned(), field.cells)));
+        return Ok(Some(source(field, HEIGHTS.to_owned())));
     }
     let map = named.name.rsplit_once('.').filter(|(_, map)| MAPS.iter().any(|known| known.name == *map));
     let Some((id, map)) = map else { return Ok(None) };
@@ -144,7 +153,7 @@ fn of_item(builder: &Builder<'_>, entry: &Entry<'_>, named: &NamedInput) -> Resu
         let message = format!("`{}` names the map `{map}` of \"{id}\", which is not a [[terrain]]", named.key);
         return Err(entry.error(&named.key, message).into());
     }
-    Ok(Some(source(&field.item, format!("{map}.tif"), field.cells)))
+    Ok(Some(source(field, format!("{map}.tif"))))
 }
 
 /// A file beside the study.
@@ -164,7 +173,10 @@ fn of_file(
             format!("`{}` sweeps over files; sweep over ids of [[dem]], or write one item for each file", named.key);
         return Err(entry.error("sweep", message).into());
     }
-    let cells = dem::claimed(&path, &ReadOptions::default()).map_or(0, |claimed| claimed.cells);
+    let claimed = dem::claimed(&path, &ReadOptions::default()).filter(|_| named.holds != Holds::Points);
+    let cells = claimed.map_or(0, |claimed| claimed.cells);
+    // Degrees are refused when the file is read.
+    let place = claimed.filter(|claimed| !claimed.geographic).and_then(|claimed| claimed.geometry);
     let (copy, release_path) = match copies.get(&named.name) {
         Some(known) => known.clone(),
         None => {
@@ -184,5 +196,5 @@ fn of_file(
         builder.inputs.push(place);
     }
     let file = original::name(&release_path).to_owned();
-    Ok(Source { named, item: copy, file, release_path: Some(release_path), cells })
+    Ok(Source { named, item: copy, file, release_path: Some(release_path), cells, place })
 }

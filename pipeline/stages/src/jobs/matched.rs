@@ -4,8 +4,9 @@ use super::fit;
 use crate::job::{ItemRef, JobError, Work};
 use sastrugi_schemas::ParameterError;
 use sastrugi_schemas::fit::FitFile;
-use sastrugi_texture::{Cost, Method};
+use sastrugi_texture::{Cost, Method, Prospect};
 use serde_json::{Value, json};
+use std::collections::BTreeMap;
 
 /// What a texture matches.
 #[derive(Clone)]
@@ -48,13 +49,14 @@ impl Matched {
         }
     }
 
-    /// What a texture of the method takes. For a fit of the study, only what the method's parameters determine.
+    /// What a texture of the method takes. For a fit of the study, only what the method's parameters determine, and memory for any
+    /// covariance that the fit can find; `prospects` tells of the fits.
     ///
     /// # Errors
     /// A stated covariance that the method refuses.
-    pub fn cost(&self, method: &dyn Method) -> Result<Cost, ParameterError> {
+    pub fn cost(&self, method: &dyn Method, prospects: &BTreeMap<String, Prospect>) -> Result<Cost, ParameterError> {
         match self {
-            Self::Item(_) => Ok(method.cost()),
+            Self::Item(fit) => Ok(prospects.get(&fit.id).map_or_else(|| method.cost(), |fit| method.cost_of(fit))),
             Self::Stated(fit) => Ok(method.bind(fit)?.cost()),
         }
     }

@@ -21,15 +21,18 @@ use sastrugi_schemas::tables::{PhotoclinometryBandRow, PhotoclinometryRow};
 use sastrugi_store::{dem, digest};
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 /// Name of the stage.
 pub const STAGE: &str = "photoclinometry";
 /// Rough time of a cell of one image in a round, s.
-const SECONDS_PER_SAMPLE: f64 = 6e-7;
+const SECONDS_PER_SAMPLE: f64 = 4.5e-7;
 /// Rough time of a cell in one perturbed solution, s.
-const SECONDS_PER_PERTURBED: f64 = 1.5e-6;
+const SECONDS_PER_PERTURBED: f64 = 1.1e-6;
 /// Memory of a cell beside its images, bytes.
 const BYTES_PER_CELL: u64 = 600;
+/// Memory of a cell of the surface that the result is compared with, bytes: its heights, and what they are at the cells of the map.
+const BYTES_PER_TRUE_CELL: u64 = 24;
 /// Memory of a cell of one image, bytes.
 const BYTES_PER_SAMPLE: u64 = 48;
 
@@ -50,6 +53,8 @@ struct PhotoclinometryJob {
     settings: Settings,
     streams: Streams,
     cells: u64,
+    /// Cells of the surface that the images show.
+    truth_cells: u64,
     geotiff: GeoTiff,
 }
 
@@ -96,7 +101,8 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
                 images: images.clone(),
                 coarse: coarse.clone(),
                 altimetry: altimetry.clone(),
-                cells: cells(&field, &settings),
+                cells: cells(&field, &settings, images),
+                truth_cells: field.cells,
                 settings: settings.clone(),
                 streams,
                 geotiff: builder.study.head.geotiff,
@@ -124,12 +130,13 @@ fn add_one(
         variant: job.variant.clone().filter(|_| job.group.is_some()),
         replicate: truth.replicate,
         kind: STAGE.to_owned(),
-        parameters: job.recipe(),
+        parameters: Arc::new(job.recipe()),
         streams: Some(job.streams.clone()),
         release_path: job.released("tif"),
         cells: job.cells,
         cell_m: job.settings.cell_m,
         geometry: None,
+        expected: None,
     };
     let images = job.images.iter().map(|i| &i.item);
     let known = [job.coarse.as_ref().map(|(item, _)| item), job.altimetry.as_ref().map(|points| &points.item)];
@@ -226,11 +233,11 @@ fn coarse(
     }
 }
 
-/// Cells of the map, roughly.
-fn cells(truth: &Heightfield, settings: &Settings) -> u64 {
-    match truth.geometry.zip(settings.cell_m) {
+/// Cells of the map, roughly: as many as the images have pixels, where its cells are not stated.
+fn cells(truth: &Heightfield, settings: &Settings, images: &[Image]) -> u64 {
+    match truth.expected.zip(settings.cell_m) {
         Some((g, cell_m)) => (g.size()[0] * g.size()[1] / (cell_m * cell_m)) as u64,
-        None => truth.cells,
+        None => images.iter().map(|image| image.pixels).max().unwrap_or(truth.cells),
     }
 }
 
@@ -352,7 +359,8 @@ impl Job for PhotoclinometryJob {
     }
 
     fn memory_bytes(&self) -> u64 {
-        self.cells * (BYTES_PER_CELL + BYTES_PER_SAMPLE * self.images.len() as u64)
+        let map = self.cells * (BYTES_PER_CELL + BYTES_PER_SAMPLE * self.images.len() as u64);
+        (32 << 20) + map + BYTES_PER_TRUE_CELL * self.truth_cells
     }
 
     fn estimate(&self) -> Estimate {

@@ -13,6 +13,7 @@ use sastrugi_schemas::study::RoughnessSection;
 use sastrugi_schemas::tables::TerrainRow;
 use sastrugi_store::{dem, digest};
 use serde_json::{Value, json};
+use std::sync::Arc;
 
 /// Name of the stage.
 pub const STAGE: &str = "roughness";
@@ -21,17 +22,23 @@ pub const CLASSES: &str = "classes.tif";
 /// Class map before closing.
 pub const CLASSES_RAW: &str = "classes.raw.tif";
 
+/// Rough time of a cell, s: gradients, pair sums and spectra, and the class maps that are written. Cells are measured from 256 x 256 to
+/// 2048 x 2048.
+const SECONDS_PER_CELL: f64 = 6e-7;
+
 /// Adds one item for every heightfield of the study, which describes and classifies it.
 ///
 /// # Errors
 /// None of a study's own.
 pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
+    // One for all: what is known of each of many items is little.
+    let section = Arc::new(builder.study.roughness.clone());
     let node = |(id, field): (&String, &Heightfield)| Node {
         item: item(id),
         parents: vec![field.item.clone()],
         inputs: Vec::new(),
         stream: None,
-        job: Box::new(RoughnessJob { id: id.clone(), field: field.clone(), section: builder.study.roughness.clone() }),
+        job: Box::new(RoughnessJob { id: id.clone(), field: field.clone(), section: Arc::clone(&section) }),
     };
     let nodes: Vec<Node> = builder.heightfields.iter().map(node).collect();
     Ok(nodes.into_iter().try_for_each(|node| builder.node(node))?)
@@ -41,7 +48,7 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
 struct RoughnessJob {
     id: String,
     field: Heightfield,
-    section: RoughnessSection,
+    section: Arc<RoughnessSection>,
 }
 
 impl RoughnessJob {
@@ -84,11 +91,11 @@ impl RoughnessJob {
 impl Job for RoughnessJob {
     fn recipe(&self) -> Value {
         json!({
-            "section": self.section,
+            "section": *self.section,
             "group": self.field.group,
             "variant": self.field.variant,
             "kind": self.field.kind,
-            "params": self.field.parameters,
+            "params": *self.field.parameters,
             "path": self.field.release_path,
         })
     }
@@ -103,7 +110,8 @@ impl Job for RoughnessJob {
     }
 
     fn estimate(&self) -> Estimate {
-        Estimate { seconds: 0.3, bytes: 300e3 }
+        let cells = self.field.cells as f64;
+        Estimate { seconds: 0.03 + SECONDS_PER_CELL * cells, bytes: 1e5 + 0.3 * cells }
     }
 
     fn run(&self, work: &Work<'_>) -> Result<Outcome, JobError> {

@@ -459,7 +459,7 @@ impl Job for RouteJob {
     fn estimate(&self) -> Estimate {
         let cells = self.field.cells as f64;
         let searches = self.search.pairs.count() as f64;
-        Estimate { seconds: 4e-7 * cells * (1.0 + searches), bytes: 200.0 * cells.sqrt() * searches }
+        Estimate { seconds: 2e-7 * cells * (1.0 + searches), bytes: 200.0 * cells.sqrt() * searches }
     }
 
     fn run(&self, work: &Work<'_>) -> Result<Outcome, JobError> {

@@ -38,7 +38,9 @@ const BYTES_PER_RECORDED_CYCLE: u64 = 6000;
 const RULES: [&str; 7] =
     ["bearing_tolerance_rad", "turn_noise_rad", "pass_m", "commit_m", "commit_growth", "commit_max_m", "progress_m"];
 /// Rough time of a cycle, s.
-const SECONDS_PER_CYCLE: f64 = 6e-5;
+const SECONDS_PER_CYCLE: f64 = 1.1e-4;
+/// Rough time of a square metre of a planetary world that a rover which knows the whole map is led over, s.
+const SECONDS_PER_KNOWN_M2: f64 = 8e-4;
 
 /// The navigators.
 pub fn kinds() -> Vec<Kind> {
@@ -460,7 +462,7 @@ impl Job for RoverJob {
                 json!({ "name": head.name, "seed": head.seed, "license": head.license, "epoch_ns": head.epoch_ns, "mcap": head.mcap })
             }),
             // The world goes on beyond the heights of the item.
-            "world": [self.field.parameters.clone(), json!(self.field.stream())],
+            "world": [*self.field.parameters, json!(self.field.stream())],
         })
     }
 
@@ -480,7 +482,12 @@ impl Job for RoverJob {
     }
 
     fn estimate(&self) -> Estimate {
-        estimate(&self.trial.parameters)
+        let driven = estimate(&self.trial.parameters);
+        // The world is made around all starts and goals.
+        let side_m = 2.0 * self.trial.parameters.straight_m();
+        let is_world = self.field.kind == sastrugi_terrain::planetary::KIND;
+        let known = if is_world { SECONDS_PER_KNOWN_M2 * side_m * side_m } else { 0.0 };
+        Estimate { seconds: driven.seconds + known, ..driven }
     }
 
     fn run(&self, work: &Work<'_>) -> Result<Outcome, JobError> {

@@ -136,7 +136,7 @@ impl Job for DesignsJob {
             "terrain": self.terrain,
             "group": self.field.group,
             // The world goes on beyond the heights of the item.
-            "world": [self.field.parameters.clone(), json!(self.field.stream())],
+            "world": [*self.field.parameters, json!(self.field.stream())],
         })
     }
 

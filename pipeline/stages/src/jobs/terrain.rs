@@ -2,7 +2,7 @@
 
 use super::exports::Exports;
 use super::inputs::{Copies, Sources};
-use super::rasters::{raster_options, raster_packing};
+use super::rasters::{SECONDS_PER_WRITTEN_CELL, raster_options, raster_packing};
 use crate::builder::{BuildError, Builder, HEIGHTS, Heightfield, common};
 use crate::job::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work};
 use crate::operations::terrains::{generate, values_of, write_png16};
@@ -17,6 +17,7 @@ use sastrugi_store::{digest, geojson};
 use sastrugi_terrain::{Generator, Line, planetary};
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
 /// Name of the stage.
 pub const STAGE: &str = "terrain";
@@ -57,6 +58,7 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
         builder.claim(entry, STAGE, &one.id)?;
         let generator = sastrugi_terrain::prepare(&item.kind, &one.params).map_err(|e| entry.refuse(e))?;
         let inputs = Sources::find(builder, (entry, &item), generator.as_ref(), &mut copies)?;
+        generator.check_places(&inputs.places()).map_err(|e| entry.refuse(e))?;
         // Parameters name files as the release does, wherever they lie now.
         let released = inputs.as_released(&one.params);
         let generator = sastrugi_terrain::prepare(&item.kind, &released).map_err(|e| entry.refuse(e))?;
@@ -69,12 +71,13 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
             variant: one.sweep.filter(|_| item.group.is_some()),
             replicate: Some(one.replicate),
             kind: item.kind.clone(),
-            parameters: generator.parameters(),
+            parameters: Arc::new(generator.parameters()),
             streams: Some(streams.clone()),
             release_path: format!("terrain/{}.tif", one.id),
             cells: generator.geometry().len() as u64,
             cell_m: Some(generator.geometry().cell.into_iter().fold(f64::INFINITY, f64::min)),
             geometry: Some(generator.geometry()),
+            expected: Some(generator.geometry()),
         };
         let geotiff = builder.study.head.geotiff;
         let exports = Exports::new(&item.exports, &generator.geometry()).map_err(|e| entry.error("exports", e))?;
@@ -141,7 +144,8 @@ impl Job for TerrainJob {
 
     fn estimate(&self) -> Estimate {
         let cells = self.generator.geometry().len() as f64;
-        Estimate { seconds: self.generator.seconds(), bytes: 3.0 * cells + self.exports.bytes() }
+        let seconds = self.generator.seconds() + SECONDS_PER_WRITTEN_CELL * cells;
+        Estimate { seconds, bytes: 3.0 * cells + self.exports.bytes() }
     }
 
     fn run(&self, work: &Work<'_>) -> Result<Outcome, JobError> {

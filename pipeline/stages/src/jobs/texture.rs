@@ -3,7 +3,7 @@
 use super::dem as dem_job;
 use super::fit;
 use super::matched::Matched;
-use super::rasters::{raster_options, raster_packing};
+use super::rasters::{SECONDS_PER_WRITTEN_CELL, raster_options, raster_packing};
 use super::scoreboard::{self, Entrant, ScoreboardJob};
 use super::surface::{Surface, SurfaceRows};
 use crate::builder::{BuildError, Builder, HEIGHTS, Heightfield, unknown_id};
@@ -13,7 +13,7 @@ use crate::operations::textures::{fill_note, has_its_texture, lay_onto, scaled};
 use crate::revision::Room;
 use crate::runner::graph::Node;
 use crate::study::{Entry, Expanded, StudyError};
-use sastrugi_numeric::{Grid, Streams};
+use sastrugi_numeric::{Geometry, Grid, Streams};
 use sastrugi_schemas::fit::FitFile;
 use sastrugi_schemas::study::{FitReference, GeoTiff, Methods, Modulate, Onto, TextureItem};
 use sastrugi_schemas::{Kind, ParameterError};
@@ -24,11 +24,24 @@ use sastrugi_texture::synth::{conditional, fft_ma};
 use sastrugi_texture::{Cost, Method, SlopeFactors, TextureOutcome};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 /// Name of the stage.
 pub const STAGE: &str = "texture";
 /// Most realisations of a scoreboard.
 const REALISATIONS_MAX: u32 = 1000;
+
+/// Rough time of an arithmetic operation of a method, s: of transforms, of bumps that are added all over a field, of a dense factor.
+fn seconds_per_operation(method: &str) -> f64 {
+    match method {
+        "gaussians" | "quasi_wavelets" => 3.5e-9,
+        "cholesky" => 2e-10,
+        _ => 5e-10,
+    }
+}
+
+/// Rough time of a cell of a texture that is detrended, trimmed and described, s.
+const SECONDS_PER_DESCRIBED_CELL: f64 = 6e-7;
 
 /// Synthesis methods.
 pub fn kinds() -> Vec<Kind> {
@@ -53,6 +66,8 @@ struct Base {
     dem: Option<ItemRef>,
     /// Its cells.
     cells: u64,
+    /// Shape and place, where they are known before the run.
+    expected: Option<Geometry>,
     /// Whether it is the DEM that the texture's fit was made from.
     was_fitted: bool,
 }
@@ -61,17 +76,18 @@ impl Base {
     fn of(builder: &Builder<'_>, entry: &Entry<'_>, onto: &Onto, matched: &Matched) -> Result<Self, BuildError> {
         match onto {
             Onto::Id(id) => {
-                let (item, cells) = heightfield(builder, entry, "onto", id)?;
+                let Heightfield { item, cells, expected, .. } = builder.surface(entry, "onto", id)?.clone();
                 let was_fitted = matched.parent().and_then(|fit| fitted_dem(builder, &fit)) == Some(&item);
-                Ok(Self { item, file: HEIGHTS, dem: None, cells, was_fitted })
+                Ok(Self { item, file: HEIGHTS, dem: None, cells, expected, was_fitted })
             }
             Onto::Background { background } => {
                 let item = ItemRef::new(fit::STAGE, background);
                 let Some(dem) = fitted_dem(builder, &item) else {
                     return Err(unknown_id(entry, "onto.background", background, builder.fits.iter()).into());
                 };
-                let cells = builder.heightfields.get(&dem.id).map_or(0, |field| field.cells);
-                Ok(Self { item, file: fit::BACKGROUND, dem: Some(dem.clone()), cells, was_fitted: false })
+                let field = builder.heightfields.get(&dem.id);
+                let (cells, expected) = field.map_or((0, None), |field| (field.cells, field.expected));
+                Ok(Self { item, file: fit::BACKGROUND, dem: Some(dem.clone()), cells, expected, was_fitted: false })
             }
         }
     }
@@ -126,7 +142,7 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
     let matched = matched(builder, entry, &item)?;
     check_purpose(entry, &item, &params)?;
     let base = item.onto.as_ref().map(|onto| Base::of(builder, entry, onto, &matched)).transpose()?;
-    let fill = item.fill.as_deref().map(|id| heightfield(builder, entry, "fill", id)).transpose()?;
+    let fill = item.fill.as_deref().map(|id| builder.surface(entry, "fill", id).cloned()).transpose()?;
     let modulation = modulation(builder, entry, &item)?;
     let mut ids = Vec::new();
     for one in entry.expand(&item.id, item.count, &item.sweep, &params)? {
@@ -137,8 +153,13 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
         let mut refusal = None;
         for method in &methods {
             let own = if side_by_side { own_parameters(&one.params, &kinds, method) } else { one.params.clone() };
-            let checked = sastrugi_texture::method(method, &own)
-                .and_then(|synthesis| Ok((matched.cost(synthesis.as_ref())?, synthesis)));
+            let checked = sastrugi_texture::method(method, &own).and_then(|synthesis| {
+                // Side by side, the scoreboard says which of the methods cannot make it; a filled DEM is not made of a tile.
+                if !side_by_side && fill.is_none() {
+                    check_before_run(builder, &matched, base.as_ref(), synthesis.as_ref())?;
+                }
+                Ok((matched.cost(synthesis.as_ref(), &builder.prospects)?, synthesis))
+            });
             let cost = checked.as_ref().ok().map(|(cost, _)| *cost);
             entrants.push(Entrant { method: method.clone(), parameters: own, cost });
             let (cost, synthesis) = match checked {
@@ -161,19 +182,23 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
                 variant: one.sweep.clone().filter(|_| item.group.is_some()),
                 replicate: Some(one.replicate),
                 kind: method.clone(),
-                parameters: parameters(&item, &matched, synthesis.as_ref()),
+                parameters: Arc::new(parameters(&item, &matched, synthesis.as_ref())),
                 streams: Some(streams.clone()),
                 release_path: format!("texture/{id}.tif"),
                 cells: match (&base, &fill) {
-                    (Some(Base { cells, .. }), _) | (None, Some((_, cells))) => *cells,
+                    (Some(Base { cells, .. }), _) | (None, Some(Heightfield { cells, .. })) => *cells,
                     (None, None) => synthesis.geometry().len() as u64,
                 },
                 cell_m: Some(synthesis.geometry().cell.into_iter().fold(f64::INFINITY, f64::min)),
                 geometry: (base.is_none() && fill.is_none()).then(|| synthesis.geometry()),
+                expected: match (&base, &fill) {
+                    (Some(Base { expected, .. }), _) | (None, Some(Heightfield { expected, .. })) => *expected,
+                    (None, None) => Some(synthesis.geometry()),
+                },
             };
             let cells = field.cells;
             let one_of_many = item.count.is_some_and(|count| count > 1);
-            let (base, fill) = (base.clone(), fill.as_ref().map(|(item, _)| item.clone()));
+            let (base, fill) = (base.clone(), fill.as_ref().map(|field| field.item.clone()));
             let raster = match &modulation {
                 Some(Modulation::Raster(raster)) => Some(raster.clone()),
                 _ => None,
@@ -221,6 +246,24 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
     Ok(())
 }
 
+/// Refuses what is known not to go together before the fit is made: cells of the texture beside those of a measured covariance, or of a base.
+fn check_before_run(
+    builder: &Builder<'_>,
+    matched: &Matched,
+    base: Option<&Base>,
+    synthesis: &dyn Method,
+) -> Result<(), ParameterError> {
+    let prospect = matched.parent().and_then(|fit| builder.prospects.get(&fit.id));
+    if let Some(measured_m) = prospect.filter(|fit| fit.is_measured).and_then(|fit| fit.cell_m) {
+        synthesis.check_measured(measured_m)?;
+    }
+    match base.and_then(|base| base.expected) {
+        Some(place) => sastrugi_texture::check_cells(place.cell, synthesis.geometry().cell)
+            .map_err(|error| ParameterError::new("cell_m", format!("does not go with `onto`: {error}"))),
+        None => Ok(()),
+    }
+}
+
 /// On a measured DEM or a fit's background a texture has what its background lacks, unless the item says otherwise.
 fn on_background(mut one: Expanded, base: &Option<Base>, matched: &Matched, item: &TextureItem) -> Expanded {
     let measured = base.as_ref().is_some_and(|base| [dem_job::STAGE, fit::STAGE].contains(&base.item.stage.as_str()));
@@ -254,16 +297,10 @@ fn check_purpose(entry: &Entry<'_>, item: &TextureItem, params: &Value) -> Resul
     Ok(())
 }
 
-/// A heightfield that the item names, with its number of cells.
-fn heightfield(builder: &Builder<'_>, entry: &Entry<'_>, key: &str, id: &str) -> Result<(ItemRef, u64), StudyError> {
-    let field = builder.surface(entry, key, id)?;
-    Ok((field.item.clone(), field.cells))
-}
-
 fn modulation(builder: &Builder<'_>, entry: &Entry<'_>, item: &TextureItem) -> Result<Option<Modulation>, StudyError> {
     Ok(match item.modulate.clone() {
         None => None,
-        Some(Modulate::Raster(id)) => Some(Modulation::Raster(heightfield(builder, entry, "modulate", &id)?.0)),
+        Some(Modulate::Raster(id)) => Some(Modulation::Raster(builder.surface(entry, "modulate", &id)?.item.clone())),
         Some(Modulate::Slope { slope_deg, factor }) => {
             let factors = SlopeFactors { slope_deg, factor };
             factors.check().map_err(|e| entry.refuse(e))?;
@@ -392,7 +429,14 @@ impl Job for TextureJob {
 
     fn estimate(&self) -> Estimate {
         let cells = self.synthesis.geometry().len() as f64;
-        Estimate { seconds: 0.02 + 3e-7 * cells, bytes: 3.5 * cells }
+        // What describes the residual of a texture from a fit is what describes a surface.
+        let described =
+            if self.matched.parent().is_some() && self.fill.is_none() { SECONDS_PER_DESCRIBED_CELL } else { 0.0 };
+        let seconds = 0.02
+            + seconds_per_operation(&self.method) * self.cost.operations
+            + SECONDS_PER_WRITTEN_CELL * self.cells as f64
+            + described * cells;
+        Estimate { seconds, bytes: 3.5 * self.cells as f64 }
     }
 
     fn run(&self, work: &Work<'_>) -> Result<Outcome, JobError> {

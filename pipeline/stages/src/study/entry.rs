@@ -10,8 +10,8 @@ use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
 
-/// Most items that one table may stand for.
-const ITEMS_MAX: usize = 1_000_000;
+/// Most items of a study, and so of one table: what is known of each before the run stays in memory, about 3 KiB.
+pub const ITEMS_MAX: usize = 400_000;
 
 /// One item table.
 #[derive(Clone, Copy)]

@@ -228,7 +228,7 @@ fn worlds_of_study(path: &Path, text: &str) -> Result<Vec<ServedWorld>, Error> {
     let mut worlds = Vec::new();
     for (id, field) in &loaded.heightfields {
         if let (true, Some(streams)) = (field.kind == planetary::KIND, &field.streams) {
-            let (world, parameters) = (world(&field.parameters)?, field.parameters.clone());
+            let (world, parameters) = (world(&field.parameters)?, Value::clone(&field.parameters));
             if !world.inputs().is_empty() {
                 continue;
             }

@@ -3,14 +3,18 @@
 use super::band::Values;
 use super::checks::{cell_count, free_of_no_data_value};
 use super::crs::Crs;
-use super::raster::{Dem, DemInfo, Format, NO_DATA, Refusal};
+use super::raster::{Claimed, Dem, DemInfo, Format, NO_DATA, Refusal};
 use sastrugi_numeric::{Geometry, Grid};
 use std::fmt::Write;
+use std::iter::Peekable;
 use std::path::Path;
 
 /// Sizes of the usual global grids in arc seconds that no grid in metres has by chance (as degrees they have no short
 /// decimal form).
 const ARC_SECONDS: [f64; 10] = [1.0 / 9.0, 1.0 / 3.0, 1.0, 2.0, 3.0, 5.0, 6.0, 10.0, 15.0, 30.0];
+
+/// Bytes of a file in which its header is looked for.
+const HEADER_BYTES_MAX: u64 = 1 << 12;
 
 /// True for the text of an ESRI ASCII grid: its first word is one of a header.
 pub(crate) fn looks_like(bytes: &[u8]) -> bool {
@@ -66,6 +70,17 @@ struct Header {
 }
 
 impl Header {
+    /// The keys and numbers before the first height.
+    fn read<'a>(words: &mut Peekable<impl Iterator<Item = &'a [u8]>>) -> Result<Self, Refusal> {
+        let mut header = Self::default();
+        while let Some(key) = words.peek().copied().and_then(Key::of) {
+            words.next();
+            let value = words.next().ok_or_else(|| Refusal::new("the header of the ASCII grid breaks off"))?;
+            header.set(key, value)?;
+        }
+        Ok(header)
+    }
+
     fn set(&mut self, key: Key, word: &[u8]) -> Result<(), Refusal> {
         match key {
             Key::Columns => self.cols = Some(count(word, "ncols")?),
@@ -114,13 +129,8 @@ fn count(word: &[u8], key: &str) -> Result<u64, Refusal> {
 
 /// Reads an ESRI ASCII grid, with the `.prj` file beside it when there is one.
 pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Dem, Refusal> {
-    let mut header = Header::default();
     let mut words = words(bytes).peekable();
-    while let Some(key) = words.peek().copied().and_then(Key::of) {
-        words.next();
-        let value = words.next().ok_or_else(|| Refusal::new("the header of the ASCII grid breaks off"))?;
-        header.set(key, value)?;
-    }
+    let header = Header::read(&mut words)?;
     let geometry = header.geometry()?;
     let cells = geometry.len();
     // Every value takes a character and a separator.
@@ -129,8 +139,7 @@ pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Dem, Refusal> {
         return Err(Refusal::new(format!("claims {rows} rows of {cols} columns in {} bytes", bytes.len())));
     }
     let (values, integers) = read_values(words, cells, header.nodata)?;
-    let projection = crate::file::read_text(&path.with_extension("prj")).ok();
-    let (crs, notes) = projection.as_deref().and_then(named_crs).unwrap_or_else(|| guess_crs(&geometry));
+    let (crs, notes) = crs_of(path, &geometry);
     let dtype = if integers { "int32" } else { "float32" };
     let info = DemInfo {
         format: Format::EsriAscii,
@@ -143,6 +152,23 @@ pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Dem, Refusal> {
         notes,
     };
     Ok(Dem { grid: Grid::new(geometry, values), info })
+}
+
+/// What the header says, and the `.prj` file beside it.
+pub(super) fn claimed(path: &Path) -> Option<Claimed> {
+    let head = crate::file::head(path, HEADER_BYTES_MAX).ok()?;
+    let mut words = words(&head).peekable();
+    let header = Header::read(&mut words).ok()?;
+    // A header that ends with these bytes may have been cut in the middle of a number.
+    words.peek()?;
+    let geometry = header.geometry().ok()?;
+    Some(Claimed::raster(geometry, crs_of(path, &geometry).0.geographic))
+}
+
+/// The system of a grid: that of the `.prj` file beside it when there is one.
+fn crs_of(path: &Path, geometry: &Geometry) -> (Crs, Vec<String>) {
+    let projection = crate::file::read_text(&path.with_extension("prj")).ok();
+    projection.as_deref().and_then(named_crs).unwrap_or_else(|| guess_crs(geometry))
 }
 
 fn read_values<'a>(

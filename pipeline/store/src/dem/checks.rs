@@ -1,6 +1,6 @@
 //! Checks that formats share.
 
-use super::raster::{Dem, MAX_CELLS, NO_DATA, Refusal};
+use super::raster::{Dem, MAX_CELLS, NO_DATA, ReadOptions, Refusal, unplaced};
 use sastrugi_numeric::{Geometry, Grid};
 
 /// The checks that every format shares.
@@ -35,6 +35,12 @@ pub(super) fn cell_count(rows: u64, cols: u64) -> Result<usize, Refusal> {
         Refusal::new(format!("claims {rows} rows of {cols} columns; at most {MAX_CELLS} cells can be read"))
     })?;
     usize::try_from(cells).map_err(|_| Refusal::new(format!("{cells} cells do not fit in memory")))
+}
+
+/// Geometry of a raster of a claimed size that does not say where it lies, before anything is decoded; `None` for a size that cannot be held.
+pub(super) fn unplaced_claim(rows: u64, cols: u64, options: &ReadOptions) -> Option<Geometry> {
+    cell_count(rows, cols).ok()?;
+    Some(unplaced(usize::try_from(rows).ok()?, usize::try_from(cols).ok()?, options, &mut Vec::new()))
 }
 
 /// A height that equals the number for no data would be read as no data.

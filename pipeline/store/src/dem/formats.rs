@@ -79,17 +79,20 @@ static CODECS: [Codec; 9] = [
     Codec {
         starts: ascii::looks_like,
         parse: Some(|path, bytes, _| ascii::parse(path, &bytes)),
+        claimed: Some(|path, _, _| ascii::claimed(path)),
         render: Some(|_, grid, crs, _| ascii::render(grid, crs)),
         ..Codec::new(Format::EsriAscii, "esri_ascii", &["asc"])
     },
     Codec {
         parse: Some(|path, bytes, _| hgt::parse(path, &bytes)),
+        claimed: Some(|path, file, _| hgt::claimed(path, &file)),
         render: Some(|path, grid, crs, _| hgt::render(path, grid, crs)),
         ..Codec::new(Format::Hgt, "hgt", &["hgt"])
     },
     Codec {
         starts: npy::looks_like,
         parse: Some(|_, bytes, options| npy::parse(&bytes, options)),
+        claimed: Some(|path, _, options| npy::claimed(path, options)),
         render: Some(|_, grid, _, _| Ok(npy::render(grid))),
         ..Codec::new(Format::Npy, "npy", &["npy"])
     },
@@ -128,6 +131,13 @@ static CODECS: [Codec; 9] = [
 /// The format that a file's first bytes tell.
 pub(super) fn of_start(bytes: &[u8]) -> Option<&'static Codec> {
     CODECS.iter().find(|codec| (codec.starts)(bytes))
+}
+
+/// The format of a file of which only the first bytes are known: by them, or by its name where that format has no such bytes, or longer
+/// ones.
+pub(super) fn of_header(path: &Path, bytes: &[u8]) -> Option<&'static Codec> {
+    let by_name = |codec: &&Codec| matches!(codec.format, Format::EsriAscii | Format::Hgt);
+    of_start(bytes).or_else(|| of_name(path).filter(by_name))
 }
 
 /// The format of a raster: by its first bytes, and by its name where those tell none, or a point cloud.

@@ -45,8 +45,7 @@ pub(super) fn read(path: &Path, options: &ReadOptions) -> Result<Dem, DemError> 
 /// What the header says.
 pub(super) fn claimed(path: &Path, options: &ReadOptions) -> Option<Claimed> {
     let Raster { geometry, info, .. } = Raster::open(path, options, 0).ok()?;
-    let cell_m = (!info.crs.geographic).then(|| geometry.cell[0].min(geometry.cell[1]));
-    Some(Claimed { cells: geometry.len() as u64, points: 0, cell_m })
+    Some(Claimed::raster(geometry, info.crs.geographic))
 }
 
 /// Reads a TIFF that is in memory.

@@ -3,8 +3,9 @@
 
 use super::band::Values;
 use super::crs::Crs;
-use super::raster::{Dem, DemInfo, Format, Refusal};
+use super::raster::{Claimed, Dem, DemInfo, Format, Refusal};
 use sastrugi_numeric::{Geometry, Grid};
+use std::fs::File;
 use std::path::Path;
 
 const VOID: i16 = i16::MIN;
@@ -32,6 +33,13 @@ pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Dem, Refusal> {
         notes: vec![],
     };
     Ok(Dem { grid: Grid::new(geometry, values), info })
+}
+
+/// What name and length of the file say.
+pub(super) fn claimed(path: &Path, file: &File) -> Option<Claimed> {
+    let bytes = file.metadata().ok()?.len();
+    let side = SIDES.into_iter().find(|n| (n * n * 2) as u64 == bytes)?;
+    Some(Claimed::raster(tile(corner(path).ok()?, side), true))
 }
 
 fn tile(corner: [f64; 2], side: usize) -> Geometry {

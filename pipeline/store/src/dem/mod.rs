@@ -40,7 +40,7 @@ pub(crate) use ascii::looks_like as is_grid_text;
 pub(crate) use raster::Refusal;
 
 use crate::atomic::Target;
-use checks::checked;
+use checks::{check_place, checked};
 use formats::READ_FORMATS;
 use points::GridSettings;
 use raster::save;
@@ -125,12 +125,11 @@ pub fn open(path: &Path, options: &ReadOptions) -> Result<BlockReader, DemError>
     }
 }
 
-/// The claims of a GeoTIFF, PNG, LAS or LAZ file; `None` for other formats, whose files have a byte or more for a cell, and
-/// for files that cannot be read.
+/// What a file claims of its size and place; `None` for files whose header cannot be read.
 pub fn claimed(path: &Path, options: &ReadOptions) -> Option<Claimed> {
     let (file, first) = opened(path).ok()?;
-    let claimed = formats::of_start(&first)?.claimed?;
-    claimed(path, file, options)
+    let claim = formats::of_header(path, &first)?.claimed?;
+    claim(path, file, options).filter(|claimed| claimed.geometry.is_none_or(|g| check_place(&g).is_ok()))
 }
 
 /// Writes heights in the format of the name's ending: `.tif` (float32, tiles of 256, no data -9999, PixelIsArea),

@@ -1,10 +1,11 @@
 //! NumPy arrays, versions 1 to 3 (Kern, NumPy Enhancement Proposal 1): two dimensions of real numbers, row 0 north.
 
 use super::band::Values;
-use super::checks::cell_count;
+use super::checks::{cell_count, unplaced_claim};
 use super::crs::Crs;
-use super::raster::{Dem, DemInfo, Format, ReadOptions, Refusal, unplaced};
+use super::raster::{Claimed, Dem, DemInfo, Format, ReadOptions, Refusal, unplaced};
 use sastrugi_numeric::Grid;
+use std::path::Path;
 
 /// True for the first bytes of an array's file.
 pub(super) fn looks_like(bytes: &[u8]) -> bool {
@@ -44,6 +45,19 @@ pub(super) fn parse(bytes: &[u8], options: &ReadOptions) -> Result<Dem, Refusal>
         notes,
     };
     Ok(Dem { grid: Grid::new(geometry, values), info })
+}
+
+/// Most bytes of a header that are looked at for what it claims; NumPy's own have 128.
+const HEADER_BYTES_MAX: u64 = 1 << 16;
+
+/// What the header says.
+pub(super) fn claimed(path: &Path, options: &ReadOptions) -> Option<Claimed> {
+    let head = crate::file::head(path, HEADER_BYTES_MAX).ok()?;
+    let (header, _) = split(&head)?;
+    let (rows, cols) = shape(field(header, "shape")?).ok()?;
+    let cell_m = options.cell_m.map(|[x, y]| x.min(y));
+    let geometry = unplaced_claim(rows, cols, options)?;
+    Some(Claimed { geometry: Some(geometry), ..Claimed::size(geometry.len() as u64, 0, cell_m) })
 }
 
 /// Header text and data.

@@ -1,7 +1,7 @@
 //! Greyscale PNG: heights as 16-bit levels, for game engines and image programs.
 
 use super::band::Values;
-use super::checks::cell_count;
+use super::checks::{cell_count, unplaced_claim};
 use super::crs::Crs;
 use super::raster::{Claimed, Dem, DemError, DemInfo, Format, MAX_CELLS, ReadOptions, Refusal, save, unplaced};
 use crate::atomic::Target;
@@ -62,8 +62,10 @@ pub(super) fn claimed(mut file: File, options: &ReadOptions) -> Option<Claimed> 
     let mut header = [0; 20];
     file.read_exact(&mut header).ok()?;
     let side = |at: usize| Some(u64::from(u32::from_be_bytes(header.get(at..at + 4)?.try_into().ok()?)));
-    let cells = side(12)?.saturating_mul(side(16)?).min(MAX_CELLS);
-    Some(Claimed { cells, points: 0, cell_m: options.cell_m.map(|[x, y]| x.min(y)) })
+    let (cols, rows) = (side(12)?, side(16)?);
+    let cell_m = options.cell_m.map(|[x, y]| x.min(y));
+    let size = Claimed::size(cols.saturating_mul(rows).min(MAX_CELLS), 0, cell_m);
+    Some(Claimed { geometry: unplaced_claim(rows, cols, options), ..size })
 }
 
 /// Writes levels as they are.

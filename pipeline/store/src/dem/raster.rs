@@ -154,6 +154,23 @@ pub struct Claimed {
     pub points: u64,
     /// Smaller side of a cell, m, where the header or the caller says.
     pub cell_m: Option<f64>,
+    /// Shape and place of a raster, in its own units, where the header or the caller says: those that reading it gives.
+    pub geometry: Option<Geometry>,
+    /// True when coordinates are degrees.
+    pub geographic: bool,
+}
+
+impl Claimed {
+    /// A raster whose header says where it lies.
+    pub(super) fn raster(geometry: Geometry, geographic: bool) -> Self {
+        let cell_m = (!geographic).then(|| geometry.cell[0].min(geometry.cell[1]));
+        Self { cells: geometry.len() as u64, points: 0, cell_m, geometry: Some(geometry), geographic }
+    }
+
+    /// A raster or a point cloud of which only the size is known.
+    pub fn size(cells: u64, points: u64, cell_m: Option<f64>) -> Self {
+        Self { cells, points, cell_m, geometry: None, geographic: false }
+    }
 }
 
 /// Compression of a written GeoTIFF.

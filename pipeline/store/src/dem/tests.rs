@@ -353,12 +353,27 @@ fn val_claims() {
         claimed(&path, options)
     };
     let cell_m = Some(grid.geometry.cell[0].min(grid.geometry.cell[1]));
-    assert_eq!(claim("a.tif", &ReadOptions::default()), Some(Claimed { cells: 60 * 27, points: 0, cell_m }));
-    let unsized_png = Some(Claimed { cells: 60 * 27, points: 0, cell_m: None });
-    assert_eq!(claim("a.png", &ReadOptions::default()), unsized_png);
+    let none = ReadOptions::default();
+    for name in ["a.tif", "a.asc"] {
+        let claimed = claim(name, &none).unwrap();
+        let geometry = read(&folder.path().join(name)).unwrap().grid.geometry;
+        assert_eq!((claimed.cells, claimed.points, claimed.geographic), (60 * 27, 0, false), "{name}");
+        assert_eq!((claimed.cell_m, claimed.geometry), (cell_m, Some(geometry)), "{name}");
+    }
+    // Rasters that do not say where they lie have their corner at (0, 0), and cells of the size that the caller knows.
+    for name in ["a.png", "a.npy"] {
+        let claimed = claim(name, &none).unwrap();
+        assert_eq!((claimed.cells, claimed.cell_m), (60 * 27, None), "{name}");
+        let sized = ReadOptions { cell_m: Some([0.5, 0.25]) };
+        let geometry = read_with(&folder.path().join(name), &sized).unwrap().grid.geometry;
+        let claimed = claim(name, &sized).unwrap();
+        assert_eq!((claimed.cell_m, claimed.geometry), (Some(0.25), Some(geometry)), "{name}");
+    }
     std::fs::write(folder.path().join("stub.png"), b"\x89PNG\r\n").unwrap();
     assert_eq!(claimed(&folder.path().join("stub.png"), &ReadOptions::default()), None);
-    assert_eq!(claim("a.npy", &ReadOptions::default()), None);
+    // A number that is cut off is not taken for a shorter one.
+    std::fs::write(folder.path().join("cut.asc"), "ncols 27\nnrows 60\nxllcorner 0\nyllcorner 0\ncellsize 1").unwrap();
+    assert_eq!(claimed(&folder.path().join("cut.asc"), &none), None);
     assert_eq!(claimed(&folder.path().join("none.tif"), &ReadOptions::default()), None);
     if let Some(cloud) = data("pozo_blanca.laz") {
         let claims = claimed(&cloud, &ReadOptions { cell_m: Some([0.5; 2]) }).unwrap();

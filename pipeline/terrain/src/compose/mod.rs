@@ -38,8 +38,9 @@ pub mod trail;
 pub use params::{Compose, Operation, RawCompose, RawProcess, RawRegion};
 
 use crate::generator::{Generator, Input, Line, MAPS, Map, NamedInput, Terrain, TerrainError};
-use params::{Operand, Part, Process, Region, Step};
+use params::{COMMON, Operand, Part, Process, Region, Step};
 use sastrugi_numeric::{Geometry, Grid, Streams, Surface, ops, sums};
+use sastrugi_schemas::ParameterError;
 use serde_json::Value;
 
 /// Name in the registry.
@@ -73,6 +74,19 @@ impl Operand {
         }
     }
 
+    /// Whether inputs of these shapes and places serve on the cells of `geometry`.
+    fn check_places(&self, geometry: &Geometry, places: &[Option<Geometry>]) -> Result<(), ParameterError> {
+        match (self, places) {
+            (Self::Surface(base), [Some(surface)]) => check_reach(surface, geometry)
+                .map_err(|reason| ParameterError::new(&base.key, format!("names \"{}\": it {reason}", base.name))),
+            (Self::Surface(_), _) => Ok(()),
+            (Self::Generator { generator, key }, places) => generator.check_places(places).map_err(|e| {
+                // Size and place are those of the whole.
+                if COMMON.contains(&e.key.as_str()) { e } else { e.within(key) }
+            }),
+        }
+    }
+
     /// The values on the cells of `geometry`; takes its inputs off the front of `inputs`.
     fn values(&self, geometry: &Geometry, streams: &Streams, inputs: &mut &[Input]) -> Result<Terrain, TerrainError> {
         let (own, rest) = inputs.split_at(self.inputs().len().min(inputs.len()));
@@ -85,8 +99,29 @@ impl Operand {
     }
 }
 
+/// How far the centres of cells may lie beyond the outer ones of a surface, cells of it: coordinates are rounded.
+const REACH_TOLERANCE: f64 = 1e-6;
+
+/// Whether a surface reaches all centres of some cells; the reason where it does not.
+fn check_reach(surface: &Geometry, cells: &Geometry) -> Result<(), String> {
+    let [has, needs] = [surface, cells].map(|g| [[g.x(0), g.x(g.cols - 1)], [g.y(g.rows - 1), g.y(0)]]);
+    let reaches = |axis: usize| {
+        let tolerance = REACH_TOLERANCE * surface.cell[axis];
+        needs[axis][0] >= has[axis][0] - tolerance && needs[axis][1] <= has[axis][1] + tolerance
+    };
+    if reaches(0) && reaches(1) {
+        return Ok(());
+    }
+    let ([[x0, x1], [y0, y1]], [[west, east], [south, north]]) = (has, needs);
+    Err(format!(
+        "has the centres of its outer cells at x {x0} to {x1}, y {y0} to {y1} m; the centres of the cells to be made, x {west} to {east}, \
+         y {south} to {north} m, do not lie between them"
+    ))
+}
+
 /// A surface at the centres of other cells.
 fn sampled(base: &NamedInput, surface: &Grid, geometry: &Geometry) -> Result<Grid, TerrainError> {
+    check_reach(&surface.geometry, geometry).map_err(|reason| base.error(reason))?;
     let at = |k: usize| {
         let (x, y) = (geometry.x(k % geometry.cols), geometry.y(k / geometry.cols));
         surface.height(x, y).ok_or_else(|| {
@@ -259,6 +294,16 @@ impl Generator for Compose {
 
     fn inputs(&self) -> Vec<NamedInput> {
         self.processes.iter().flat_map(Process::operands).flat_map(Operand::inputs).collect()
+    }
+
+    fn check_places(&self, places: &[Option<Geometry>]) -> Result<(), ParameterError> {
+        let mut rest = places;
+        for operand in self.processes.iter().flat_map(Process::operands) {
+            let (own, others) = rest.split_at(operand.inputs().len().min(rest.len()));
+            rest = others;
+            operand.check_places(&self.geometry, own)?;
+        }
+        Ok(())
     }
 
     fn generate(&self, streams: &Streams, inputs: &[Input]) -> Result<Terrain, TerrainError> {

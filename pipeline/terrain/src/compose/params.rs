@@ -14,7 +14,7 @@ const DEFAULT_SIZE_PX: [u32; 2] = [512, 512];
 /// Most processes of one surface.
 const PROCESSES_MAX: usize = 64;
 /// Keys that a generator of a process takes from the whole.
-const COMMON: [&str; 4] = ["size_m", "size_px", "cell_m", "origin_m"];
+pub(super) const COMMON: [&str; 4] = ["size_m", "size_px", "cell_m", "origin_m"];
 
 /// Surfaces joined by an ordered list of processes.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]

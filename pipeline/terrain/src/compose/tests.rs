@@ -98,12 +98,42 @@ fn val_a_refined_dem_lies_on_its_posts() {
 fn val_surfaces_must_reach_the_cells() {
     let small = Grid::filled(Geometry::square(10, 10, 0.5), 1.0);
     let error = prepared(json!([{"of": "small"}])).generate(&streams(), &[small.into()]).unwrap_err();
-    assert!(error.to_string().contains("\"small\"") && error.to_string().contains("x = 0.25 m, y = 9.75 m"), "{error}");
+    assert!(
+        error.to_string().contains("\"small\"") && error.to_string().contains("at x 0.25 to 4.75, y 0.25 to 4.75 m"),
+        "{error}"
+    );
     let error = prepared(json!([{"of": "small"}])).generate(&streams(), &[]).unwrap_err();
     assert!(error.to_string().contains("is not there"));
     let flat = Grid::filled(Geometry::square(40, 40, 0.5), 1.0);
     let error = prepared(json!([{"of": "flat"}])).generate_checked(&streams(), &[flat.into()]).unwrap_err();
     assert!(error.to_string().contains("same everywhere"), "{error}");
+}
+
+/// What does not reach the cells is refused before it is read, in the words of the run, by the key that names it; what is not known yet is
+/// left to the run.
+#[test]
+fn val_places_are_checked_before_the_run() {
+    let small = Grid::filled(Geometry::square(10, 10, 0.5), 1.0);
+    let generator = prepared(json!([{"kind": "spheroids"}, {"of": "a"}, {"of": "small"}]));
+    let wide = Geometry::square(40, 40, 0.5);
+    assert_eq!(generator.check_places(&[Some(wide), None]), Ok(()));
+    assert_eq!(generator.check_places(&[]), Ok(()));
+    let error = generator.check_places(&[Some(wide), Some(small.geometry)]).unwrap_err();
+    assert_eq!(error.key, "processes.2.of");
+    let at_run = generator.generate(&streams(), &[Grid::filled(wide, 1.0).into(), small.into()]).unwrap_err();
+    let reason = at_run.to_string().split_once("it has").unwrap().1.to_owned();
+    assert!(
+        reason.contains("x 0.25 to 4.75, y 0.25 to 4.75 m") && error.message.ends_with(&reason),
+        "{error} {at_run}"
+    );
+    // The origin of an elaborated DEM is that of the whole.
+    let inner = prepared(json!([{"kind": "elaborate", "parameters": {"dem": "b"}}]));
+    let error =
+        inner.check_places(&[Some(Geometry { origin: [3.0, 0.0], ..Geometry::square(20, 20, 5.0) })]).unwrap_err();
+    assert_eq!(error.key, "origin_m");
+    // To the rounding of coordinates.
+    let exact = Geometry { origin: [1e-9, -1e-9], ..Geometry::square(20, 30, 0.5) };
+    assert_eq!(prepared(json!([{"of": "a"}])).check_places(&[Some(exact)]), Ok(()));
 }
 
 #[test]

@@ -53,12 +53,13 @@ pub use params::{Elaborate, RawElaborate};
 pub use windows::Elaborated;
 
 use crate::generator::{Generator, Input, Map, NamedInput, Terrain, TerrainError};
-use crate::planetary::{self, Assembly, Patch, Potential, RawProcess, Request, Window, World};
+use crate::planetary::{self, Assembly, Patch, Potential, RawProcess, Request, Window, Work, World};
 use altimetry::{AltimetryError, Correction, Points, Posts};
 use background::Background;
 use bounds::Bound;
 use rayon::prelude::*;
 use sastrugi_numeric::{Counter, Geometry, Grid, Streams};
+use sastrugi_schemas::ParameterError;
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -101,6 +102,18 @@ enum DemError {
     NoAlbedo { albedo: f64, x: f64, y: f64 },
     #[error("cannot hold the surface: {0}")]
     Altimetry(AltimetryError),
+}
+
+impl DemError {
+    /// The parameter that decides what is wrong with an input; `input` is the one that names it.
+    fn key<'a>(&self, input: &'a str) -> &'a str {
+        match self {
+            Self::Outside { .. } => "origin_m",
+            Self::NotFiner { .. } => "cell_m",
+            Self::Shows { .. } => "processes",
+            _ => input,
+        }
+    }
 }
 
 /// Columns and rows (from the south) of posts.
@@ -244,6 +257,16 @@ impl Elaborate {
                 Err(name.failed(&DemError::NoAlbedo { albedo, x, y }))
             }
         }
+    }
+
+    /// Whether a DEM or an albedo of some shape and place can be used.
+    fn check_place(&self, name: &NamedInput, g: &Geometry) -> Result<(), DemError> {
+        self.check_size(g)?;
+        self.posts(g, 0.0)?;
+        if *name == self.dem() {
+            self.bounded(g.cell[0].min(g.cell[1]))?;
+        }
+        Ok(())
     }
 
     /// Whether a raster has enough posts, and farther apart than the samples.
@@ -550,7 +573,7 @@ impl Generator for Elaborate {
     }
 
     fn seconds(&self) -> f64 {
-        planetary::seconds(self.window.len(), self.work.visits)
+        planetary::seconds(self.window.len(), &Work { is_textured: self.raw.texture, ..self.work })
     }
 
     fn notes(&self) -> Vec<String> {
@@ -560,6 +583,19 @@ impl Generator for Elaborate {
     fn inputs(&self) -> Vec<NamedInput> {
         let rasters = [Some(self.dem()), self.albedo(), planetary::potential_input(&self.raw.processes)];
         rasters.into_iter().flatten().chain(self.altimetry()).collect()
+    }
+
+    fn check_places(&self, places: &[Option<Geometry>]) -> Result<(), ParameterError> {
+        for (name, place) in self.inputs().iter().zip(places) {
+            let Some(g) = place.filter(|_| *name == self.dem() || Some(name) == self.albedo().as_ref()) else {
+                continue;
+            };
+            self.check_place(name, &g).map_err(|error| {
+                let message = format!("does not go with \"{}\": it {error}", name.name);
+                ParameterError::new(error.key(&name.key), message)
+            })?;
+        }
+        Ok(())
     }
 
     fn generate(&self, streams: &Streams, inputs: &[Input]) -> Result<Terrain, TerrainError> {

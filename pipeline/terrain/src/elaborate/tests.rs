@@ -168,6 +168,19 @@ fn val_unusable_dems_are_refused() {
     ] {
         assert!(refusal(params.clone(), &dem).contains(words), "{params}: {}", refusal(params.clone(), &dem));
     }
+    for (params, key) in [
+        (with(json!({"origin_m": [99.0, 205.0]})), "origin_m"),
+        (with(json!({"size_px": [400, 60]})), "origin_m"),
+        (with(json!({"cell_m": 1.28})), "cell_m"),
+        (with(json!({"processes": [{"kind": "primary_craters", "diameter_min_m": 3.0}]})), "processes"),
+    ] {
+        // Before the run, in the words of the run.
+        let refused = elaborate(params.clone()).check_places(&[Some(dem.geometry)]).unwrap_err();
+        let reason = refusal(params.clone(), &dem).split_once("it has").unwrap().1.to_owned();
+        assert!(refused.key == key && refused.message.ends_with(&reason), "{params}: {refused}");
+        assert_eq!(elaborate(params).check_places(&[None]), Ok(()));
+    }
+    assert_eq!(elaborate(inside.clone()).check_places(&[Some(dem.geometry)]), Ok(()));
     assert!(refusal(inside.clone(), &site(3, 20, [1.28, 1.28])).contains("at least 4 x 4"));
     let mut holed = dem.clone();
     holed.values[14 * 20 + 6] = f64::NAN;

@@ -63,10 +63,21 @@ use serde_json::Value;
 /// Name in the registry.
 pub const KIND: &str = "planetary";
 
-/// Rough time of a sample, s.
+/// Most time of a sample that a request is expected to take, s.
 const SECONDS_PER_SAMPLE: f64 = 4e-7;
-/// Rough time of a crater or rock that a tile looks at, s: 4e-7 to 1.1e-6 in the zooms of `jpl_planetary.toml`.
+/// The same of a crater or rock that a tile looks at, s: 4e-7 to 1.1e-6 in the zooms of `jpl_planetary.toml`.
 const SECONDS_PER_VISIT: f64 = 7e-7;
+/// Rough time of a sample by itself, s.
+const SECONDS_PER_OWN_SAMPLE: f64 = 2e-7;
+/// Rough time of a place where a crater or rock may be, s.
+const SECONDS_PER_PLACE: f64 = 7e-8;
+/// Rough time of setting a rock on textured ground, s: among samples that lie close to each other, and between samples that lie farther apart than
+/// the rock is wide.
+const SECONDS_PER_ROCK: [f64; 2] = [5e-6, 1.1e-5];
+/// The same on ground without texture, s.
+const SECONDS_PER_ROCK_ON_PLAIN: [f64; 2] = [5e-7, 5e-7];
+/// Rough time of a crater and of the ground under it, s.
+const SECONDS_PER_CRATER: f64 = 1.5e-4;
 /// Samples along the side of a tile.
 const TILE: usize = 256;
 /// Working memory of a tile for a sample of it: the patch, heights on the way, and what two levels of a texture need.
@@ -81,7 +92,8 @@ const TILES_AT_WORK: usize = 64;
 impl World {
     /// Rough time of [`World::patch_for`] on one core, s.
     pub fn expected_seconds(&self, request: &Request<'_>) -> f64 {
-        seconds(request.window.len(), self.expected_visits(&request.window, request.feature_min_m))
+        let visits = self.expected_visits(&request.window, request.feature_min_m);
+        SECONDS_PER_SAMPLE * request.window.len() as f64 + SECONDS_PER_VISIT * visits
     }
 
     /// A patch, made in tiles side by side.
@@ -135,9 +147,15 @@ fn widest_tile(window: &Window) -> Window {
     Window { cols: window.cols.min(TILE), rows: window.rows.min(TILE), ..*window }
 }
 
-/// Rough time of a patch on one core, s.
-pub(crate) fn seconds(samples: usize, visits: f64) -> f64 {
-    SECONDS_PER_SAMPLE * samples as f64 + SECONDS_PER_VISIT * visits
+/// Rough time of a window of so many samples on one core, s: samples, and again those under rocks; places where craters and rocks are looked for;
+/// the ground under each rock that is set and under each crater, which is made for its sake where it is not that of a sample.
+pub(crate) fn seconds(samples: usize, work: &Work) -> f64 {
+    let rocks = if work.is_textured { SECONDS_PER_ROCK } else { SECONDS_PER_ROCK_ON_PLAIN };
+    let set: f64 = work.rocks_set.iter().zip(rocks).map(|(count, each)| each * count).sum();
+    SECONDS_PER_OWN_SAMPLE * samples as f64 * (1.0 + work.under_rocks)
+        + SECONDS_PER_PLACE * work.visits
+        + set
+        + SECONDS_PER_CRATER * work.craters
 }
 
 /// Peak memory of making a patch and of its grids, bytes.
@@ -197,7 +215,7 @@ impl Generator for Planetary {
     }
 
     fn seconds(&self) -> f64 {
-        seconds(self.window.len(), self.work.visits)
+        seconds(self.window.len(), &self.work)
     }
 
     fn notes(&self) -> Vec<String> {

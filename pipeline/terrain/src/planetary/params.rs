@@ -220,6 +220,14 @@ pub struct Work {
     pub tile_objects: f64,
     /// Craters and rocks to look at, and places to look for them, in all tiles.
     pub visits: f64,
+    /// Craters that all tiles are expected to meet.
+    pub craters: f64,
+    /// Rocks that are set in all tiles: among samples that lie close to each other, and between others.
+    pub rocks_set: [f64; 2],
+    /// Samples under rocks for each sample of the window, as often as rocks overlap.
+    pub under_rocks: f64,
+    /// Whether the ground has a texture.
+    pub is_textured: bool,
 }
 
 /// What a window of a world of some processes asks for.
@@ -237,7 +245,16 @@ pub fn window_in_reach(processes: &[RawProcess], spacing_m: f64, window: &Window
     let tile = widest_tile(window);
     let visits = world.expected_visits(&tile, 0.0) * tiles(window) as f64;
     if visits <= OBJECTS_MAX {
-        return Ok(Work { tile_objects: world.expected_objects(&tile), visits });
+        let is_textured = processes.iter().any(|process| matches!(process, RawProcess::Texture(_)));
+        let of_all = |of_tile: f64| of_tile * tiles(window) as f64;
+        return Ok(Work {
+            tile_objects: world.expected_objects(&tile),
+            visits,
+            craters: of_all(world.expected_craters(&tile)),
+            rocks_set: world.expected_rocks(&tile).map(of_all),
+            under_rocks: world.rock_layers(),
+            is_textured,
+        });
     }
     let message = format!(
         "stand for {visits:.1e} craters and rocks that the surface would have to look at; the most is {OBJECTS_MAX:.1e}: \

@@ -341,6 +341,22 @@ impl Rocks {
         wide.map(|bin| (1.0 + bin.mean) * window.diamonds(bin.zoom, self.bin_reach(bin))).sum()
     }
 
+    /// Expected number of rocks that stay and lie under points of a window: of bins whose rocks are as wide as its points lie apart, and of others.
+    pub fn set(&self, window: &Window) -> [f64; 2] {
+        /// Share of the square about the widest rock of a bin that one of its rocks covers.
+        const UNDER_A_ROCK: f64 = 0.25;
+        let stays = (self.parameters.coverage / COVERAGE_MAX).min(1.0);
+        self.bins.iter().fold([0.0; 2], |[close, apart], bin| {
+            let axis = Self::widest_axis(bin);
+            let count = stays * bin.mean * window.ground(bin.zoom, axis);
+            if spacing(window.zoom) > 2.0 * axis + 1.0 {
+                [close, apart + UNDER_A_ROCK * count]
+            } else {
+                [close + count, apart]
+            }
+        })
+    }
+
     /// Expected number of rocks found for a window, were each as wide as the widest of its bin and did all candidates stay.
     pub fn held(&self, window: &Window) -> f64 {
         self.bins.iter().map(|bin| bin.mean * window.ground(bin.zoom, Self::widest_axis(bin))).sum()

@@ -155,6 +155,25 @@ impl World {
         self.populations().map(|p| p.held(&near)).sum::<f64>() + rocks
     }
 
+    /// Expected number of craters that a patch meets, not below the true one.
+    pub fn expected_craters(&self, window: &Window) -> f64 {
+        let near = self.near(window);
+        self.populations().map(|p| p.held(&near)).sum()
+    }
+
+    /// Expected number of rocks that are set in a patch: among samples that lie close to each other, and between others.
+    pub fn expected_rocks(&self, window: &Window) -> [f64; 2] {
+        self.rocks.as_ref().map_or([0.0; 2], |(rocks, _)| rocks.set(window))
+    }
+
+    /// How many rocks lie over a point on average, and the ground about them that is looked at with them.
+    pub fn rock_layers(&self) -> f64 {
+        /// Rectangle about an ellipse of any direction over the ellipse.
+        const RECTANGLE: f64 = 1.6;
+        let coverage = self.rocks.as_ref().map_or(0.0, |(rocks, _)| rocks.parameters().coverage);
+        -RECTANGLE * libm::log1p(-coverage)
+    }
+
     /// Expected number of craters and rocks wider than `feature_min_m` that a patch draws, and of the places where it looks for them; time
     /// goes with it and with the number of points.
     pub fn expected_visits(&self, window: &Window, feature_min_m: f64) -> f64 {

@@ -43,6 +43,11 @@ use std::f64::consts::PI;
 /// Name in the registry.
 pub const KIND: &str = "weierstrass_mandelbrot";
 
+/// Rough time of a cell: its share of the transform, s.
+const SECONDS_PER_CELL: f64 = 1e-7;
+/// Rough time of a wave that is spread over the spectrum, s.
+const SECONDS_PER_WAVE: f64 = 1e-6;
+
 /// Relief below this share of the summed amplitudes is too near to the transform's error of 1e-12 of them.
 const RELIEF_SHARE_MIN: f64 = 1e-7;
 
@@ -128,6 +133,11 @@ impl Generator for WeierstrassMandelbrot {
     fn memory_bytes(&self) -> u64 {
         let waves = u64::from(self.frequencies) * u64::from(self.raw.ridges) + 1;
         plane_waves::memory_bytes(&self.size.geometry(), waves)
+    }
+
+    fn seconds(&self) -> f64 {
+        SECONDS_PER_CELL * self.size.cells() as f64
+            + SECONDS_PER_WAVE * f64::from(self.frequencies) * f64::from(self.raw.ridges)
     }
 
     fn notes(&self) -> Vec<String> {

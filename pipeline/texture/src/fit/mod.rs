@@ -23,6 +23,7 @@
 mod block_places;
 mod carried;
 pub(crate) mod case;
+mod cost;
 mod error;
 pub(crate) mod estimator;
 pub(crate) mod expectation;

@@ -215,6 +215,11 @@ impl FitSettings {
         FitParameters { min_valid_share: Some(self.min_valid_share), ..self.parameters.clone() }
     }
 
+    /// Whether the fit stores the measured covariance, for textures.
+    pub fn is_empirical(&self) -> bool {
+        self.empirical
+    }
+
     pub(super) fn mode(&self) -> Mode {
         self.parameters.mode
     }

@@ -9,7 +9,7 @@ use crate::covariance::{Covariance, Form};
 use std::f64::consts::PI;
 
 /// Largest range the search may reach, in windows.
-const RANGE_MAX_WINDOWS: f64 = 20.0;
+pub const RANGE_MAX_WINDOWS: f64 = 20.0;
 /// Largest nugget, in variances of the data.
 const NUGGET_MAX: f64 = 2.0;
 /// Largest `ln(1 / ratio)`.

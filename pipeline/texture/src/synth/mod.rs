@@ -41,11 +41,32 @@ pub trait Method: Send + Sync {
     /// What a texture takes, as far as that is known without the covariance.
     fn cost(&self) -> Cost;
 
+    /// The same with the most memory that any result of a fit asks for.
+    fn cost_of(&self, prospect: &Prospect) -> Cost;
+
+    /// Refuses what [`Self::bind`] would refuse of a fit with a covariance that was measured on cells of that size, east-west and
+    /// north-south, m.
+    ///
+    /// # Errors
+    /// A method that makes covariances of models only; cells that are no whole multiples of the measured ones.
+    fn check_measured(&self, measured_m: [f64; 2]) -> Result<(), ParameterError>;
+
     /// The texture that matches a fit.
     ///
     /// # Errors
     /// A fit without a covariance, or one that the method cannot make on this tile.
     fn bind(&self, fit: &FitFile) -> Result<Box<dyn Synthesis>, ParameterError>;
+}
+
+/// What is known of a fit before it is made.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Prospect {
+    /// Side of a torus that holds its covariance, whatever that will be, m.
+    pub torus_m: f64,
+    /// Cells of what is fitted, east-west and north-south, m.
+    pub cell_m: Option<[f64; 2]>,
+    /// Whether the measured covariance is stored.
+    pub is_measured: bool,
 }
 
 /// What a texture takes.
@@ -152,8 +173,6 @@ pub enum SynthesisError {
 pub trait MethodParameters: DeserializeOwned + Serialize + JsonSchema + Clone + Send + Sync + 'static {
     /// Its name.
     const NAME: &'static str;
-    /// Whether it makes measured covariances, besides those of models.
-    const MAKES_MEASURED: bool = false;
     /// What makes a tile.
     type Kernel: Kernel + 'static;
 
@@ -166,8 +185,22 @@ pub trait MethodParameters: DeserializeOwned + Serialize + JsonSchema + Clone + 
     /// Parameters out of range.
     fn check(&self, tile: &Tile) -> Result<(), ParameterError>;
 
+    /// Refuses a covariance that was measured on cells of that size, where it cannot be made.
+    ///
+    /// # Errors
+    /// A method that makes covariances of models only; cells that do not go with the measured ones.
+    fn check_measured(&self, _tile: &Tile, _measured_m: [f64; 2]) -> Result<(), ParameterError> {
+        let message = format!("is `{}`; an empirical covariance is made by `fft_ma` only", Self::NAME);
+        Err(ParameterError::new("method", message))
+    }
+
     /// What a tile takes, as far as that is known without the covariance.
     fn cost(&self, tile: &Tile) -> Cost;
+
+    /// The same with the most memory that any result of a fit asks for.
+    fn cost_of(&self, tile: &Tile, _prospect: &Prospect) -> Cost {
+        self.cost(tile)
+    }
 
     /// The method for one tile of `wanted`, which is the covariance of `fitted` with the anisotropy of the tile.
     ///
@@ -299,11 +332,19 @@ impl<P: MethodParameters> Method for Checked<P> {
         self.tile.repeated_cost(self.own.cost(&self.tile))
     }
 
+    fn cost_of(&self, prospect: &Prospect) -> Cost {
+        self.tile.repeated_cost(self.own.cost_of(&self.tile, prospect))
+    }
+
+    fn check_measured(&self, measured_m: [f64; 2]) -> Result<(), ParameterError> {
+        self.own.check_measured(&self.tile, measured_m)
+    }
+
     fn bind(&self, fit: &FitFile) -> Result<Box<dyn Synthesis>, ParameterError> {
         let wanted = Wanted::of_fit(fit)?;
-        if wanted.map.is_some() && !P::MAKES_MEASURED {
-            let message = format!("is `{}`; an empirical covariance is made by `fft_ma` only", P::NAME);
-            return Err(ParameterError::new("method", message));
+        if wanted.map.is_some() {
+            // That its cells are missing is found where they are needed.
+            self.check_measured(wanted.cell_m.unwrap_or(self.tile.geometry.cell))?;
         }
         Ok(Box::new(Texture::new(&self.tile, &self.own, wanted)?))
     }

@@ -167,7 +167,7 @@ impl Job for StraightJob {
     }
 
     fn estimate(&self) -> Estimate {
-        Estimate { seconds: 0.02, bytes: 200.0 * self.settings.count() as f64 }
+        Estimate { seconds: 0.03, bytes: 200.0 * self.settings.count() as f64 }
     }
 
     fn run(&self, work: &Work<'_>) -> Result<Outcome, JobError> {

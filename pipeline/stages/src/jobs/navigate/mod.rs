@@ -368,7 +368,7 @@ impl Job for NavigateJob {
     fn estimate(&self) -> Estimate {
         let runs = self.routes.count as f64 * f64::from(self.lead.count);
         let across = (self.field.cells as f64).sqrt();
-        Estimate { seconds: 3e-7 * self.field.cells as f64 + 2e-4 * across * runs, bytes: 2e3 * across * runs }
+        Estimate { seconds: 2e-7 * self.field.cells as f64 + 2e-4 * across * runs, bytes: 2e3 * across * runs }
     }
 
     fn run(&self, work: &Work<'_>) -> Result<Outcome, JobError> {

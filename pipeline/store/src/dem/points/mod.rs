@@ -103,7 +103,7 @@ pub(super) fn claimed(mut file: File, cell_m: Option<f64>) -> Option<Claimed> {
         None => points as f64 / 0.75,
     };
     // An extent that is no number is found out when the cloud is read.
-    Some(Claimed { cells: (cells as u64).min(MAX_CELLS), points, cell_m })
+    Some(Claimed::size((cells as u64).min(MAX_CELLS), points, cell_m))
 }
 
 /// True for the first bytes of a point cloud.

@@ -55,18 +55,9 @@ impl Aim {
                 "is missing from the fit file; an empirical covariance needs it",
             ));
         };
-        let ratio = [1, 0].map(|k| cell_m[k] / measured_m[k]);
-        let times = ratio.map(|r| r.round().max(1.0));
-        if [0, 1].iter().any(|&k| (ratio[k] / times[k] - 1.0).abs() > MULTIPLE_TOLERANCE) {
-            let message = format!(
-                "is {} x {} m; cells must be whole multiples of the measured covariance's, {} x {} m",
-                cell_m[0], cell_m[1], measured_m[0], measured_m[1]
-            );
-            return Err(ParameterError::new("cell_m", message));
-        }
+        let times = multiples(cell_m, measured_m)?;
         let needs_window = map.base != "surface" || purpose == Purpose::Residual;
         let window = if needs_window { window_at(measured_m)? } else { BoxWindow { half: [0, 0] } };
-        let times = times.map(|t| t as usize);
         Ok(Some(Self::Empirical { map: map.clone(), window, purpose, times }))
     }
 
@@ -123,6 +114,29 @@ impl Aim {
             }
         }
     }
+}
+
+/// How many cells no larger than a fit's one of a texture's takes, for the spectrum of a residual or of a measured covariance.
+pub fn finest(cell_m: [f64; 2], fitted_m: [f64; 2]) -> u64 {
+    let times = |k: usize| (cell_m[k] / fitted_m[k] * (1.0 - MULTIPLE_TOLERANCE)).ceil().max(1.0) as u64;
+    times(0).saturating_mul(times(1))
+}
+
+/// How many cells of a measured covariance make one of a texture, north-south and east-west.
+///
+/// # Errors
+/// Cells that are no whole multiples of the measured ones.
+pub fn multiples(cell_m: [f64; 2], measured_m: [f64; 2]) -> Result<[usize; 2], ParameterError> {
+    let ratio = [1, 0].map(|k| cell_m[k] / measured_m[k]);
+    let times = ratio.map(|r| r.round().max(1.0));
+    if [0, 1].iter().any(|&k| (ratio[k] / times[k] - 1.0).abs() > MULTIPLE_TOLERANCE) {
+        let message = format!(
+            "is {} x {} m; cells must be whole multiples of the measured covariance's, {} x {} m",
+            cell_m[0], cell_m[1], measured_m[0], measured_m[1]
+        );
+        return Err(ParameterError::new("cell_m", message));
+    }
+    Ok(times.map(|t| t as usize))
 }
 
 /// Cells of which `times` (north-south and east-west) make one.

@@ -37,7 +37,7 @@ mod aim;
 mod spectrum;
 
 use super::tile::{self, CELLS_MAX, Tile, TileParameters};
-use super::{Cost, Kernel, Made, MethodParameters, SynthesisError, Texture, Wanted, reach};
+use super::{Cost, Kernel, Made, MethodParameters, Prospect, SynthesisError, Texture, Wanted, reach};
 use crate::covariance::Covariance;
 use crate::covariance::empirical::Purpose;
 use aim::Aim;
@@ -60,6 +60,9 @@ const BYTES_PER_CELL: u64 = 18;
 
 /// The same while the spectrum of a residual or of a measured covariance is made.
 const AIM_BYTES_PER_CELL: u64 = 40;
+
+/// Transforms and roots of a texture with such a spectrum, over those of another.
+const AIM_SPECTRA: f64 = 3.0;
 
 /// Random part of the spectrum.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -153,7 +156,6 @@ pub fn texture(
 
 impl MethodParameters for FftMaParameters {
     const NAME: &'static str = "fft_ma";
-    const MAKES_MEASURED: bool = true;
     type Kernel = FftMa;
 
     fn is_periodic(&self) -> bool {
@@ -182,6 +184,33 @@ impl MethodParameters for FftMaParameters {
         let [rows, cols] = self.torus_of_any(tile);
         // As for a measured covariance or a residual, which takes most.
         cost(rows * cols, tile.geometry.len(), 1)
+    }
+
+    fn cost_of(&self, tile: &Tile, prospect: &Prospect) -> Cost {
+        let (least, [rows, cols]) = (self.cost(tile), self.torus_of_any(tile));
+        let cell_m = tile.geometry.cell;
+        let aims = prospect.is_measured || self.covariance == CovarianceOf::Residual;
+        let memory_bytes = if aims {
+            let oversampling = prospect.cell_m.map_or(1, |fitted_m| aim::finest(cell_m, fitted_m));
+            // More is refused.
+            let most = (CELLS_MAX / (rows * cols).max(1) as u64).max(1);
+            cost(rows * cols, tile.geometry.len(), oversampling.min(most)).memory_bytes
+        } else if self.periodic {
+            least.memory_bytes
+        } else {
+            let side = |n: usize, cell_m: f64| (prospect.torus_m / cell_m).ceil().max(n as f64);
+            // A larger one is refused.
+            let cells = (side(rows, cell_m[1]) * side(cols, cell_m[0])).min(CELLS_MAX as f64);
+            cost(cells as usize, tile.geometry.len(), 0).memory_bytes
+        };
+        // Time is that of the usual range, which is shorter; the spectrum of a residual or of a measured covariance is filtered, and made again for
+        // the notes.
+        let operations = if aims { AIM_SPECTRA * least.operations } else { least.operations };
+        Cost { memory_bytes: memory_bytes.max(least.memory_bytes), operations }
+    }
+
+    fn check_measured(&self, tile: &Tile, measured_m: [f64; 2]) -> Result<(), ParameterError> {
+        aim::multiples(tile.geometry.cell, measured_m).map(drop)
     }
 
     /// Refuses Eq. 10 of a covariance that is no isotropic exponential, a residual of a fit without a window, and cells that are no
