@@ -1,5 +1,5 @@
-//! Files: DEM formats, point clouds, masks, transects, altimetry, GeoJSON, pictures, opening and atomic writes, Parquet tables, MCAP recordings, and the release folder
-//! with its checksums.
+//! Files: DEM formats, point clouds, masks, transects, altimetry, GeoJSON, pictures, vehicles as MJCF and URDF, opening and atomic writes,
+//! Parquet tables, MCAP recordings, and the release folder with its checksums.
 //!
 //! The only room that names `arrow`, `parquet`, `mcap`, `foxglove`, `prost`, `geotiff-*`, `tiff`, `png`, `las` and `tar`. Nothing
 //! here computes: heights, rows and recordings come in and go out as they are. Only point clouds are gridded
@@ -18,6 +18,7 @@ pub mod file;
 pub mod geojson;
 pub mod mask;
 pub mod mcap;
+pub mod mechanism;
 pub mod parquet;
 pub mod picture;
 pub mod release;
