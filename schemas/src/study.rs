@@ -207,7 +207,8 @@ pub struct TerrainItem {
     /// Also write a 16-bit PNG of the heights.
     #[serde(default)]
     pub png16: bool,
-    /// Also write folders to import into simulators, `export/<id>/<simulator>/`.
+    /// Also write folders to import into simulators, `export/<id>/<simulator>/`, and the vehicles that drive there as MJCF and URDF,
+    /// `export/vehicle/<traverse id>.xml` and `.urdf`.
     #[serde(default)]
     pub exports: BTreeSet<Simulator>,
 }

@@ -134,6 +134,8 @@ pub struct Builder<'a> {
     pub study: &'a Study,
     /// Heightfields by id.
     pub heightfields: BTreeMap<String, Heightfield>,
+    /// Ids of heightfields that are exported for simulators.
+    pub exported: BTreeSet<String>,
     /// Ids that an id in the study stands for (its replicates and sweeps).
     pub families: BTreeMap<String, Vec<String>>,
     /// Ids of fits.
@@ -172,6 +174,7 @@ impl<'a> Builder<'a> {
         Self {
             study,
             heightfields: BTreeMap::new(),
+            exported: BTreeSet::new(),
             families: BTreeMap::new(),
             fits: Vec::new(),
             missions: BTreeMap::new(),

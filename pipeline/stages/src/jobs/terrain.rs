@@ -84,6 +84,9 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
         let node =
             Node { item: field.item.clone(), parents, inputs: Vec::new(), stream: field.stream(), job: Box::new(job) };
         builder.node(node)?;
+        if !item.exports.is_empty() {
+            builder.exported.insert(one.id.clone());
+        }
         builder.heightfields.insert(one.id, field);
     }
     Ok(())
