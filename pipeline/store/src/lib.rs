@@ -3,7 +3,7 @@
 //!
 //! The only room that names `arrow`, `parquet`, `mcap`, `foxglove`, `prost`, `geotiff-*`, `tiff`, `png`, `las` and `tar`. Nothing
 //! here computes: heights, rows and recordings come in and go out as they are. Only point clouds are gridded
-//! ([`dem::points`]), polygons made masks ([`mask`]), and heights laid on the posts that a simulator takes ([`dem::simulators`]).
+//! ([`dem::points`]), polygons made masks ([`mask`]), meshes decimated ([`dem::decimate`]), and heights laid on the posts that a simulator takes ([`dem::simulators`]).
 //!
 //! * Same input, same bytes, on any x86-64 CPU and for any number of threads.
 //! * A file appears under its name only when it is complete and on disk ([`atomic`]).

@@ -59,7 +59,7 @@ impl Exports {
         let heights = heights.as_stored();
         for simulator in self.simulators() {
             let name = simulator.name();
-            let export = simulators::export(&heights, simulator, Fit::Resample).map_err(JobError::new)?;
+            let export = simulators::export(&heights, simulator, Fit::Resample, None).map_err(JobError::new)?;
             for (file, bytes) in &export.files {
                 let own = format!("{name}.{file}");
                 work.write(&own, bytes)?;
