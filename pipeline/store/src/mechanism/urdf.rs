@@ -22,7 +22,8 @@ pub(super) fn render(mechanism: &Mechanism) -> String {
         let _ = writeln!(text, "  {line}");
     }
     text.push_str(
-        "  URDF has no springs and no rolling resistance: comments state them. Friction stands in gazebo elements.\n",
+        "  URDF has no springs and no rolling resistance: comments state them. Friction stands in gazebo elements.\n  \
+         base_link moves freely. Wheels may reach into the box of the chassis: switch collisions within the vehicle off.\n",
     );
     if !mechanism.couplings.is_empty() {
         text.push_str(
