@@ -211,6 +211,10 @@ pub struct TerrainItem {
     /// `export/vehicle/<traverse id>.xml` and `.urdf`.
     #[serde(default)]
     pub exports: BTreeSet<Simulator>,
+    /// Decimate the meshes of the exports (`gazebo`, `isaac`): no post is farther from them than this, vertically, m. Not decimated
+    /// when absent.
+    #[serde(default)]
+    pub export_max_error_m: Option<f64>,
 }
 
 /// Program into which a terrain can be imported.

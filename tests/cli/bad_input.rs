@@ -104,6 +104,12 @@ fn val_exports_are_refused() {
 /// Options of meshes for what holds none, limits that make no sense, and vehicles that are not known.
 #[test]
 fn val_vehicles_and_decimations_are_refused() {
+    study_refused("count = 2", "exports = [\"unity\"]\nexport_max_error_m = 0.1", &["export_max_error_m", "isaac"]);
+    study_refused(
+        "count = 2",
+        "exports = [\"isaac\"]\nexport_max_error_m = -0.1",
+        &["is -0.1; it must be a finite number"],
+    );
     let folder = area();
     let path = folder.path();
     write(path, "a.asc", "ncols 2\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 1\n1 2\n3 5\n");

@@ -491,6 +491,16 @@ fn val_meshes_are_decimated_on_request() {
     let import = std::fs::read_to_string(path.join("isaac/import.json")).unwrap();
     let import: Value = serde_json::from_str(&import).unwrap();
     assert_eq!(import["settings"]["decimation"], coarse);
+    // In a study, of the same heights.
+    let study = "[study]\nname = \"out\"\nseed = 5\ndate = \"2026-01-01\"\n\n[[terrain]]\nid = \"t\"\nkind = \"multifractal\"\n\
+        seed = 3\nsize_px = [90, 70]\nexports = [\"isaac\", \"mujoco\"]\nexport_max_error_m = 0.1\n";
+    write(path, "study.toml", study);
+    ok(path, &["run", "study.toml", "-o", "release", "--quiet"]);
+    for name in ["import.json", "terrain.usda"] {
+        let [verb, item] =
+            ["isaac", "release/export/t/isaac"].map(|folder| std::fs::read(path.join(folder).join(name)).unwrap());
+        assert!(verb == item, "{name}");
+    }
 }
 
 #[test]

@@ -19,7 +19,8 @@
 //! * *Exact.* The triangulation is Delaunay in columns and rows, whatever the shape of the cells, by integer arithmetic.
 //! * *The error is recomputed* over all posts when the triangulation is finished.
 //!
-//! Cost: about `n log n` for `n` posts on terrain, at worst `n` times the number of vertices; 60 bytes a post.
+//! Cost: about `n log n` for `n` posts on terrain, at worst `n` times the number of vertices; up to 400 bytes a post
+//! where none can be left out.
 //! Not for surfaces whose small-scale roughness matters, as it does to wheels: that is what it takes away.
 
 mod delaunay;

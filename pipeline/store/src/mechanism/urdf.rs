@@ -63,7 +63,7 @@ fn hang(text: &mut String, mechanism: &Mechanism, parent: &str, child: &Link) {
         } else {
             link(text, &name, &Mass::carrier(child), None);
         }
-        joint(text, mechanism, one, [&above, &name], &origin);
+        joint(text, mechanism, one, [above.as_str(), name.as_str()], &origin);
         above = name;
         origin = [0.0; 3];
     }
@@ -122,7 +122,7 @@ fn geometry(shape: &Shape) -> String {
     format!("      <origin xyz=\"{origin}\" rpy=\"{turn}\"/>\n      <geometry>{solid}</geometry>\n")
 }
 
-fn joint(text: &mut String, mechanism: &Mechanism, joint: &Joint, [parent, child]: [&String; 2], origin: &[f64; 3]) {
+fn joint(text: &mut String, mechanism: &Mechanism, joint: &Joint, [parent, child]: [&str; 2], origin: &[f64; 3]) {
     let kind = match (joint.motion, joint.range) {
         (Motion::SlideZ, _) => "prismatic",
         (_, Some(_)) => "revolute",
