@@ -1,5 +1,5 @@
 //! What crosses a boundary: the study envelope, parameter errors and kinds, rows of every Parquet table, the fit file,
-//! the manifest, MCAP topics and roughness classes. No algorithms, no file formats.
+//! the manifest, MCAP topics, vehicles as bodies on joints, and roughness classes. No algorithms, no file formats.
 
 pub mod answer;
 pub mod class;
@@ -8,6 +8,7 @@ pub mod fit;
 pub mod kind;
 pub mod log;
 pub mod manifest;
+pub mod mechanism;
 pub mod study;
 pub mod tables;
 pub mod topics;

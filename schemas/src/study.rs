@@ -264,9 +264,14 @@ pub struct TerrainItem {
     /// Also write a 16-bit PNG of the heights.
     #[serde(default)]
     pub png16: bool,
-    /// Also write folders to import into simulators, `export/<id>/<simulator>/`.
+    /// Also write folders to import into simulators, `export/<id>/<simulator>/`, and the vehicles that drive there as MJCF and URDF,
+    /// `export/vehicle/<traverse id>.xml` and `.urdf`.
     #[serde(default)]
     pub exports: BTreeSet<Simulator>,
+    /// Decimate the meshes of the exports (`gazebo`, `isaac`): no post is farther from them than this, vertically, m. Not decimated
+    /// when absent.
+    #[serde(default)]
+    pub export_max_error_m: Option<f64>,
 }
 
 /// Program into which a terrain can be imported.

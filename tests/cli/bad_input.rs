@@ -166,6 +166,29 @@ fn val_places_are_refused_before_the_run() {
     }
 }
 
+/// Options of meshes for what holds none, limits that make no sense, and vehicles that are not known.
+#[test]
+fn val_vehicles_and_decimations_are_refused() {
+    study_refused("count = 2", "exports = [\"unity\"]\nexport_max_error_m = 0.1", &["export_max_error_m", "isaac"]);
+    study_refused(
+        "count = 2",
+        "exports = [\"isaac\"]\nexport_max_error_m = -0.1",
+        &["is -0.1; it must be a finite number"],
+    );
+    let folder = area();
+    let path = folder.path();
+    write(path, "a.asc", "ncols 2\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 1\n1 2\n3 5\n");
+    refused(path, &["convert", "a.asc", "b.tif", "--max-error", "1"], USAGE, &["b.tif", "decimate meshes", ".glb"]);
+    refused(path, &["convert", "a.asc", "b", "--for", "unity", "--triangles", "9"], USAGE, &["isaac"]);
+    refused(path, &["convert", "a.asc", "b.obj", "--max-error", "-1"], USAGE, &["must be 0 m or more, got -1 m"]);
+    refused(path, &["convert", "a.asc", "b.obj", "--triangles", "1"], USAGE, &["take 2 triangles"]);
+    refused(path, &["convert", "a.asc", "b.obj", "--surface", "ice"], USAGE, &["--surface is for vehicles"]);
+    refused(path, &["convert", "husky", "b.xml"], USAGE, &["`husky`", "`husky_a200`"]);
+    refused(path, &["convert", "husky_a200", "b.urdf", "--surface", "mud"], USAGE, &["mud", "hard_soil"]);
+    refused(path, &["convert", "husky_a200", "b.urdf", "--window", "0,0,1,1"], USAGE, &["takes --surface"]);
+    refused(path, &["convert", "none.toml", "b.urdf"], INPUT, &["none.toml"]);
+}
+
 /// A wheel meets the longer side of a cell.
 #[test]
 fn val_oblong_cells_are_judged_by_their_longer_side() {

@@ -424,6 +424,85 @@ fn val_exports_are_reproducible() {
     assert_eq!(sums_of("plain").get("terrain/t-0002.tif"), sums_of("release").get("terrain/t-0002.tif"));
 }
 
+/// The vehicle of a run on exported terrains lies beside them, with the bytes of `convert`; without exports there is none.
+#[test]
+fn val_vehicles_of_exported_terrains_are_released() {
+    let folder = area();
+    let path = folder.path();
+    let plain = small_study();
+    write(path, "study.toml", &plain.replace("size_px = [320, 300]", "size_px = [320, 300]\nexports = [\"mujoco\"]"));
+    ok(path, &["run", "study.toml", "-o", "release", "--quiet"]);
+    ok(path, &["verify", "release", "--quiet"]);
+    let released: Vec<String> =
+        sums(&path.join("release")).into_keys().filter(|p| p.starts_with("export/vehicle/")).collect();
+    assert_eq!(released, ["export/vehicle/husky.urdf", "export/vehicle/husky.xml"]);
+    for ending in ["xml", "urdf"] {
+        let name = format!("husky_a200.{ending}");
+        ok(path, &["convert", "husky_a200", &name]);
+        let of_release = std::fs::read(path.join(format!("release/export/vehicle/husky.{ending}"))).unwrap();
+        assert_eq!(std::fs::read(path.join(&name)).unwrap(), of_release, "{ending}");
+    }
+    write(path, "plain.toml", &plain);
+    ok(path, &["run", "plain.toml", "-o", "plain", "--quiet"]);
+    assert!(sums(&path.join("plain")).keys().all(|p| !p.starts_with("export/")));
+}
+
+/// Known vehicles and vehicle files become MJCF and URDF; the friction is that of the surface.
+#[test]
+fn val_vehicles_are_converted() {
+    let folder = area();
+    let path = folder.path();
+    let told = ok_json(path, &["convert", "rocker_bogie_rover", "rover.urdf", "--surface", "sand"]);
+    assert_eq!((told["joints"].as_u64(), told["mass_kg"].as_f64().map(f64::round)), (Some(14), Some(118.0)));
+    let text = std::fs::read_to_string(path.join("rover.urdf")).unwrap();
+    assert!(
+        text.contains("surface sand: wheels 0.53") && text.contains("<mimic joint=\"left_rocker_pivot\""),
+        "{text}"
+    );
+    let sprung = ok_json(path, &["convert", "ugv_4x4", "ugv.urdf"]);
+    assert!(sprung["notes"][0].as_str().unwrap().contains("no springs"), "{sprung}");
+    write(path, "mine.toml", "base = \"husky_a200\"\n[parameters.wheels]\nradius_m = 0.2\n");
+    let mine = ok_json(path, &["convert", "mine.toml", "mine.xml"]);
+    assert!((mine["standing_height_m"].as_f64().unwrap() - 0.16718).abs() < 1e-9, "{mine}");
+    assert!(std::fs::read_to_string(path.join("mine.xml")).unwrap().contains("size=\"0.2 0.05715\""));
+}
+
+/// Fewer triangles within the limit; the numbers are those of the file, and the same every time.
+#[test]
+fn val_meshes_are_decimated_on_request() {
+    let folder = area();
+    let path = folder.path();
+    ok(path, &["terrain", "multifractal", "--set", "size_px=[90,70]", "--seed", "3", "-o", "t.tif"]);
+    let mesh = |arguments: &[&str]| ok_json(path, &[&["convert", "t.tif"], arguments].concat())["mesh"].clone();
+    let coarse = mesh(&["a.obj", "--max-error", "0.1"]);
+    let fine = mesh(&["b.obj", "--max-error", "0.02"]);
+    let count = |mesh: &Value| mesh["triangles"].as_u64().unwrap();
+    assert!(count(&coarse) < count(&fine) && count(&fine) < 2 * 89 * 69, "{coarse} {fine}");
+    assert!(fine["error_max_m"].as_f64().unwrap() <= 0.02 && fine["triangles_of_dem"] == 2 * 89 * 69, "{fine}");
+    let text = std::fs::read_to_string(path.join("b.obj")).unwrap();
+    assert_eq!(text.lines().filter(|l| l.starts_with("f ")).count() as u64, count(&fine));
+    assert!(text.contains("# decimated to "), "{text}");
+    assert_eq!(mesh(&["again.obj", "--max-error", "0.02", "--threads", "1"]), fine);
+    assert_eq!(std::fs::read(path.join("again.obj")).unwrap(), text.into_bytes());
+    let few = mesh(&["c.glb", "--triangles", "100"]);
+    assert!((99..=100).contains(&count(&few)), "{few}");
+    assert_eq!(mesh(&["whole.obj"]), Value::Null);
+    ok(path, &["convert", "t.tif", "isaac", "--for", "isaac", "--max-error", "0.1"]);
+    let import = std::fs::read_to_string(path.join("isaac/import.json")).unwrap();
+    let import: Value = serde_json::from_str(&import).unwrap();
+    assert_eq!(import["settings"]["decimation"], coarse);
+    // In a study, of the same heights.
+    let study = "[study]\nname = \"out\"\nseed = 5\ndate = \"2026-01-01\"\n\n[[terrain]]\nid = \"t\"\nkind = \"multifractal\"\n\
+        seed = 3\nsize_px = [90, 70]\nexports = [\"isaac\", \"mujoco\"]\nexport_max_error_m = 0.1\n";
+    write(path, "study.toml", study);
+    ok(path, &["run", "study.toml", "-o", "release", "--quiet"]);
+    for name in ["import.json", "terrain.usda"] {
+        let [verb, item] =
+            ["isaac", "release/export/t/isaac"].map(|folder| std::fs::read(path.join(folder).join(name)).unwrap());
+        assert!(verb == item, "{name}");
+    }
+}
+
 #[test]
 fn val_traverse_makes_a_release_of_its_own() {
     let folder = area();

@@ -217,6 +217,80 @@ fn val_simulators_see_the_terrain() {
     }
 }
 
+/// Decimated meshes of a terrain, and of one with holes and oblong cells, in every format: the error that is stated is that of every
+/// cell centre.
+#[test]
+fn val_readers_measure_the_error_of_decimated_meshes() {
+    let Some(python) = python() else { return };
+    let folder = area();
+    let path = folder.path();
+    let run = |arguments: &[&str]| {
+        let call = sastrugi_in(path, arguments);
+        assert_eq!(call.code, 0, "{arguments:?}: {}", call.stderr);
+        call.stdout
+    };
+    run(&["terrain", "multifractal", "--set", "size_px=[90,70]", "--seed", "3", "-o", "whole.tif"]);
+    let height = |k: i32| if k % 41 < 3 { -9999 } else { (k * k) % 7 - k / 30 };
+    let heights: Vec<String> = (0..24 * 30).map(|k| height(k).to_string()).collect();
+    let rows: Vec<String> = heights.chunks(30).map(|row| row.join(" ")).collect();
+    let head = "ncols 30\nnrows 24\nxllcorner 664692.5\nyllcorner 4878903.25\ndx 0.5\ndy 0.25\nnodata_value -9999\n";
+    write(path, "holed.asc", &format!("{head}{}\n", rows.join("\n")));
+    run(&["convert", "holed.asc", "holed.tif"]);
+    for (dem, limit) in
+        [("whole", ["--max-error", "0.05"]), ("whole", ["--triangles", "500"]), ("holed", ["--max-error", "2.5"])]
+    {
+        let mut made = vec![path.join(format!("{dem}.tif")), path.join("stated.json")];
+        for ending in ["obj", "glb", "usda"] {
+            let (from, to) = (format!("{dem}.tif"), format!("{dem}.{ending}"));
+            let told = run(&[&["convert", &from, &to, "--json", "--quiet"][..], &limit].concat());
+            write(path, "stated.json", &told);
+            made.push(path.join(to));
+        }
+        let call = check(&python, "check_decimated.py", &made.iter().map(PathBuf::as_path).collect::<Vec<_>>());
+        assert_eq!(call.code, 0, "{dem} {limit:?}: {}{}", call.stdout, call.stderr);
+    }
+}
+
+/// MJCF and URDF of every shipped vehicle, and of one from a file, in MuJoCo: mass, centre of mass, moments of inertia, wheels and joints as their numbers
+/// say; at rest as high as our own model, but for the sag of its tyres, to 1 mm; motors drive forward at their speed.
+#[test]
+fn val_mujoco_sees_the_vehicles() {
+    let Some(python) = python() else { return };
+    let folder = area();
+    let path = folder.path();
+    let run = |arguments: &[&str]| {
+        let call = sastrugi_in(path, arguments);
+        assert_eq!(call.code, 0, "{arguments:?}: {}", call.stderr);
+        call.stdout
+    };
+    let row = "0 ".repeat(200);
+    let head = "ncols 200\nnrows 200\nxllcorner 0\nyllcorner 0\ncellsize 0.1\nnodata_value -9999\n";
+    write(path, "flat.asc", &format!("{head}{}", format!("{row}\n").repeat(200)));
+    let shipped = ["husky_a200", "ugv_4x4", "rocker_bogie_rover"];
+    for name in shipped {
+        let told = run(&["kinds", name, "--json"]);
+        write(path, &format!("{name}.json"), &told);
+    }
+    // A vehicle file whose numbers are all changes.
+    let mut own: Value = serde_json::from_slice(&std::fs::read(path.join("ugv_4x4.json")).unwrap()).unwrap();
+    own[0]["parameters"]["chassis"]["mass_kg"] = Value::from(900.0_f64);
+    own[0]["parameters"]["wheels"]["radius_m"] = Value::from(0.45_f64);
+    write(path, "own.json", &own.to_string());
+    let vehicles = shipped.map(|name| (name, name)).into_iter().chain([("own", "own.json")]);
+    let missions = ["--missions", "1", "--set-missions", "length_m=5", "--set-missions", "border_m=4"];
+    for (name, vehicle) in vehicles {
+        for ending in ["xml", "urdf"] {
+            run(&["convert", vehicle, &format!("{name}.{ending}"), "--quiet"]);
+        }
+        let drive = ["traverse", "flat.asc", "--vehicle", vehicle, "--set", "timeout_s=4", "-o", name, "--quiet"];
+        run(&[&drive[..], &missions].concat());
+    }
+    let names = shipped.into_iter().chain(["own"]).map(Path::new);
+    let arguments: Vec<&Path> = std::iter::once(path).chain(names).collect();
+    let call = check(&python, "check_vehicles.py", &arguments);
+    assert_eq!(call.code, 0, "{}{}", call.stdout, call.stderr);
+}
+
 /// A terrain of more than two tiles a side.
 const LARGE_TERRAIN: &str = "[study]\nname = \"large\"\nseed = 7\ndate = \"2026-11-22\"\ngeotiff = \"HOW\"\n\n\
     [[terrain]]\nid = \"t\"\nkind = \"weierstrass_mandelbrot\"\nsize_px = [600, 531]\ncell_m = 0.2\nfrequencies = 64\n\n\

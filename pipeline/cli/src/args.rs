@@ -153,13 +153,15 @@ pub enum Verb {
         sastrugi compare site.json synthetic.json --equivalence-sigma 0.05 --fail-on-difference")]
     Compare(Compare),
     /// Convert between DEM formats, by file name ending (.tif .asc .hgt .png .npy, meshes .obj .glb .usda), grid point clouds
-    /// (.las .laz), or write a folder to import into a simulator.
+    /// (.las .laz), or write what a simulator imports: a folder of a terrain, or the file of a vehicle (.xml of MuJoCo, .urdf).
     #[command(
         after_help = "With --for OUT is a folder: the heights, README.md with the steps, import.json with every number. Sizes that the\n\
         program does not take are resampled (bilinear, over the same ground), and the folder says by how much heights change;\n\
         with --crop the middle is cut out, and every height stays.\n\n\
         Examples:\n  sastrugi convert N44W072.hgt tile.tif\n  sastrugi convert scan.laz scan.tif --cell 0.05 --fill 2\n  \
-        sastrugi convert terrain.tif terrain.glb\n  sastrugi convert terrain.tif unreal-terrain --for unreal"
+        sastrugi convert terrain.tif terrain.glb\n  sastrugi convert terrain.tif unreal-terrain --for unreal\n  \
+        sastrugi convert terrain.tif terrain.obj --max-error 0.01\n  sastrugi convert husky_a200 husky.xml\n  \
+        sastrugi convert mine.toml mine.urdf --surface hard_soil"
     )]
     Convert(Convert),
     /// Draw a DEM: heights in colours, under a light from the north-west, as PNG.
@@ -935,9 +937,9 @@ pub struct Writing {
 /// `convert`.
 #[derive(Debug, Args)]
 pub struct Convert {
-    /// DEM to read.
+    /// DEM to read; for a vehicle file its name (see `kinds`) or a vehicle file of your own.
     pub input: PathBuf,
-    /// DEM to write; a folder with --for.
+    /// DEM to write, or the file of a vehicle (.xml is MJCF, .urdf); a folder with --for.
     pub output: PathBuf,
     /// Write a folder for this simulator.
     #[arg(long = "for", value_name = "SIMULATOR", value_parser = simulators())]
@@ -945,6 +947,15 @@ pub struct Convert {
     /// Where the simulator takes certain sizes only, cut the largest one out of the middle instead of resampling.
     #[arg(long, requires = "simulator")]
     pub crop: bool,
+    /// Decimate a mesh: no cell centre is farther from it than this, vertically, m.
+    #[arg(long, value_name = "M", allow_hyphen_values = true)]
+    pub max_error: Option<f64>,
+    /// Decimate a mesh to at most so many triangles.
+    #[arg(long, value_name = "N")]
+    pub triangles: Option<usize>,
+    /// Ground whose friction the file of a vehicle states (`sastrugi kinds surface`); `study` when absent.
+    #[arg(long, value_name = "SURFACE")]
+    pub surface: Option<String>,
     /// Part of the DEM, x0,y0,x1,y1 in its own coordinates.
     #[arg(long, value_name = "X0,Y0,X1,Y1", allow_hyphen_values = true)]
     pub window: Option<String>,

@@ -1,7 +1,7 @@
 //! Examples for the page on study files.
 
 /// Examples of keys that have no default and stand in no study to start from, by name or the last word of it, after `section: ` where sections differ.
-pub const EXAMPLES: [(&str, &str); 144] = [
+pub const EXAMPLES: [(&str, &str); 145] = [
     ("basic_spacing_m", "0.01"),
     ("pixel_m", "0.64"),
     ("elevation_deg", "45.0"),
@@ -28,6 +28,7 @@ pub const EXAMPLES: [(&str, &str); 144] = [
     ("citation", r#""Doe, J. (2025): Snow DEMs of a field""#),
     ("seed", "7"),
     ("count", "3"),
+    ("export_max_error_m", "0.01"),
     ("exports", r#"["gazebo", "mujoco"]"#),
     ("terrain: sweep", "{ cell_m = [0.05, 0.1] }"),
     ("fit: sweep", "{ outer_scale_m = [1.0, 2.0] }"),

@@ -24,6 +24,7 @@ mod simd;
 pub mod streams;
 pub mod sums;
 pub mod surface;
+pub mod triangulation;
 pub mod turns;
 
 pub use counter::{Counter, Poisson};
@@ -31,3 +32,4 @@ pub use grid::{Geometry, Grid};
 pub use ground::{Ground, GroundClass, GroundGrid, GroundPoint, NoGround};
 pub use streams::{Stream, Streams};
 pub use surface::Surface;
+pub use triangulation::{Triangulation, triangulate};

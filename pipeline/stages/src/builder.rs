@@ -142,6 +142,8 @@ pub struct Builder<'a> {
     pub study: &'a Study,
     /// Heightfields by id.
     pub heightfields: BTreeMap<String, Heightfield>,
+    /// Ids of heightfields that are exported for simulators.
+    pub exported: BTreeSet<String>,
     /// Ids that an id in the study stands for (its replicates and sweeps).
     pub families: BTreeMap<String, Vec<String>>,
     /// Ids of fits.
@@ -186,6 +188,7 @@ impl<'a> Builder<'a> {
         Self {
             study,
             heightfields: BTreeMap::new(),
+            exported: BTreeSet::new(),
             families: BTreeMap::new(),
             fits: Vec::new(),
             prospects: BTreeMap::new(),

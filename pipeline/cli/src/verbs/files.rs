@@ -9,10 +9,10 @@ use sastrugi_stages::operations::dem::to_metres;
 use sastrugi_stages::studies;
 use sastrugi_stages::verbs::{self, Read, Reading, describe_grid, numbers, read_as_it_is, transects};
 use sastrugi_store::dem::simulators::{self, Fit};
-use sastrugi_store::dem::{self, Dem, DemError, Values};
-use sastrugi_store::mcap;
+use sastrugi_store::dem::{self, Dem, DemError, MeshLimits, Values};
 use sastrugi_store::release::Release;
 use sastrugi_store::transect::Transects;
+use sastrugi_store::{mcap, mechanism};
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -26,15 +26,24 @@ fn failure(error: DemError) -> Failure {
 
 /// `convert`.
 pub fn convert(args: &Convert, common: &Common) -> Verdict {
+    let of_vehicle = mechanism::Format::of_name(&args.output).filter(|_| args.simulator.is_none());
+    if let Some(format) = of_vehicle {
+        return convert_vehicle(args, format, common);
+    }
     let output = args.output.display();
     let mut options = options(&args.writing, &args.output)?;
     let format = dem::Format::of_name(&args.output);
+    let limits = mesh_limits(args, format)?;
     match (args.simulator, format) {
         (Some(_), _) if args.output.exists() && !args.output.is_dir() => {
             return Err(Failure::usage(format!("{output}: is a file; with --for OUT names a folder")));
         }
         (None, None) => {
-            let message = format!("{output}: the ending names no DEM format; {} do", dem::WRITTEN_ENDINGS);
+            let message = format!(
+                "{output}: the ending names no DEM format; {} do, and for vehicles {}",
+                dem::WRITTEN_ENDINGS,
+                mechanism::WRITTEN_ENDINGS
+            );
             return Err(Failure::usage(message));
         }
         _ => {}
@@ -50,19 +59,72 @@ pub fn convert(args: &Convert, common: &Common) -> Verdict {
         Some(simulator) => {
             let fit = if args.crop { Fit::Crop } else { Fit::Resample };
             let export = if geographic { simulators::export_from_degrees } else { simulators::export };
-            let export = export(&grid, simulator, fit).map_err(failure)?;
+            let export = export(&grid, simulator, fit, limits.as_ref()).map_err(failure)?;
             simulators::write(&args.output, &export).map_err(failure)?;
             export.notes
         }
         None => {
             options.values = info.values;
+            let decimated = limits.map(|limits| dem::decimate(&args.output, &grid, &limits)).transpose();
+            options.decimation = decimated.map_err(failure)?;
             dem::write(&args.output, &grid, &info.crs, &options).map_err(failure)?
         }
     };
     let notes: Vec<&String> = notes.iter().chain(&converted).chain(&lost).collect();
     let mut text = format!("{output}: {} x {} cells", grid.rows(), grid.cols());
     notes.iter().for_each(|note| text.push_str(&format!("\n  note: {note}")));
-    let result = json!({ "file": args.output, "grid": describe_grid(&grid), "notes": notes });
+    let mut result = json!({ "file": args.output, "grid": describe_grid(&grid), "notes": notes });
+    if let Some(decimation) = &options.decimation {
+        result["mesh"] = decimation.to_json();
+    }
+    print(common.json, &result, &text)?;
+    Ok(Code::Done)
+}
+
+/// Limits of a mesh, which only some outputs have.
+fn mesh_limits(args: &Convert, format: Option<dem::Format>) -> Result<Option<MeshLimits>, Failure> {
+    if args.surface.is_some() {
+        let endings = mechanism::WRITTEN_ENDINGS;
+        return Err(Failure::usage(format!("{}: --surface is for vehicles, {endings}", args.output.display())));
+    }
+    let limits = MeshLimits { error_max_m: args.max_error, triangles_max: args.triangles };
+    if limits == MeshLimits::default() {
+        return Ok(None);
+    }
+    let has_mesh = args.simulator.map_or(format.is_some_and(dem::Format::is_mesh), simulators::has_mesh);
+    if has_mesh {
+        return Ok(Some(limits));
+    }
+    let message = "--max-error and --triangles decimate meshes: .obj, .glb, .usda, and --for gazebo or isaac";
+    Err(Failure::usage(format!("{}: {message}", args.output.display())))
+}
+
+/// `convert` of a vehicle.
+fn convert_vehicle(args: &Convert, format: mechanism::Format, common: &Common) -> Verdict {
+    let output = args.output.display();
+    let is_of_dem = args.window.is_some() || !args.masks.all().is_empty() || args.writing.cog;
+    if is_of_dem || args.max_error.is_some() || args.triangles.is_some() {
+        return Err(Failure::usage(format!("{output}: a vehicle takes --surface; the other options are for DEMs")));
+    }
+    let name = args.input.to_string_lossy();
+    let (vehicle, doubts) = verbs::vehicle::mechanism(&name, args.surface.as_deref())?;
+    mechanism::write(&args.output, &vehicle, format).map_err(|e| Failure::failed(format!("{output}: {e}")))?;
+    let notes: Vec<String> = doubts.into_iter().chain(mechanism::notes(&vehicle, format)).collect();
+    let joints = vehicle.links.iter().map(|link| link.joints.len()).sum::<usize>();
+    let mass_kg = vehicle.links.iter().map(|link| link.mass_kg).sum::<f64>();
+    let mut text = format!("{output}: {}, {mass_kg:.3} kg, {joints} joints", vehicle.name);
+    notes.iter().for_each(|note| text.push_str(&format!("\n  note: {note}")));
+    let result = json!({
+        "file": args.output,
+        "vehicle": vehicle.name,
+        "format": format.name(),
+        "mass_kg": mass_kg,
+        "links": vehicle.links.len(),
+        "joints": joints,
+        "standing_height_m": vehicle.standing_height_m,
+        "tyre_sag_m": vehicle.tyre_sag_m,
+        "notes": notes,
+    });
     print(common.json, &result, &text)?;
     Ok(Code::Done)
 }

@@ -32,6 +32,7 @@ mod doubts;
 mod drive;
 mod ground;
 mod linkage;
+mod mechanism;
 mod model;
 mod params;
 mod settings;

@@ -153,7 +153,7 @@ impl Vehicle {
 }
 
 /// Hubs in base_link, axle by axle from the front, left before right.
-fn hubs(parameters: &VehicleParameters) -> Vec<Vec3> {
+pub(super) fn hubs(parameters: &VehicleParameters) -> Vec<Vec3> {
     let wheels = &parameters.wheels;
     let axle = |&x: &f64| [0.5, -0.5].map(|side| [x, side * wheels.track_m, wheels.axle_z_m]);
     wheels.axles_m.iter().flat_map(axle).collect()

@@ -1,4 +1,5 @@
 mod following;
+mod mechanism;
 
 use super::drive::Servo;
 use super::simulation::Simulation;

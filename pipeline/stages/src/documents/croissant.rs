@@ -106,6 +106,13 @@ const EXPORTS: (&str, &[&str], &[&str], &str) = (
     &["image/png", "application/octet-stream", "application/xml", "text/plain", "application/json", "text/markdown"],
     "Terrains to import into simulators: heights, README.md with the steps, import.json with the numbers",
 );
+/// Vehicles that drive on exported terrains.
+const VEHICLES: (&str, &[&str], &[&str], &str) = (
+    "vehicles",
+    &["export/vehicle/*.xml", "export/vehicle/*.urdf"],
+    &["application/xml"],
+    "Vehicles to import into simulators: MJCF and URDF, with masses, inertia, joints and friction",
+);
 /// Layout of a viewer for recordings of that flavour.
 const LAYOUT: (&str, &[&str], &[&str], &str) = (
     "viewer-layout",
@@ -198,7 +205,8 @@ fn distribution(described: &Described<'_>) -> Vec<Value> {
     }));
     let layout = (described.head.mcap == McapFlavour::Viewer && there("mcap", ".mcap")).then_some(LAYOUT);
     let exports = there(exports::FOLDER.trim_end_matches('/'), "").then_some(EXPORTS);
-    let documents = DOCUMENTS.into_iter().chain(layout).chain(exports);
+    let vehicles = there("export/vehicle", ".urdf").then_some(VEHICLES);
+    let documents = DOCUMENTS.into_iter().chain(layout).chain(exports).chain(vehicles);
     files.extend(documents.map(|(id, includes, media, what)| file_set(id, includes, media, what)));
     files
 }

@@ -15,7 +15,10 @@ pub const FOLDERS: [(&str, &str); 14] = [
     ("mask/", "masks of the fits, obstacles of the routes"),
     ("input/", "rasters and measured points that terrains and recovered surfaces are made with"),
     ("terrain/", "generated heightfields, GeoTIFF, float32 metres, no data -9999; maps of the same cells beside them"),
-    ("export/", "terrains to import into simulators: `export/<terrain>/<simulator>/README.md` says how"),
+    (
+        "export/",
+        "terrains to import into simulators: `export/<terrain>/<simulator>/README.md` says how; `export/vehicle/`: the vehicles",
+    ),
     ("texture/", "synthesised textures, GeoTIFF, float32 metres, no data -9999"),
     ("classes/", "roughness classes: 0 low, 1 semi, 2 high, 255 none; `.raw.tif` before closing"),
     ("fit/", "covariance fits (JSON), with background, residual and the cells used"),

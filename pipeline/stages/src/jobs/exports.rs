@@ -3,8 +3,8 @@
 use crate::job::{JobError, Outcome, Product, Work};
 use sastrugi_numeric::{Geometry, Grid};
 use sastrugi_schemas::study::Simulator;
-use sastrugi_store::dem::DemError;
 use sastrugi_store::dem::simulators::{self, Cost, Fit};
+use sastrugi_store::dem::{DemError, MeshLimits};
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -13,9 +13,16 @@ pub const FOLDER: &str = "export/";
 /// Bytes of a height as it is released, which is what is exported.
 const BYTES_PER_CELL: u64 = 8;
 
+/// Working memory of an export whose mesh is decimated, over that of one whose mesh is not.
+const DECIMATING: u64 = 4;
+
 /// The simulators that a terrain is exported for, and what each export takes.
 #[derive(Clone, Debug, Default)]
-pub struct Exports(BTreeMap<Simulator, Cost>);
+pub struct Exports {
+    costs: BTreeMap<Simulator, Cost>,
+    /// Limits of their meshes.
+    limits: Option<MeshLimits>,
+}
 
 impl Exports {
     /// For terrains of this size.
@@ -25,27 +32,48 @@ impl Exports {
     pub fn new(simulators: &BTreeSet<Simulator>, geometry: &Geometry) -> Result<Self, String> {
         let cost = |&simulator| Ok((simulator, simulators::check_size(geometry, simulator, Fit::Resample)?));
         let costs: Result<_, DemError> = simulators.iter().map(cost).collect();
-        costs.map(Self).map_err(|e| e.to_string())
+        costs.map(|costs| Self { costs, limits: None }).map_err(|e| e.to_string())
+    }
+
+    /// The same with meshes that pass every post within `error_max_m`, where that is given.
+    pub fn decimated(self, error_max_m: Option<f64>) -> Self {
+        let limits = error_max_m.map(|_| MeshLimits { error_max_m, triangles_max: None });
+        Self { limits, ..self }
+    }
+
+    /// True when there is none.
+    pub fn is_empty(&self) -> bool {
+        self.costs.is_empty()
     }
 
     /// Adds them to what says how the heights are packed.
     pub fn packing(&self, heights: Value) -> Value {
-        if self.0.is_empty() { heights } else { json!({ "heights": heights, "exports": self.simulators() }) }
+        if self.is_empty() {
+            return heights;
+        }
+        let mut packing = json!({ "heights": heights, "exports": self.simulators() });
+        if let Some(limits) = &self.limits {
+            packing["export_max_error_m"] = json!(limits.error_max_m);
+        }
+        packing
     }
 
     fn simulators(&self) -> Vec<Simulator> {
-        self.0.keys().copied().collect()
+        self.costs.keys().copied().collect()
     }
 
     /// Working memory, bytes: one export is made after the other.
     pub fn memory_bytes(&self, cells: u64) -> u64 {
-        let largest = self.0.values().map(|cost| cost.memory_bytes).max();
+        let factor = |simulator| {
+            if self.limits.is_some() && simulators::has_mesh(simulator) { DECIMATING } else { 1 }
+        };
+        let largest = self.costs.iter().map(|(simulator, cost)| factor(*simulator) * cost.memory_bytes).max();
         largest.map_or(0, |bytes| bytes + BYTES_PER_CELL * cells)
     }
 
     /// Bytes of their files.
     pub fn bytes(&self) -> f64 {
-        self.0.values().map(|cost| cost.file_bytes as f64).sum()
+        self.costs.values().map(|cost| cost.file_bytes as f64).sum()
     }
 
     /// Writes the folders of the terrain `id`, of its heights as they are released.
@@ -53,13 +81,14 @@ impl Exports {
     /// # Errors
     /// When a file cannot be written.
     pub fn write(&self, work: &Work<'_>, id: &str, heights: &Grid, outcome: &mut Outcome) -> Result<(), JobError> {
-        if self.0.is_empty() {
+        if self.is_empty() {
             return Ok(());
         }
         let heights = heights.as_stored();
         for simulator in self.simulators() {
             let name = simulator.name();
-            let export = simulators::export(&heights, simulator, Fit::Resample).map_err(JobError::new)?;
+            let export = simulators::export(&heights, simulator, Fit::Resample, self.limits.as_ref());
+            let export = export.map_err(JobError::new)?;
             for (file, bytes) in &export.files {
                 let own = format!("{name}.{file}");
                 work.write(&own, bytes)?;

@@ -23,3 +23,4 @@ pub mod surface;
 pub mod terrain;
 pub mod texture;
 pub mod traverse;
+pub mod vehicle;

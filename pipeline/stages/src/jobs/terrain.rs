@@ -8,10 +8,12 @@ use crate::job::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work};
 use crate::operations::terrains::{generate, values_of, write_png16};
 use crate::revision::Room;
 use crate::runner::graph::Node;
-use crate::study::Entry;
 use crate::study::entry::Expanded;
+use crate::study::{Entry, StudyError};
 use sastrugi_numeric::{Grid, Streams};
+use sastrugi_schemas::ParameterError;
 use sastrugi_schemas::study::{GeoTiff, TerrainItem};
+use sastrugi_store::dem::simulators::has_mesh;
 use sastrugi_store::dem::{self, Crs, WriteOptions};
 use sastrugi_store::{digest, geojson};
 use sastrugi_terrain::{Generator, Line, planetary};
@@ -51,6 +53,7 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
     if let Some(kind) = kinds.iter().find(|k| k.kind == item.kind) {
         entry.check_keys::<TerrainItem>(&params, &kind.parameters)?;
     }
+    check_decimation(entry, &item)?;
     let expanded = entry.expand(&item.id, item.count, &item.sweep, &params)?;
     name_families(builder, entry, &item.id, &expanded)?;
     let mut copies = Copies::new();
@@ -81,15 +84,33 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
         };
         let geotiff = builder.study.head.geotiff;
         let exports = Exports::new(&item.exports, &generator.geometry()).map_err(|e| entry.error("exports", e))?;
+        let exports = exports.decimated(item.export_max_error_m);
         let parents = inputs.0.iter().map(|s| s.item.clone()).collect::<BTreeSet<_>>().into_iter().collect();
         let id = one.id.clone();
         let job = TerrainJob { id, generator, inputs, streams, png16: item.png16, exports, geotiff };
         let node =
             Node { item: field.item.clone(), parents, inputs: Vec::new(), stream: field.stream(), job: Box::new(job) };
         builder.node(node)?;
+        if !item.exports.is_empty() {
+            builder.exported.insert(one.id.clone());
+        }
         builder.heightfields.insert(one.id, field);
     }
     Ok(())
+}
+
+/// The limit of the meshes of exports, of which there must be one.
+fn check_decimation(entry: &Entry<'_>, item: &TerrainItem) -> Result<(), StudyError> {
+    let Some(error_max_m) = item.export_max_error_m else { return Ok(()) };
+    let key = "export_max_error_m";
+    ParameterError::not_negative(key, error_max_m).map_err(|e| entry.refuse(e))?;
+    if item.exports.iter().any(|&simulator| has_mesh(simulator)) {
+        return Ok(());
+    }
+    Err(entry.error(
+        key,
+        "decimates meshes, and `exports` names no simulator with one; `gazebo` and `isaac` have one".to_owned(),
+    ))
 }
 
 /// An item's id stands for all that it expands to, and the id of each of its swept parts for the replicates.

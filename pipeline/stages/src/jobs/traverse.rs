@@ -1,7 +1,7 @@
 //! Stage `traverse`: all missions of one terrain driven and recorded.
 
 use super::dem as measured;
-use super::{missions, roughness};
+use super::{missions, roughness, vehicle};
 use crate::builder::{BuildError, Builder, HEIGHTS, Heightfield, unknown_id};
 use crate::job::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work};
 use crate::operations::dem::input_error;
@@ -139,6 +139,9 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
             count: drawn.count,
             seconds_each: (drawn.length_m / raw.speed_m_s).min(raw.timeout_s),
         });
+        if drawn.lines.iter().any(|lines| builder.exported.contains(&lines.heightfield)) {
+            vehicle::add(builder, &drive.id, &drive.vehicle, &drive.settings)?;
+        }
         drawn.lines.iter().try_for_each(|lines| add_one(builder, entry, &envelope.id, &drive, lines))?;
     }
     Ok(())

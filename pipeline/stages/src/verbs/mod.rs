@@ -19,6 +19,7 @@ pub mod served;
 pub mod terrain;
 pub mod texture;
 pub mod traverse;
+pub mod vehicle;
 
 pub use reading::{Read, Reading, read, read_as_it_is, transects};
 pub use sastrugi_mobility::metrics::log::LogSettings;

@@ -44,6 +44,8 @@ pub(super) struct Codec {
     pub render: Option<Render>,
     /// States metres.
     in_metres: bool,
+    /// Holds triangles, which may be decimated.
+    mesh: bool,
 }
 
 impl Codec {
@@ -61,6 +63,7 @@ impl Codec {
             claimed: None,
             render: None,
             in_metres: false,
+            mesh: false,
         }
     }
 }
@@ -104,18 +107,30 @@ static CODECS: [Codec; 9] = [
         ..Codec::new(Format::Png, "png", &["png"])
     },
     Codec {
-        render: Some(|_, grid, crs, _| Ok((mesh::obj(grid)?, crs.loss_notes()))),
+        render: Some(|_, grid, crs, options| {
+            let decimation = options.decimation.as_ref();
+            Ok((mesh::obj(grid, decimation)?, mesh::with_decimation(crs.loss_notes(), decimation)))
+        }),
         in_metres: true,
+        mesh: true,
         ..Codec::new(Format::Obj, "obj", &["obj"])
     },
     Codec {
-        render: Some(|_, grid, crs, _| Ok((mesh::glb(grid)?, mesh::local_notes(grid, crs)))),
+        render: Some(|_, grid, crs, options| {
+            let decimation = options.decimation.as_ref();
+            Ok((mesh::glb(grid, decimation)?, mesh::with_decimation(mesh::local_notes(grid, crs), decimation)))
+        }),
         in_metres: true,
+        mesh: true,
         ..Codec::new(Format::Glb, "glb", &["glb"])
     },
     Codec {
-        render: Some(|_, grid, crs, _| Ok((mesh::usda(grid)?, mesh::local_notes(grid, crs)))),
+        render: Some(|_, grid, crs, options| {
+            let decimation = options.decimation.as_ref();
+            Ok((mesh::usda(grid, decimation)?, mesh::with_decimation(mesh::local_notes(grid, crs), decimation)))
+        }),
         in_metres: true,
+        mesh: true,
         ..Codec::new(Format::Usda, "usda", &["usda"])
     },
     Codec {
@@ -169,6 +184,11 @@ impl Format {
     /// True for formats that state metres, so that a raster in degrees is converted before it is written.
     pub fn in_metres(self) -> bool {
         self.codec().in_metres
+    }
+
+    /// True for meshes, which may be decimated.
+    pub fn is_mesh(self) -> bool {
+        self.codec().mesh
     }
 }
 

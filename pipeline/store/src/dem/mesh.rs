@@ -1,13 +1,15 @@
 //! Triangle meshes: Wavefront `.obj`, binary glTF 2.0 `.glb` (Khronos Group, "glTF 2.0 Specification", 2021) and OpenUSD `.usda`.
 //!
 //! One vertex per cell with data, at its centre; two triangles between four neighbours, counter-clockwise from above, whose common
-//! side runs from north-west to south-east. A triangle with a corner without data is left out.
+//! side runs from north-west to south-east. A triangle with a corner without data is left out. A mesh may be decimated: fewer
+//! triangles between some of the cells ([`sastrugi_numeric::triangulation`]), with the error stated in the file.
 
 use super::checks::check_single_precision;
 use super::crs::Crs;
 use super::raster::Refusal;
-use sastrugi_numeric::Grid;
-use serde_json::json;
+use sastrugi_numeric::triangulation::Limits;
+use sastrugi_numeric::{Grid, Triangulation, triangulate};
+use serde_json::{Value, json};
 use std::fmt::Write;
 
 /// Most cells of a `.glb` or `.usda`: 4096 a side. Programs that read them hold several times their bytes in memory.
@@ -21,6 +23,92 @@ const ELEMENT_ARRAY_BUFFER: u32 = 34963;
 /// Number of a cell without data, which has no vertex.
 const NO_VERTEX: u32 = u32::MAX;
 
+/// How far a mesh may be decimated; at least one of both.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct MeshLimits {
+    /// Largest vertical distance of a cell centre from the mesh, m; 0 where only the triangles are limited.
+    pub error_max_m: Option<f64>,
+    /// Most triangles.
+    pub triangles_max: Option<usize>,
+}
+
+/// A decimated mesh of one grid.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Decimation {
+    limits: MeshLimits,
+    triangulation: Triangulation,
+    /// Triangles of the mesh that is not decimated.
+    whole: usize,
+}
+
+impl Decimation {
+    /// Decimates the mesh of a grid in metres until one of the limits is met.
+    pub(super) fn new(grid: &Grid, limits: &MeshLimits) -> Result<Self, Refusal> {
+        let error_max = limits.error_max_m.unwrap_or(0.0);
+        if !(error_max.is_finite() && error_max >= 0.0) {
+            return Err(Refusal::new(format!("the largest error of a mesh must be 0 m or more, got {error_max} m")));
+        }
+        check_cells(grid)?;
+        let whole = Mesh::of(grid, [0.0; 3], None)?.triangles().count();
+        let asked = Limits { error_max, triangles_max: limits.triangles_max };
+        let triangulation = triangulate(grid, &asked).ok_or_else(no_mesh)?;
+        let count = triangulation.triangles.len();
+        if limits.triangles_max.is_some_and(|most| count > most) {
+            let reason =
+                format!("the outline and the rims of holes alone take {count} triangles; ask for as many or more");
+            return Err(Refusal::new(reason));
+        }
+        Ok(Self { limits: *limits, triangulation, whole })
+    }
+
+    /// What was done, and the error.
+    pub fn sentence(&self) -> String {
+        let found = &self.triangulation;
+        let mut text = format!(
+            "decimated to {} of {} triangles, which pass the cell centres within {} m (RMS {} m)",
+            found.triangles.len(),
+            self.whole,
+            stated(found.error_max),
+            stated(found.error_rms)
+        );
+        if let Some(limit) = self.limits.error_max_m.filter(|limit| found.error_max > *limit) {
+            text.push_str(&format!("; {limit} m would take more triangles"));
+        }
+        text
+    }
+
+    /// The same as numbers.
+    pub fn to_json(&self) -> Value {
+        let found = &self.triangulation;
+        json!({
+            "vertices": found.cells.len(),
+            "triangles": found.triangles.len(),
+            "triangles_of_dem": self.whole,
+            "error_max_m": found.error_max,
+            "error_rms_m": found.error_rms,
+        })
+    }
+}
+
+/// An error with four digits, rounded up.
+fn stated(error_m: f64) -> f64 {
+    format!("{:.3e}", 1.0005 * error_m).parse().unwrap_or(error_m)
+}
+
+fn no_mesh() -> Refusal {
+    Refusal::new("no three neighbouring cells hold data, so that there is no mesh")
+}
+
+fn check_cells(grid: &Grid) -> Result<(), Refusal> {
+    let g = &grid.geometry;
+    if g.len() <= MAX_CELLS {
+        return Ok(());
+    }
+    let size = format!("{} x {} cells", g.cols, g.rows);
+    let limit = format!("which takes {MAX_CELLS}; choose a smaller size, or cut a window");
+    Err(Refusal::new(format!("{size} are too many for a mesh, {limit}")))
+}
+
 /// Vertices (x east, y north, z up, m) and triangles of a grid, made as they are asked for.
 struct Mesh<'a> {
     grid: &'a Grid,
@@ -28,6 +116,7 @@ struct Mesh<'a> {
     zero: [f64; 3],
     /// For each cell, the number of its vertex.
     numbers: Vec<u32>,
+    decimation: Option<&'a Decimation>,
 }
 
 impl<'a> Mesh<'a> {
@@ -35,36 +124,49 @@ impl<'a> Mesh<'a> {
     ///
     /// # Errors
     /// No triangle, or a height that does not fit in single precision.
-    fn of(grid: &'a Grid, zero: [f64; 3]) -> Result<Self, Refusal> {
+    fn of(grid: &'a Grid, zero: [f64; 3], decimation: Option<&'a Decimation>) -> Result<Self, Refusal> {
         check_single_precision(grid.values.iter().map(|z| z - zero[2]))?;
-        let mut count = 0..;
-        let numbers = grid.values.iter().map(|z| if z.is_finite() { count.next() } else { None });
-        let numbers = numbers.map(|number| number.unwrap_or(NO_VERTEX)).collect();
-        let mesh = Self { grid, zero, numbers };
+        let mut numbers = vec![NO_VERTEX; grid.values.len()];
+        match decimation {
+            Some(decimation) => number_vertices(&mut numbers, decimation.triangulation.cells.iter().copied()),
+            None => {
+                let cells = grid.values.iter().enumerate().filter(|(_, z)| z.is_finite());
+                number_vertices(&mut numbers, cells.map(|(cell, _)| cell));
+            }
+        }
+        let mesh = Self { grid, zero, numbers, decimation };
         if mesh.triangles().next().is_none() {
-            return Err(Refusal::new("no three neighbouring cells hold data, so that there is no mesh"));
+            return Err(no_mesh());
         }
         Ok(mesh)
     }
 
     /// The grid from its south-west corner, for formats of single precision.
-    fn local(grid: &'a Grid) -> Result<Self, Refusal> {
-        let g = &grid.geometry;
-        if g.len() > MAX_CELLS {
-            let size = format!("{} x {} cells", g.cols, g.rows);
-            let limit = format!("which takes {MAX_CELLS}; choose a smaller size, or cut a window");
-            return Err(Refusal::new(format!("{size} are too many for a mesh, {limit}")));
-        }
-        Self::of(grid, [g.origin[0], g.origin[1], 0.0])
+    fn local(grid: &'a Grid, decimation: Option<&'a Decimation>) -> Result<Self, Refusal> {
+        check_cells(grid)?;
+        let [x, y] = grid.geometry.origin;
+        Self::of(grid, [x, y, 0.0], decimation)
+    }
+
+    fn vertex_count(&self) -> usize {
+        self.numbers.iter().filter(|number| **number != NO_VERTEX).count()
     }
 
     fn vertices(&self) -> impl Iterator<Item = [f64; 3]> {
         let (g, [x, y, z]) = (&self.grid.geometry, self.zero);
-        let cells = self.grid.values.iter().enumerate().filter(|(_, height)| height.is_finite());
-        cells.map(move |(at, height)| [g.x(at % g.cols) - x, g.y(at / g.cols) - y, height - z])
+        let cells = self.numbers.iter().zip(&self.grid.values).enumerate();
+        let cells = cells.filter(|(_, (number, _))| **number != NO_VERTEX);
+        cells.map(move |(at, (_, height))| [g.x(at % g.cols) - x, g.y(at / g.cols) - y, height - z])
     }
 
+    /// Corners of the triangles, counter-clockwise from above: those of the decimation, or all.
     fn triangles(&self) -> impl Iterator<Item = [u32; 3]> {
+        let few = self.decimation.map(|decimation| decimation.triangulation.triangles.iter().copied());
+        let all = self.decimation.is_none().then(|| self.all_triangles());
+        few.into_iter().flatten().chain(all.into_iter().flatten())
+    }
+
+    fn all_triangles(&self) -> impl Iterator<Item = [u32; 3]> {
         let g = &self.grid.geometry;
         let squares = (1..g.rows).flat_map(move |south| (1..g.cols).map(move |east| south * g.cols + east));
         let corners = squares.flat_map(move |se| {
@@ -75,17 +177,27 @@ impl<'a> Mesh<'a> {
     }
 }
 
+/// Numbers these cells in their order.
+fn number_vertices(numbers: &mut [u32], cells: impl Iterator<Item = usize>) {
+    for (number, cell) in (0..).zip(cells) {
+        numbers[cell] = number;
+    }
+}
+
 /// Wavefront, in the DEM's own coordinates.
-pub(super) fn obj(grid: &Grid) -> Result<Vec<u8>, Refusal> {
-    obj_above(grid, 0.0)
+pub(super) fn obj(grid: &Grid, decimation: Option<&Decimation>) -> Result<Vec<u8>, Refusal> {
+    obj_above(grid, 0.0, decimation)
 }
 
 /// Wavefront, in the DEM's own coordinates, with heights above `zero_m`: single precision then counts the relief, not the height
 /// above the sea.
-pub(super) fn obj_above(grid: &Grid, zero_m: f64) -> Result<Vec<u8>, Refusal> {
-    let mesh = Mesh::of(grid, [0.0, 0.0, zero_m])?;
+pub(super) fn obj_above(grid: &Grid, zero_m: f64, decimation: Option<&Decimation>) -> Result<Vec<u8>, Refusal> {
+    let mesh = Mesh::of(grid, [0.0, 0.0, zero_m], decimation)?;
     let mut text = String::from("# terrain mesh; x east, y north, z up, metres\n");
     // Writing to a string cannot fail.
+    if let Some(decimation) = decimation {
+        let _ = writeln!(text, "# {}", decimation.sentence());
+    }
     for [x, y, z] in mesh.vertices() {
         let _ = writeln!(text, "v {x} {y} {}", z as f32);
     }
@@ -96,13 +208,13 @@ pub(super) fn obj_above(grid: &Grid, zero_m: f64) -> Result<Vec<u8>, Refusal> {
 }
 
 /// Binary glTF, whose y points up: x east, y up, z south.
-pub(super) fn glb(grid: &Grid) -> Result<Vec<u8>, Refusal> {
-    let mesh = Mesh::local(grid)?;
+pub(super) fn glb(grid: &Grid, decimation: Option<&Decimation>) -> Result<Vec<u8>, Refusal> {
+    let mesh = Mesh::local(grid, decimation)?;
     let vertices = || mesh.vertices().map(|[x, y, z]| [x as f32, z as f32, -y as f32]);
     let (low, high) = bounds(vertices());
-    let (vertex_count, triangle_count) = (grid.finite_count(), mesh.triangles().count());
+    let (vertex_count, triangle_count) = (mesh.vertex_count(), mesh.triangles().count());
     let (vertex_bytes, index_bytes) = (12 * vertex_count, 12 * triangle_count);
-    let scene = json!({
+    let mut scene = json!({
         "asset": { "version": "2.0", "generator": crate::PROGRAM },
         "scene": 0,
         "scenes": [{ "nodes": [0] }],
@@ -118,6 +230,9 @@ pub(super) fn glb(grid: &Grid) -> Result<Vec<u8>, Refusal> {
         ],
         "buffers": [{ "byteLength": vertex_bytes + index_bytes }],
     });
+    if let Some(decimation) = decimation {
+        scene["meshes"][0]["extras"] = decimation.to_json();
+    }
     let mut text = scene.to_string();
     // Chunks fill multiples of 4 bytes; that of the numbers does by itself.
     text.push_str(&" ".repeat(text.len().next_multiple_of(4) - text.len()));
@@ -135,16 +250,17 @@ pub(super) fn glb(grid: &Grid) -> Result<Vec<u8>, Refusal> {
 }
 
 /// OpenUSD: metres, z up, a collision mesh of its own triangles (no convex hull).
-pub(super) fn usda(grid: &Grid) -> Result<Vec<u8>, Refusal> {
-    let mesh = Mesh::local(grid)?;
+pub(super) fn usda(grid: &Grid, decimation: Option<&Decimation>) -> Result<Vec<u8>, Refusal> {
+    let mesh = Mesh::local(grid, decimation)?;
     let points = || mesh.vertices().map(|point| point.map(|v| v as f32));
     let (low, high) = bounds(points());
     let point = |[x, y, z]: [f32; 3]| format!("({x}, {y}, {z})");
-    let mut text = String::from(
-        "#usda 1.0\n(\n    defaultPrim = \"Terrain\"\n    doc = \"Terrain; x east, y north, z up\"\n    \
+    let what = decimation.map_or_else(String::new, |decimation| format!("; {}", decimation.sentence()));
+    let mut text = format!(
+        "#usda 1.0\n(\n    defaultPrim = \"Terrain\"\n    doc = \"Terrain; x east, y north, z up{what}\"\n    \
          kilogramsPerUnit = 1\n    metersPerUnit = 1\n    upAxis = \"Z\"\n)\n\n\
-         def Xform \"Terrain\" (\n    kind = \"component\"\n)\n{\n    def Mesh \"Mesh\" (\n        \
-         prepend apiSchemas = [\"PhysicsCollisionAPI\", \"PhysicsMeshCollisionAPI\"]\n    )\n    {\n",
+         def Xform \"Terrain\" (\n    kind = \"component\"\n)\n{{\n    def Mesh \"Mesh\" (\n        \
+         prepend apiSchemas = [\"PhysicsCollisionAPI\", \"PhysicsMeshCollisionAPI\"]\n    )\n    {{\n",
     );
     let _ = writeln!(text, "        float3[] extent = [{}, {}]", point(low), point(high));
     text.push_str("        int[] faceVertexCounts = [");
@@ -158,6 +274,12 @@ pub(super) fn usda(grid: &Grid) -> Result<Vec<u8>, Refusal> {
          uniform token subdivisionScheme = \"none\"\n    }\n}\n",
     );
     Ok(text.into_bytes())
+}
+
+/// A decimation as a sentence, after those on what was lost.
+pub(super) fn with_decimation(mut notes: Vec<String>, decimation: Option<&Decimation>) -> Vec<String> {
+    notes.extend(decimation.map(Decimation::sentence));
+    notes
 }
 
 /// Sentences on what the formats of single precision lose, whose coordinates must stay small.

@@ -33,6 +33,7 @@ pub use blocks::BlockReader;
 pub use classes::{read_classes, write_classes};
 pub use crs::{Crs, GeoKey};
 pub use formats::WRITTEN_ENDINGS;
+pub use mesh::{Decimation, MeshLimits};
 pub use png::{HeightScale, write_png_heights, write_png16};
 pub use raster::{Claimed, Compression, Dem, DemError, DemInfo, Format, MAX_CELLS, NO_DATA, ReadOptions, WriteOptions};
 
@@ -148,6 +149,15 @@ pub fn write<'a>(
     let (bytes, notes) = render(target.path, grid, crs, options).map_err(|refusal| refusal.unfit(target.path))?;
     save(target, &bytes)?;
     Ok(notes)
+}
+
+/// Decimates the mesh of a grid in metres, to be written with [`WriteOptions::decimation`].
+///
+/// # Errors
+/// [`DemError::Unfit`] for a limit out of range or one that the rims of holes exceed, for a grid without three neighbouring cells with
+/// data, and for one that is too large for a mesh.
+pub fn decimate(path: &Path, grid: &Grid, limits: &MeshLimits) -> Result<Decimation, DemError> {
+    Decimation::new(grid, limits).map_err(|refusal| refusal.unfit(path))
 }
 
 /// Most memory that [`write()`] takes for a GeoTIFF beside its grid, bytes.

@@ -2,6 +2,7 @@
 
 use super::band::Values;
 use super::crs::Crs;
+use super::mesh::Decimation;
 use crate::atomic::{self, Target};
 use sastrugi_numeric::{Geometry, Grid};
 use std::io;
@@ -194,6 +195,8 @@ pub struct WriteOptions {
     pub cloud_optimised: bool,
     /// What its values are.
     pub values: Values,
+    /// A decimation of the grid that is written, for meshes ([`super::decimate`]).
+    pub decimation: Option<Decimation>,
 }
 
 /// Geometry of a raster that does not say where it lies, with a note where nobody knows the size of its cells.

@@ -13,6 +13,7 @@
 use super::levels::Levels;
 use super::parts::{Parts, SAME};
 use super::posts::Posts;
+use crate::dem::mesh::Decimation;
 use crate::dem::raster::Refusal;
 use crate::dem::{mesh, png};
 use serde_json::json;
@@ -21,14 +22,14 @@ const COLLISION: &str = "collision.obj";
 /// Posts a side.
 pub(super) const SIZES: [usize; 6] = [129, 257, 513, 1025, 2049, 4097];
 
-pub(super) fn parts(posts: &Posts) -> Result<Parts, Refusal> {
+pub(super) fn parts(posts: &Posts, decimation: Option<&Decimation>) -> Result<Parts, Refusal> {
     let levels = Levels { offset_m: posts.low_m, step_m: posts.relief_m() / 65535.0 };
     let model = model(posts);
     Ok(Parts {
         title: "Gazebo",
         files: vec![
             ("heightmap.png".to_owned(), png::levels(&levels.of(posts))?),
-            (COLLISION.to_owned(), mesh::obj_above(&posts.heights, posts.low_m)?),
+            (COLLISION.to_owned(), mesh::obj_above(&posts.heights, posts.low_m, decimation)?),
             ("model.config".to_owned(), CONFIG.as_bytes().to_vec()),
             ("model.sdf".to_owned(), document(&model).into_bytes()),
             ("world.sdf".to_owned(), document(&world(&model)).into_bytes()),

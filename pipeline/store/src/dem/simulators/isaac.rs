@@ -3,16 +3,16 @@
 
 use super::parts::{Parts, SAME};
 use super::posts::Posts;
-use crate::dem::mesh;
+use crate::dem::mesh::{self, Decimation};
 use crate::dem::raster::Refusal;
 use serde_json::json;
 
 const SCENE: &str = "terrain.usda";
 
-pub(super) fn parts(posts: &Posts) -> Result<Parts, Refusal> {
+pub(super) fn parts(posts: &Posts, decimation: Option<&Decimation>) -> Result<Parts, Refusal> {
     Ok(Parts {
         title: "Isaac Sim",
-        files: vec![(SCENE.to_owned(), mesh::usda(&posts.heights)?)],
+        files: vec![(SCENE.to_owned(), mesh::usda(&posts.heights, decimation)?)],
         scene_to_target: SAME,
         axes: "x east, y north, z up, m",
         settings: json!({

@@ -21,7 +21,7 @@ mod unreal;
 #[cfg(test)]
 mod tests;
 
-use super::mesh;
+use super::mesh::{self, Decimation, MeshLimits};
 use super::raster::{DemError, Refusal, save};
 use crate::atomic;
 use parts::Parts;
@@ -124,13 +124,14 @@ fn size(g: &Geometry, simulator: Simulator, fit: Fit) -> Result<Option<usize>, R
     fitting.copied().ok_or_else(|| Refusal::new(refusal)).map(Some)
 }
 
-/// The files for a simulator, of heights in metres. The same heights give the same bytes.
+/// The files for a simulator, of heights in metres. The same heights give the same bytes. Where the folder holds
+/// a mesh, `limits` decimate it.
 ///
 /// # Errors
 /// [`DemError::Unfit`] as [`check_size`], for cells without data where the program has no holes, and for heights beyond single
 /// precision.
-pub fn export(grid: &Grid, simulator: Simulator, fit: Fit) -> Result<Export, DemError> {
-    export_posts(simulator, posts(grid, simulator, fit))
+pub fn export(grid: &Grid, simulator: Simulator, fit: Fit, limits: Option<&MeshLimits>) -> Result<Export, DemError> {
+    export_posts(simulator, posts(grid, simulator, fit), limits)
 }
 
 /// As [`export`], of a DEM that was brought from degrees to metres: its own coordinates are not those of the scene shifted, and the
@@ -138,18 +139,38 @@ pub fn export(grid: &Grid, simulator: Simulator, fit: Fit) -> Result<Export, Dem
 ///
 /// # Errors
 /// As [`export`].
-pub fn export_from_degrees(grid: &Grid, simulator: Simulator, fit: Fit) -> Result<Export, DemError> {
-    export_posts(simulator, posts(grid, simulator, fit).map(Posts::of_degrees))
+pub fn export_from_degrees(
+    grid: &Grid,
+    simulator: Simulator,
+    fit: Fit,
+    limits: Option<&MeshLimits>,
+) -> Result<Export, DemError> {
+    export_posts(simulator, posts(grid, simulator, fit).map(Posts::of_degrees), limits)
 }
 
-fn export_posts(simulator: Simulator, posts: Result<Posts, Refusal>) -> Result<Export, DemError> {
+/// True for simulators whose folder holds a mesh, which may be decimated.
+pub const fn has_mesh(simulator: Simulator) -> bool {
+    matches!(simulator, Simulator::Gazebo | Simulator::Isaac)
+}
+
+fn export_posts(
+    simulator: Simulator,
+    posts: Result<Posts, Refusal>,
+    limits: Option<&MeshLimits>,
+) -> Result<Export, DemError> {
     let refused = |refusal: Refusal| refusal.unfit(Path::new(simulator.name()));
     let posts = posts.map_err(refused)?;
-    let mut parts = parts(&posts, simulator).map_err(refused)?;
+    let limits = limits.filter(|_| has_mesh(simulator));
+    let decimation = limits.map(|limits| Decimation::new(&posts.heights, limits)).transpose().map_err(refused)?;
+    let mut parts = parts(&posts, simulator, decimation.as_ref()).map_err(refused)?;
+    if let Some(decimation) = &decimation {
+        parts.settings["decimation"] = decimation.to_json();
+    }
     let mut files = std::mem::take(&mut parts.files);
     files.push((IMPORT.to_owned(), import_json(&posts, &parts, simulator).into_bytes()));
     files.push((README.to_owned(), readme(&posts, &parts).into_bytes()));
-    Ok(Export { files, notes: posts.sentence().into_iter().collect() })
+    let notes = posts.sentence().into_iter().collect();
+    Ok(Export { files, notes: mesh::with_decimation(notes, decimation.as_ref()) })
 }
 
 /// Refuses a folder that holds something else than an export for this simulator, which is what [`write()`] would overwrite.
@@ -219,13 +240,13 @@ fn posts(grid: &Grid, simulator: Simulator, fit: Fit) -> Result<Posts, Refusal> 
     }
 }
 
-fn parts(posts: &Posts, simulator: Simulator) -> Result<Parts, Refusal> {
+fn parts(posts: &Posts, simulator: Simulator, decimation: Option<&Decimation>) -> Result<Parts, Refusal> {
     match simulator {
         Simulator::Unreal => unreal::parts(posts),
         Simulator::Unity => Ok(unity::parts(posts)),
-        Simulator::Gazebo => gazebo::parts(posts),
+        Simulator::Gazebo => gazebo::parts(posts, decimation),
         Simulator::Mujoco => Ok(mujoco::parts(posts)),
-        Simulator::Isaac => isaac::parts(posts),
+        Simulator::Isaac => isaac::parts(posts, decimation),
     }
 }
 

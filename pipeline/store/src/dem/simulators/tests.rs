@@ -9,7 +9,7 @@ fn slanted(rows: usize, cols: usize) -> Grid {
 }
 
 fn resampled(grid: &Grid, simulator: Simulator) -> Result<Export, DemError> {
-    export(grid, simulator, Fit::Resample)
+    export(grid, simulator, Fit::Resample, None)
 }
 
 fn numbers(export: &Export) -> Value {
@@ -42,7 +42,7 @@ fn val_sizes_that_fit_are_not_resampled() {
 fn val_crops_keep_heights_and_place() {
     let grid = slanted(140, 131);
     for (simulator, size) in [(Simulator::Unreal, 127), (Simulator::Gazebo, 129), (Simulator::Unity, 129)] {
-        let made = export(&grid, simulator, Fit::Crop).unwrap();
+        let made = export(&grid, simulator, Fit::Crop, None).unwrap();
         let (row, col) = ((140 - size) / 2, (131 - size) / 2);
         let posts = posts(&grid, simulator, Fit::Crop).unwrap();
         assert_eq!(posts.heights.values, grid.window(row, col, size, size).values);
@@ -51,10 +51,10 @@ fn val_crops_keep_heights_and_place() {
         let found = numbers(&made);
         assert_eq!((found["fit"]["method"].as_str(), &found["posts"]), (Some("crop"), &json!([size, size])));
         assert!(made.notes[0].contains("the middle of the 131 x 140 cell centres"), "{:?}", made.notes);
-        let refused = export(&slanted(140, 33), simulator, Fit::Crop);
+        let refused = export(&slanted(140, 33), simulator, Fit::Crop, None);
         assert_eq!(refused.is_err(), simulator != Simulator::Unity, "{refused:?}");
     }
-    let fits = export(&slanted(127, 127), Simulator::Unreal, Fit::Crop).unwrap();
+    let fits = export(&slanted(127, 127), Simulator::Unreal, Fit::Crop, None).unwrap();
     assert_eq!(fits, resampled(&slanted(127, 127), Simulator::Unreal).unwrap());
 }
 
@@ -97,19 +97,64 @@ fn val_planes_are_exported() {
 fn val_meshes_leave_holes_out() {
     let mut grid = slanted(3, 3);
     grid.values[0] = f64::NAN;
-    let text = String::from_utf8(mesh::obj(&grid).unwrap()).unwrap();
+    let text = String::from_utf8(mesh::obj(&grid, None).unwrap()).unwrap();
     let lines = |start: &str| text.lines().filter(|l| l.starts_with(start)).map(str::to_owned).collect::<Vec<_>>();
     assert_eq!(lines("v ")[0], "v 1000.75 -19.375 100.3");
     assert_eq!((lines("v ").len(), lines("f ").len()), (8, 6));
     assert_eq!(lines("f ")[0], "f 1 4 5");
-    let usda = String::from_utf8(mesh::usda(&grid).unwrap()).unwrap();
+    let usda = String::from_utf8(mesh::usda(&grid, None).unwrap()).unwrap();
     assert!(usda.contains("points = [(0.75, 0.625, 100.3), "), "{usda}");
-    let glb = mesh::glb(&grid).unwrap();
+    let glb = mesh::glb(&grid, None).unwrap();
     assert_eq!(u32::from_le_bytes(glb[8..12].try_into().unwrap()) as usize, glb.len());
     grid.values[2..].fill(f64::NAN);
     let meshes = [mesh::usda, mesh::glb, mesh::obj];
-    assert!(meshes.iter().all(|mesh| mesh(&grid).is_err()), "no triangle is left");
-    assert!(meshes.iter().all(|mesh| mesh(&slanted(20, 1)).is_err()), "a line is no surface");
+    assert!(meshes.iter().all(|mesh| mesh(&grid, None).is_err()), "no triangle is left");
+    assert!(meshes.iter().all(|mesh| mesh(&slanted(20, 1), None).is_err()), "a line is no surface");
+}
+
+/// A decimated mesh has the vertices and triangles that it states, in all formats and folders, and says so; others have no word of it.
+#[test]
+fn val_decimated_meshes_state_their_error() {
+    let grid = slanted(129, 129);
+    let limits = MeshLimits { error_max_m: Some(0.5), triangles_max: None };
+    let decimation = Decimation::new(&grid, &limits).unwrap();
+    let stated = decimation.to_json();
+    let [vertices, triangles] = ["vertices", "triangles"].map(|key| stated[key].as_u64().unwrap() as usize);
+    assert!(triangles < 2000 && stated["triangles_of_dem"] == 2 * 128 * 128, "{stated}");
+    assert!(stated["error_max_m"].as_f64().unwrap() <= 0.5, "{stated}");
+    let count = |text: &str, start: &str| text.lines().filter(|line| line.starts_with(start)).count();
+    let text = String::from_utf8(mesh::obj(&grid, Some(&decimation)).unwrap()).unwrap();
+    assert_eq!((count(&text, "v "), count(&text, "f ")), (vertices, triangles));
+    assert!(text.contains(&decimation.sentence()), "{text}");
+    let usda = String::from_utf8(mesh::usda(&grid, Some(&decimation)).unwrap()).unwrap();
+    assert!(usda.contains(&decimation.sentence()) && usda.contains("def Xform \"Terrain\" (\n"), "{usda}");
+    let glb = mesh::glb(&grid, Some(&decimation)).unwrap();
+    let length = u32::from_le_bytes(glb[12..16].try_into().unwrap()) as usize;
+    let scene: Value = serde_json::from_slice(&glb[20..20 + length]).unwrap();
+    assert_eq!(scene["meshes"][0]["extras"], stated);
+    for simulator in [Simulator::Gazebo, Simulator::Isaac] {
+        let made = export(&grid, simulator, Fit::Resample, Some(&limits)).unwrap();
+        assert_eq!(numbers(&made)["settings"]["decimation"]["triangles"], triangles);
+        assert_eq!(made.notes, [decimation.sentence()]);
+        assert!(numbers(&resampled(&grid, simulator).unwrap())["settings"].get("decimation").is_none());
+    }
+    let unreal = resampled(&grid, Simulator::Unreal).unwrap();
+    assert_eq!(export(&grid, Simulator::Unreal, Fit::Resample, Some(&limits)).unwrap(), unreal);
+}
+
+/// Limits that make no sense, and fewer triangles than the outline takes.
+#[test]
+fn val_limits_of_meshes_are_checked() {
+    let grid = slanted(20, 30);
+    let refused = |error_max_m: Option<f64>, triangles_max: Option<usize>| {
+        Decimation::new(&grid, &MeshLimits { error_max_m, triangles_max }).unwrap_err().to_string()
+    };
+    assert!(refused(Some(-1.0), None).contains("must be 0 m or more, got -1 m"));
+    assert!(refused(Some(f64::NAN), None).contains("got NaN m"));
+    assert!(refused(None, Some(1)).contains("take 2 triangles"));
+    let both = MeshLimits { error_max_m: Some(1e-6), triangles_max: Some(40) };
+    let sentence = Decimation::new(&grid, &both).unwrap().sentence();
+    assert!(sentence.ends_with("; 0.000001 m would take more triangles"), "{sentence}");
 }
 
 /// Beyond single precision no file is written, whose numbers would be infinite; nor where the relief alone is.
@@ -222,7 +267,7 @@ fn val_degrees_have_no_shift() {
     let grid = slanted(4, 4);
     let found = numbers(&resampled(&grid, Simulator::Mujoco).unwrap());
     assert_eq!(found["scene"]["dem_minus_scene_m"], json!([1000.0, -20.0]));
-    let export = export_from_degrees(&grid, Simulator::Mujoco, Fit::Resample).unwrap();
+    let export = export_from_degrees(&grid, Simulator::Mujoco, Fit::Resample, None).unwrap();
     assert!(numbers(&export)["scene"]["dem_minus_scene_m"].is_null());
     let (_, readme) = export.files.iter().find(|(name, _)| name == README).unwrap();
     assert!(String::from_utf8_lossy(readme).contains("corner of the DEM, which is in degrees;"));

@@ -1,0 +1,26 @@
+//! A vehicle for other simulators: a known one or that of a vehicle file, as bodies on joints.
+
+use super::parameters::assign_vehicle;
+use crate::error::Error;
+use sastrugi_mobility::registry::{doubts, vehicle};
+use sastrugi_mobility::vehicle::SurfaceParameters;
+use sastrugi_schemas::kind::read_parameters;
+use sastrugi_schemas::mechanism::Mechanism;
+use serde_json::json;
+
+/// The vehicle of that name or file, with the friction of a surface preset, and doubts about it, a sentence each.
+///
+/// # Errors
+/// A file that cannot be read, a vehicle or a surface that is not known, or a number out of range.
+pub fn mechanism(name: &str, surface: Option<&str>) -> Result<(Mechanism, Vec<String>), Error> {
+    let mut params = json!({});
+    assign_vehicle(&mut params, name)?;
+    let kind = params["vehicle"].as_str().unwrap_or_default();
+    let changes = params["vehicle_changes"].as_object().cloned().unwrap_or_default();
+    let surface: SurfaceParameters = match surface {
+        Some(preset) => read_parameters(&json!({ "preset": preset }))?,
+        None => SurfaceParameters::default(),
+    };
+    let found = vehicle(kind, &changes)?;
+    Ok((found.mechanism(&surface), doubts(kind, &changes)))
+}
