@@ -95,7 +95,7 @@ pub struct Source {
     pub citation: Option<String>,
 }
 
-/// A sentence about an item: a conversion, a rounded size, a warning of a fit.
+/// A sentence about an item: a conversion, a rounded size, the verdict on a fit.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ItemNote {

@@ -13,6 +13,9 @@ const TICKS_PER_SECOND: f64 = 1000.0;
 /// Time after which the speed of a copy is known, s.
 const KNOWN_AFTER_S: f64 = 2.0;
 
+/// Between two lines of progress where there is no bar, s.
+const LINE_EVERY_S: f64 = 1.0;
+
 /// The listener of a run.
 pub struct Teller {
     quiet: bool,
@@ -29,6 +32,19 @@ struct State {
     seconds_done: f64,
     /// When a copy began whose speed is not told yet.
     copy_start: Option<Instant>,
+    last_line: Option<Instant>,
+}
+
+impl State {
+    /// True when the last line is a while ago, and at the last item.
+    fn is_time(&mut self) -> bool {
+        let is_time =
+            self.ended == self.total || self.last_line.is_none_or(|at| at.elapsed().as_secs_f64() >= LINE_EVERY_S);
+        if is_time {
+            self.last_line = Some(Instant::now());
+        }
+        is_time
+    }
 }
 
 impl Teller {
@@ -75,7 +91,8 @@ impl Teller {
                 bar.set_position((state.seconds_done * TICKS_PER_SECOND) as u64);
                 bar.set_message(format!("{counts}, {item}"));
             }
-            None => self.say(&format!("{counts}, {item}{}", self.remaining(&state))),
+            None if state.is_time() => self.say(&format!("{counts}, {item}{}", self.remaining(&state))),
+            None => {}
         }
     }
 
@@ -120,7 +137,8 @@ impl Progress for Teller {
 
     fn ended(&self, item: &ItemRef, end: &End, seconds: f64) {
         match end {
-            End::Done(notes) => notes.iter().for_each(|note| self.say(&format!("{item}: {note}"))),
+            // Their sentences are told in the end, by `watch`.
+            End::Done(_) => {}
             End::Failed(why) => self.print(&format!("sastrugi: {item} failed: {why}")),
             End::Skipped(parent) => self.print(&format!("sastrugi: {item} not tried, because {parent} failed")),
         }
@@ -137,11 +155,15 @@ impl Progress for Teller {
     }
 
     fn phase(&self, text: &str) {
-        if let Some(bar) = &self.bar {
-            bar.set_message(text.to_owned());
-        }
+        self.step(text);
         if self.bar.is_none() {
             self.say(text);
+        }
+    }
+
+    fn step(&self, text: &str) {
+        if let Some(bar) = &self.bar {
+            bar.set_message(text.to_owned());
         }
     }
 }

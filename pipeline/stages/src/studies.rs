@@ -1,7 +1,7 @@
 //! What a command does with a whole study: run, plan, merge. What it does with a release is in [`crate::verification`].
 
 use crate::error::Error;
-use crate::jobs::original;
+use crate::jobs::{fit, original};
 use crate::loaded::{Loaded, load_text};
 use crate::registry;
 use crate::runner::assemble::{Contents, assemble};
@@ -11,6 +11,7 @@ use crate::runner::plan::{PlanSummary, plan};
 use crate::runner::progress::Progress;
 use crate::runner::shard::{self, Part};
 use crate::study::Study;
+use sastrugi_schemas::manifest::ItemNote;
 use sastrugi_schemas::study::StudyHead;
 use sastrugi_store::release;
 use serde::Serialize;
@@ -46,6 +47,18 @@ pub struct RunSummary {
     pub computed: usize,
     /// Items without a result.
     pub failures: Vec<Failure>,
+    /// Sentences about the items of a release, as its manifest has them; none of a shard.
+    pub notes: Vec<ItemNote>,
+}
+
+impl RunSummary {
+    /// What each fit came to: the first of its notes.
+    pub fn verdicts(&self) -> Vec<&ItemNote> {
+        let of_fits = self.notes.iter().filter(|note| note.stage == fit::STAGE);
+        let mut verdicts: Vec<&ItemNote> = of_fits.collect();
+        verdicts.dedup_by(|later, first| later.item == first.item);
+        verdicts
+    }
 }
 
 /// The work area that belongs to a release folder.
@@ -72,8 +85,11 @@ pub fn run(loaded: &Loaded, request: &RunRequest<'_>, progress: &dyn Progress) -
     if !made && !execution.failures.is_empty() {
         return Err(all_failed(&execution.failures));
     }
-    match request.part {
-        Some(part) => shard::write(request.output, loaded, &cache, part, &execution.failures, request.replace)?,
+    let notes = match request.part {
+        Some(part) => {
+            shard::write(request.output, loaded, &cache, part, &execution.failures, request.replace)?;
+            Vec::new()
+        }
         None => {
             let results =
                 execution.done.iter().map(|&p| cache.result_folder(&graph.node(p).item, graph.key(p))).collect();
@@ -85,12 +101,13 @@ pub fn run(loaded: &Loaded, request: &RunRequest<'_>, progress: &dyn Progress) -
                 failures: &execution.failures,
                 replace: request.replace,
             };
-            assemble(&contents, request.output, progress)?;
+            assemble(&contents, request.output, progress)?.manifest().notes.clone()
         }
-    }
+    };
     cache.drop_orphans(graph)?;
     let computed = execution.seconds.len() - execution.failures.iter().filter(|f| f.skipped_for.is_none()).count();
-    Ok(RunSummary { output: request.output.to_owned(), items: needed.len(), computed, failures: execution.failures })
+    let (output, items, failures) = (request.output.to_owned(), needed.len(), execution.failures);
+    Ok(RunSummary { output, items, computed, failures, notes })
 }
 
 /// Items of a part of a study with those that they need; all of them without a part.
@@ -220,8 +237,8 @@ pub fn merge(shards: &[PathBuf], output: &Path, replace: bool, progress: &dyn Pr
         failures: &joined.failures,
         replace,
     };
-    assemble(&contents, output, progress)?;
-    Ok(RunSummary { output: output.to_owned(), items, computed: 0, failures: joined.failures })
+    let notes = assemble(&contents, output, progress)?.manifest().notes.clone();
+    Ok(RunSummary { output: output.to_owned(), items, computed: 0, failures: joined.failures, notes })
 }
 
 /// Runs a study that a verb made up, to a release of its own.

@@ -6,9 +6,11 @@ use crate::failure::{Code, Failure};
 use crate::output::{bytes, columns, print, seconds, warn};
 use crate::progress::Teller;
 use sastrugi_report::{Companions, ReportError};
+use sastrugi_schemas::manifest::ItemNote;
 use sastrugi_stages::loaded;
 use sastrugi_stages::packing;
 use sastrugi_stages::runner::execute::Limits;
+use sastrugi_stages::runner::progress::Progress;
 use sastrugi_stages::runner::shard::Part;
 use sastrugi_stages::studies::{self, RunRequest, RunSummary};
 use sastrugi_stages::verbs::{parameters, traverse as drive};
@@ -19,6 +21,10 @@ use std::time::Instant;
 
 /// Working memory of the items at once where no option sets it, GiB.
 const MEMORY_GIB: f64 = 4.0;
+/// Most verdicts on fits that a run ends with.
+const VERDICTS_MAX: usize = 5;
+/// Most other notes that it ends with.
+const NOTES_MAX: usize = 3;
 /// Most lines of a plan for people.
 const PLAN_LINES: usize = 40;
 
@@ -109,7 +115,22 @@ pub(super) fn watch(
         text.push_str("\nfailed items are listed with their parameters in manifest.json:");
         summary.failures.iter().for_each(|f| text.push_str(&format!("\n  {}: {}", f.item, f.message)));
     }
+    text.push_str(&told(&summary));
     Ok((summary, text))
+}
+
+/// What the items came to: the verdict on each fit, then the other notes, where they are few.
+fn told(summary: &RunSummary) -> String {
+    let verdicts = summary.verdicts();
+    let line = |note: &ItemNote| format!("\n  {}/{}: {}", note.stage, note.item, note.note);
+    let mut text: String = verdicts.iter().take(VERDICTS_MAX).map(|note| line(note)).collect();
+    let others: Vec<&ItemNote> =
+        summary.notes.iter().filter(|note| !verdicts.iter().take(VERDICTS_MAX).any(|v| v == note)).collect();
+    match others.len() {
+        0..=NOTES_MAX => others.iter().for_each(|note| text.push_str(&line(note))),
+        n => text.push_str(&format!("\n  {n} notes on items: `notes` in manifest.json")),
+    }
+    text
 }
 
 /// `plan`.
@@ -208,7 +229,7 @@ pub fn report(args: &Report, common: &Common) -> Verdict {
     }
     let companions = Companions { against: args.against.clone(), logs: args.logs.clone() };
     let teller = Teller::new(common.quiet);
-    let summary = sastrugi_report::render_with(&args.release, &companions, &output, &|phase| teller.say(phase));
+    let summary = sastrugi_report::render_with(&args.release, &companions, &output, &|step| teller.step(step));
     let summary = summary.map_err(|e| match e {
         ReportError::Occupied { .. } => Failure::usage(e.to_string()),
         e if e.unusable_input() => Failure::input(e),

@@ -233,6 +233,8 @@ impl Job for FitJob {
         let band = shown::covariance_band(&residual, &outcome);
         let map = outcome.covariance_map();
         let fit = with_source(outcome.fit, source);
+        // First: it is what a run ends with. Its warnings stand in the fit file and the table.
+        notes.insert(0, fit.verdict.clone());
         work.write(FIT, to_json(&fit)?.as_bytes())?;
         let id = &self.id;
         let mut products = vec![Product::released(FIT, format!("fit/{id}.json"), None)];
@@ -252,7 +254,6 @@ impl Job for FitJob {
         outcome.write_rows(work, curve_rows(id, &fit))?;
         outcome.write_rows(work, profile_rows(id, &fit))?;
         SurfaceRows::of_residual(&surface, &fit).write(work, &mut outcome)?;
-        outcome.notes.extend(fit.warnings);
         Ok(outcome)
     }
 }

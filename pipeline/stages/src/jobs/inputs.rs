@@ -191,9 +191,9 @@ fn of_file(
         }
     };
     let key = entry.path_of_dotted(&named.key);
-    let place = InputPlace { key, release_path: release_path.clone() };
-    if !builder.inputs.contains(&place) {
-        builder.inputs.push(place);
+    let stated = InputPlace { key, release_path: release_path.clone() };
+    if !builder.inputs.contains(&stated) {
+        builder.inputs.push(stated);
     }
     let file = original::name(&release_path).to_owned();
     Ok(Source { named, item: copy, file, release_path: Some(release_path), cells, place })

@@ -215,7 +215,7 @@ fn add_documents(builder: &mut ReleaseBuilder, contents: &Contents<'_>, sources:
 fn add_report(builder: &mut ReleaseBuilder, progress: &dyn Progress) -> Result<(), Error> {
     builder.write_draft()?;
     let staging = builder.staging().to_owned();
-    sastrugi_report::render(&staging, &staging.join("report"), &|phase| progress.phase(phase)).map_err(Error::io)?;
+    sastrugi_report::render(&staging, &staging.join("report"), &|step| progress.step(step)).map_err(Error::io)?;
     for path in files_below(&staging, Path::new("report"))? {
         builder.adopt(&path, Origin { stage: "report".to_owned(), ..Origin::default() })?;
     }

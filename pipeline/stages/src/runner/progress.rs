@@ -20,6 +20,10 @@ pub trait Progress: Sync {
     fn phase(&self, text: &str) {
         let _ = text;
     }
+    /// A part of a phase, of interest while it goes on.
+    fn step(&self, text: &str) {
+        let _ = text;
+    }
 }
 
 /// How an item ended.
