@@ -11,7 +11,7 @@ from mcap.reader import make_reader
 
 def missions(release):
     """Rows of the table `missions` as dictionaries, in its order."""
-    return pq.read_table(release / "tables/missions/part-0000.parquet").to_pylist()
+    return pq.read_table(release / "tables/missions").to_pylist()
 
 
 def parameters(release, row):

@@ -365,8 +365,7 @@ impl<'a> Builder<'a> {
 /// The sentence on a study with too many items.
 fn too_many(most: usize) -> String {
     format!(
-        "the study stands for more than {most} items, the most that are possible; split it into several studies (every surface is two items: it is \
-         made, and described)"
+        "the study expands to more than {most} items, the limit; split it into several studies (each surface counts as two items)"
     )
 }
 
@@ -430,7 +429,7 @@ mod tests {
     fn val_items_of_all_tables_are_limited_together() {
         assert_eq!(refused(12), (String::new(), 12));
         let (said, items) = refused(4);
-        assert!(said.contains("terrain \"b\": the study stands for more than 4 items") && items == 4, "{said}");
+        assert!(said.contains("terrain \"b\": the study expands to more than 4 items") && items == 4, "{said}");
         assert!(!said.contains("terrain \"c\""), "{said}");
         // Describing the surfaces is too much.
         let (said, items) = refused(8);

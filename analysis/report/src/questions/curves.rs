@@ -72,9 +72,8 @@ pub fn slope_band(terrain: &TerrainRow) -> [f64; 2] {
 /// True where the curves cover the band of a fitted slope, but for the ends that their bins leave free: beyond, densities are rounding
 /// noise, which a slope was fitted to as well.
 pub fn covers(band: [f64; 2], curves: &[Curve]) -> bool {
-    let ends = |of: fn(f64, f64) -> f64, start: f64| {
-        curves.iter().flat_map(|c| c.points.iter()).map(|p| p.0).fold(start, of)
-    };
+    let ends =
+        |of: fn(f64, f64) -> f64, start: f64| curves.iter().flat_map(|c| c.points.iter()).map(|p| p.0).fold(start, of);
     ends(f64::min, f64::INFINITY) <= END_MAX * band[0] && ends(f64::max, 0.0) >= band[1] / END_MAX
 }
 

@@ -182,7 +182,11 @@ impl Vehicle {
         let own = LINK_SHARE * wheels.transverse_inertia_kg_m2;
         // All hubs of a link stand on one line along x.
         let along: f64 = hubs.iter().map(|hub| each_kg * (hub[0] - middle[0]) * (hub[0] - middle[0])).sum();
-        let limit_deg = if parent == CHASSIS { joints.rocker_limit_deg } else { joints.bogie_limit_deg };
+        // The model has one damper in the differential, which turns with both rockers: each takes half of it.
+        let (limit_deg, damping) = match parent {
+            CHASSIS => (joints.rocker_limit_deg, 0.5 * joints.damping_n_m_s),
+            _ => (joints.bogie_limit_deg, joints.damping_n_m_s),
+        };
         let limit = limit_deg.to_radians();
         Link {
             name: name.to_owned(),
@@ -196,7 +200,7 @@ impl Vehicle {
                 name: pivot_joint(name),
                 motion: Motion::TurnY,
                 range: Some([-limit, limit]),
-                damping: joints.damping_n_m_s,
+                damping,
                 spring: None,
             }],
         }

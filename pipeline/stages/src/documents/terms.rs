@@ -109,7 +109,9 @@ fn refusal(theirs: &Known, ours: &Known, stated: &str) -> Option<String> {
     match theirs.terms {
         Terms::Free => None,
         Terms::Attribution | Terms::Notice if ours.terms != Terms::Free => None,
-        Terms::Attribution | Terms::Notice => Some(format!("[study] license must ask for attribution too, as \"{stated}\" does")),
+        Terms::Attribution | Terms::Notice => {
+            Some(format!("[study] license must ask for attribution too, as \"{stated}\" does"))
+        }
         Terms::ShareAlike | Terms::NonCommercialShareAlike if alike => None,
         Terms::ShareAlike | Terms::NonCommercialShareAlike => {
             Some(format!("[study] license must be \"{stated}\" as well, or a later version of it"))

@@ -5,7 +5,7 @@
 //! without a licence for CC0; the notes then state the licence. Grants are listed where they are identifiers as Zenodo has them, the rest
 //! of the funding is in the notes.
 
-use super::described::{Described, Maker, page, source_line};
+use super::described::{Described, Maker, source_line};
 use super::spdx_list;
 use serde_json::{Value, json};
 
@@ -29,7 +29,8 @@ pub fn text(described: &Described<'_>) -> String {
     });
     let (grants, other): (Vec<&String>, Vec<&String>) = head.funding.iter().partition(|text| is_grant(text));
     let grants: Vec<Value> = grants.into_iter().map(|id| json!({ "id": id })).collect();
-    let page = page(head).map(|page| json!([{ "identifier": page, "relation": "isAlternateIdentifier" }]));
+    // Not the DOI, which is the deposit's own.
+    let page = head.url.as_ref().map(|page| json!([{ "identifier": page, "relation": "isAlternateIdentifier" }]));
     let sources: Vec<String> = described.sources.iter().map(source_line).collect();
     let optional = [
         ("version", head.version.as_ref().map(|version| json!(version))),

@@ -1,6 +1,6 @@
 //! Stage `scoreboard`: all methods of a texture side by side.
 
-use super::matched::Matched;
+use super::matched::{Matched, seconds_per_operation};
 use crate::job::{Estimate, Job, JobError, Outcome, Work};
 use crate::revision::Room;
 use sastrugi_numeric::Streams;
@@ -115,9 +115,9 @@ impl Job for ScoreboardJob {
     }
 
     fn estimate(&self) -> Estimate {
-        let operations: f64 = self.entrants.iter().filter_map(|e| e.cost).map(|cost| cost.operations).sum();
-        // 5e9 operations a second measured, on average over the methods.
-        Estimate { seconds: 2e-10 * operations * f64::from(self.realisations), bytes: 1e5 }
+        let seconds = |e: &Entrant| e.cost.map(|cost| seconds_per_operation(&e.method) * cost.operations);
+        let of_one: f64 = self.entrants.iter().filter_map(seconds).sum();
+        Estimate { seconds: of_one * f64::from(self.realisations), bytes: 1e5 }
     }
 
     fn run(&self, work: &Work<'_>) -> Result<Outcome, JobError> {

@@ -2,7 +2,7 @@
 
 use super::dem as dem_job;
 use super::fit;
-use super::matched::Matched;
+use super::matched::{Matched, seconds_per_operation};
 use super::rasters::{SECONDS_PER_WRITTEN_CELL, raster_options, raster_packing};
 use super::scoreboard::{self, Entrant, ScoreboardJob};
 use super::surface::{Surface, SurfaceRows};
@@ -30,15 +30,6 @@ use std::sync::Arc;
 pub const STAGE: &str = "texture";
 /// Most realisations of a scoreboard.
 const REALISATIONS_MAX: u32 = 1000;
-
-/// Rough time of an arithmetic operation of a method, s: of transforms, of bumps that are added all over a field, of a dense factor.
-fn seconds_per_operation(method: &str) -> f64 {
-    match method {
-        "gaussians" | "quasi_wavelets" => 3.5e-9,
-        "cholesky" => 2e-10,
-        _ => 5e-10,
-    }
-}
 
 /// Rough time of a cell of a texture that is detrended, trimmed and described, s.
 const SECONDS_PER_DESCRIBED_CELL: f64 = 6e-7;

@@ -330,10 +330,13 @@ fn check_orcids(head: &StudyHead) -> Result<(), ParameterError> {
             return refuse("orcid", format!("is {wrong}"));
         }
         if head.organizations.iter().any(|name| name == creator.name()) {
-            return refuse("orcid", format!("is of \"{}\", an organisation; ORCID iDs are of people", creator.name()));
+            return refuse(
+                "orcid",
+                format!("belongs to \"{}\", an organisation; only people have ORCID iDs", creator.name()),
+            );
         }
         if !seen.insert(orcid) {
-            return refuse("orcid", format!("is \"{orcid}\", which another creator has"));
+            return refuse("orcid", format!("is \"{orcid}\", which another creator has too"));
         }
     }
     Ok(())
@@ -344,7 +347,7 @@ fn check_words(key: &str, words: &[String]) -> Result<(), ParameterError> {
     for (k, word) in words.iter().enumerate() {
         let wrong = match () {
             () if word.trim().is_empty() => "is empty".to_owned(),
-            () if words[..k].contains(word) => format!("\"{word}\" is there twice"),
+            () if words[..k].contains(word) => format!("\"{word}\" is listed twice"),
             () => continue,
         };
         return Err(ParameterError::new(format!("{key}.{k}"), wrong));

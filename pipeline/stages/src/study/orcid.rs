@@ -12,7 +12,7 @@ pub fn check(orcid: &str) -> Result<(), String> {
     match last == right {
         true => Ok(()),
         false => Err(format!(
-            "\"{orcid}\", whose checksum is wrong: after its other digits the last character is {right}; look for a digit that is mistyped"
+            "\"{orcid}\", whose checksum is wrong (the last character should be {right}): check for a mistyped digit"
         )),
     }
 }

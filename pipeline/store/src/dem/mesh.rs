@@ -7,7 +7,7 @@
 use super::checks::check_single_precision;
 use super::crs::Crs;
 use super::raster::Refusal;
-use sastrugi_numeric::triangulation::Limits;
+use sastrugi_numeric::triangulation::{self, Limits};
 use sastrugi_numeric::{Grid, Triangulation, triangulate};
 use serde_json::{Value, json};
 use std::fmt::Write;
@@ -48,7 +48,9 @@ impl Decimation {
         if !(error_max.is_finite() && error_max >= 0.0) {
             return Err(Refusal::new(format!("the largest error of a mesh must be 0 m or more, got {error_max} m")));
         }
-        check_cells(grid)?;
+        if grid.geometry.len() > triangulation::MAX_CELLS {
+            return Err(too_many(grid, triangulation::MAX_CELLS));
+        }
         let whole = Mesh::of(grid, [0.0; 3], None)?.triangles().count();
         let asked = Limits { error_max, triangles_max: limits.triangles_max };
         let triangulation = triangulate(grid, &asked).ok_or_else(no_mesh)?;
@@ -65,7 +67,7 @@ impl Decimation {
     pub fn sentence(&self) -> String {
         let found = &self.triangulation;
         let mut text = format!(
-            "decimated to {} of {} triangles, which pass the cell centres within {} m (RMS {} m)",
+            "decimated to {} of {} triangles; largest error at a cell centre {} m, RMS {} m",
             found.triangles.len(),
             self.whole,
             stated(found.error_max),
@@ -92,21 +94,24 @@ impl Decimation {
 
 /// An error with four digits, rounded up.
 fn stated(error_m: f64) -> f64 {
-    format!("{:.3e}", 1.0005 * error_m).parse().unwrap_or(error_m)
+    let nearest: f64 = format!("{error_m:.3e}").parse().unwrap_or(error_m);
+    match nearest >= error_m {
+        true => nearest,
+        // One in the last digit more.
+        false => format!("{:.3e}", nearest + 1e-3 * libm::pow(10.0, libm::floor(libm::log10(error_m))))
+            .parse()
+            .unwrap_or(error_m),
+    }
 }
 
 fn no_mesh() -> Refusal {
     Refusal::new("no three neighbouring cells hold data, so that there is no mesh")
 }
 
-fn check_cells(grid: &Grid) -> Result<(), Refusal> {
+fn too_many(grid: &Grid, most: usize) -> Refusal {
     let g = &grid.geometry;
-    if g.len() <= MAX_CELLS {
-        return Ok(());
-    }
-    let size = format!("{} x {} cells", g.cols, g.rows);
-    let limit = format!("which takes {MAX_CELLS}; choose a smaller size, or cut a window");
-    Err(Refusal::new(format!("{size} are too many for a mesh, {limit}")))
+    let limit = format!("which takes {most}; choose a smaller size, or cut a window");
+    Refusal::new(format!("{} x {} cells are too many for a mesh, {limit}", g.cols, g.rows))
 }
 
 /// Vertices (x east, y north, z up, m) and triangles of a grid, made as they are asked for.
@@ -143,9 +148,10 @@ impl<'a> Mesh<'a> {
 
     /// The grid from its south-west corner, for formats of single precision.
     fn local(grid: &'a Grid, decimation: Option<&'a Decimation>) -> Result<Self, Refusal> {
-        check_cells(grid)?;
         let [x, y] = grid.geometry.origin;
-        Self::of(grid, [x, y, 0.0], decimation)
+        let mesh = Self::of(grid, [x, y, 0.0], decimation)?;
+        let vertices = decimation.map_or(grid.geometry.len(), |d| d.triangulation.cells.len());
+        if vertices > MAX_CELLS { Err(too_many(grid, MAX_CELLS)) } else { Ok(mesh) }
     }
 
     fn vertex_count(&self) -> usize {

@@ -114,16 +114,22 @@ fn check_reach(surface: &Geometry, cells: &Geometry) -> Result<(), String> {
     }
     let ([[x0, x1], [y0, y1]], [[west, east], [south, north]]) = (has, needs);
     Err(format!(
-        "has the centres of its outer cells at x {x0} to {x1}, y {y0} to {y1} m; the centres of the cells to be made, x {west} to {east}, \
-         y {south} to {north} m, do not lie between them"
+        "covers x {x0} to {x1}, y {y0} to {y1} m (centres of its outer cells), but the cells to be made reach from x {west} to {east}, y {south} to \
+         {north} m: move `origin_m`, or make the surface smaller"
     ))
 }
 
 /// A surface at the centres of other cells.
 fn sampled(base: &NamedInput, surface: &Grid, geometry: &Geometry) -> Result<Grid, TerrainError> {
-    check_reach(&surface.geometry, geometry).map_err(|reason| base.error(reason))?;
+    let has = &surface.geometry;
+    check_reach(has, geometry).map_err(|reason| base.error(reason))?;
+    // Within rounding of the outer centres counts as on them.
+    let (west, south) = (has.origin[0] + 0.5 * has.cell[0], has.origin[1] + 0.5 * has.cell[1]);
+    let within =
+        |v: f64, low: f64, count: usize, cell: f64| low + cell * ((v - low) / cell).clamp(0.0, (count - 1) as f64);
     let at = |k: usize| {
         let (x, y) = (geometry.x(k % geometry.cols), geometry.y(k / geometry.cols));
+        let (x, y) = (within(x, west, has.cols, has.cell[0]), within(y, south, has.rows, has.cell[1]));
         surface.height(x, y).ok_or_else(|| {
             let reason = format!("has no height at x = {x} m, y = {y} m; it must reach all centres of the cells");
             base.error(reason)

@@ -99,7 +99,8 @@ fn val_surfaces_must_reach_the_cells() {
     let small = Grid::filled(Geometry::square(10, 10, 0.5), 1.0);
     let error = prepared(json!([{"of": "small"}])).generate(&streams(), &[small.into()]).unwrap_err();
     assert!(
-        error.to_string().contains("\"small\"") && error.to_string().contains("at x 0.25 to 4.75, y 0.25 to 4.75 m"),
+        error.to_string().contains("\"small\"")
+            && error.to_string().contains("covers x 0.25 to 4.75, y 0.25 to 4.75 m"),
         "{error}"
     );
     let error = prepared(json!([{"of": "small"}])).generate(&streams(), &[]).unwrap_err();
@@ -121,7 +122,7 @@ fn val_places_are_checked_before_the_run() {
     let error = generator.check_places(&[Some(wide), Some(small.geometry)]).unwrap_err();
     assert_eq!(error.key, "processes.2.of");
     let at_run = generator.generate(&streams(), &[Grid::filled(wide, 1.0).into(), small.into()]).unwrap_err();
-    let reason = at_run.to_string().split_once("it has").unwrap().1.to_owned();
+    let reason = at_run.to_string().split_once("it covers").unwrap().1.to_owned();
     assert!(
         reason.contains("x 0.25 to 4.75, y 0.25 to 4.75 m") && error.message.ends_with(&reason),
         "{error} {at_run}"

@@ -16,7 +16,6 @@
 use super::FitSettings;
 use super::params::Mode;
 use super::resampling::CELLS_MAX;
-use super::search::RANGE_MAX_WINDOWS;
 use crate::covariance::Form;
 use crate::synth::Prospect;
 use sastrugi_numeric::Geometry;
@@ -45,17 +44,14 @@ const RINGS_MAX: f64 = 32.0;
 const PAPER_CELL_S: f64 = 4e-7;
 /// Windows across a surface whose cells are not known.
 const WINDOWS_ACROSS: f64 = 10.0;
-/// Ranges along a torus that holds an exponential.
-const TORUS_RANGES: f64 = 16.0;
+/// Windows along the torus of a texture that does not repeat: sixteen ranges of an exponential, each as long as the window. A fit may find a
+/// longer range, up to where its search ends; planned for that, most textures would run alone or not at all.
+const TORUS_WINDOWS: f64 = 16.0;
 
 impl FitSettings {
     /// What is known of the fit, of a surface with such cells, before it is made.
     pub fn prospect(&self, cell_m: Option<[f64; 2]>) -> Prospect {
-        Prospect {
-            torus_m: TORUS_RANGES * RANGE_MAX_WINDOWS * self.outer_scale_m(),
-            cell_m,
-            is_measured: self.is_empirical(),
-        }
+        Prospect { torus_m: TORUS_WINDOWS * self.outer_scale_m(), cell_m, is_measured: self.is_empirical() }
     }
 
     /// Rough time of a fit of `cells` cells on one core, s. Where shape and cells are not known, for a square with ten windows to a side.

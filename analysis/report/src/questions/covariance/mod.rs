@@ -11,9 +11,9 @@ use super::curves::HEIGHT;
 use super::relief::{Style, Words, deviations, exaggeration_words, limit_m, relief};
 use super::sql::quoted;
 use crate::ReportError;
-use crate::fit_figure::SURFACE_MAX;
 use crate::content::{Block, Figure, Numbers, TableBlock, number, slug, text};
 use crate::data::Data;
+use crate::fit_figure::SURFACE_MAX;
 use crate::render::axis::Axis;
 use crate::render::chart::{Mark, Plot, WIDTH};
 use crate::render::number as set;
@@ -86,10 +86,13 @@ fn warnings(data: &Data, fits: &[&FitRow]) -> Result<Vec<String>, ReportError> {
     Ok(sentences.into_iter().map(|(sentence, of)| format!("{}: {sentence}", of.join(", "))).collect())
 }
 
+/// How sentences begin that begin with a symbol.
+const SYMBOLS: [&str; 3] = ["b ", "sigma ", "sigma^2"];
+
 /// The words with a capital and a full stop; a symbol at the start stays as it is.
 fn sentence(words: &str) -> String {
     let words = words.trim();
-    let symbol = words.chars().nth(1).is_none_or(|second| !second.is_alphabetic());
+    let symbol = SYMBOLS.iter().any(|symbol| words.starts_with(symbol));
     let mut chars = words.chars();
     let start: String = match chars.next() {
         Some(first) if symbol => first.to_string(),
@@ -113,8 +116,7 @@ fn covariances(data: &Data, fits: &[&FitRow]) -> Vec<Figure> {
     let all = || drawn.iter().flat_map(|(_, bins)| bins.iter());
     let finite = |values: Vec<f64>| values.into_iter().filter(|v| v.is_finite());
     let values = || {
-        let of_bin =
-            |r: &&CovarianceRow| vec![r.covariance_m2, r.model_m2, r.covariance_low_m2, r.covariance_high_m2];
+        let of_bin = |r: &&CovarianceRow| vec![r.covariance_m2, r.model_m2, r.covariance_low_m2, r.covariance_high_m2];
         all().flat_map(move |r| finite(of_bin(r)))
     };
     let x = Axis::linear(0.0, 1.03 * all().map(|r| r.lag_m).fold(0.0, f64::max));

@@ -18,9 +18,15 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     for item in &data.failed {
         numbers.row([text(&item.stage), text(&item.item), text(&item.error), text(item.parameters.to_string())]);
     }
-    let items = if data.failed.len() == 1 { "item" } else { "items" };
-    let sentence =
-        format!("{} {items} of the study failed and are not in any figure below.", set::count(data.failed.len()));
     let table = TableBlock { id: "failed".into(), caption: "Failed items".into(), numbers };
-    Ok(vec![Block::Warning(sentence), Block::Table(table)])
+    Ok(in_words(data).map(Block::Warning).into_iter().chain([Block::Table(table)]).collect())
+}
+
+/// How many items failed; `None` where none did.
+pub(super) fn in_words(data: &Data) -> Option<String> {
+    match data.failed.len() {
+        0 => None,
+        1 => Some("1 item of the study failed and is not in any figure below.".to_owned()),
+        n => Some(format!("{} items of the study failed and are not in any figure below.", set::count(n))),
+    }
 }

@@ -38,10 +38,15 @@ pub fn blocks(data: &Data, groups: &[Group<MissionRow>]) -> Vec<Block> {
     if length <= 0.0 {
         return Vec::new();
     }
-    let heading = Block::Heading("How far they came".into());
-    let (failing, whole): (Vec<&Curves>, Vec<&Curves>) = all.iter().partition(|c| c.fails());
-    if failing.is_empty() {
-        return vec![heading, Block::Text("No mission failed: all came to the end of their line.".into())];
+    let heading = Block::Heading("Distance before failure".into());
+    let fails = |group: &&Group<MissionRow>| outcome::counts(group.rows.iter().copied())[1..].iter().any(|n| *n > 0);
+    let whole: Vec<String> = groups
+        .iter()
+        .filter(|g| !fails(g))
+        .map(|g| format!("{} ({})", g.name, set::counted(g.rows.len(), "mission")))
+        .collect();
+    if whole.len() == groups.len() {
+        return vec![heading, Block::Text("No mission failed: every one reached its goal.".into())];
     }
     let words = format!(
         "The share of missions that have failed in each way up to a distance along their line: competing risks, by Aalen and \
@@ -50,21 +55,12 @@ pub fn blocks(data: &Data, groups: &[Group<MissionRow>]) -> Vec<Block> {
          Bands are {} % at each distance, from {REPLICATES} redraws of whole terrains.",
         set::fixed(100.0 * LEVEL, 0)
     );
-    let figures = failing.iter().map(|c| figure(data, c, length, top)).collect();
+    let figures = all.iter().filter(|c| top > 0.0 && fails(&c.group)).map(|c| figure(data, c, length, top)).collect();
     let mut blocks = vec![heading, Block::Text(words), Block::Figures(figures)];
     if !whole.is_empty() {
-        let named = |c: &&Curves| format!("{} ({})", c.group.name, set::counted(c.group.rows.len(), "mission"));
-        let list = whole.iter().map(named).collect::<Vec<_>>().join(", ");
-        blocks.push(Block::Text(format!("No mission failed in group {list}.")));
+        blocks.push(Block::Text(format!("Without a failure: {}.", whole.join(", "))));
     }
     blocks
-}
-
-impl Curves<'_> {
-    /// True when a mission of the group failed.
-    fn fails(&self) -> bool {
-        self.incidence.shares.iter().any(|of_cause| of_cause.last().is_some_and(|share| *share > 0.0))
-    }
 }
 
 /// Length of a mission's line, m.

@@ -1,7 +1,7 @@
-//! What came of it, in a few sentences and a picture; the rest of the page is the evidence.
+//! The results in a few sentences and a picture; the rest of the page is the evidence.
 
 use super::missions::outcomes;
-use super::{Question, comparison, formations, outcome, rovers, texture};
+use super::{Question, comparison, failures, formations, outcome, rovers, texture};
 use crate::ReportError;
 use crate::content::{Block, Figure};
 use crate::data::Data;
@@ -9,10 +9,10 @@ use crate::render::number as set;
 use std::collections::BTreeSet;
 
 /// Registry entry.
-pub const QUESTION: Question = Question { id: "summary", name: "Summary", title: "What came of it?", answer };
+pub const QUESTION: Question = Question { id: "summary", name: "Summary", title: "What are the results?", answer };
 
 fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
-    let driven = [missions(data), formations::verdict(data), rovers::in_words(data)];
+    let driven = [failures::in_words(data), missions(data), formations::verdict(data), rovers::in_words(data)];
     let judged = [comparison::claims(data), texture::in_words(data)];
     let mut blocks: Vec<Block> = driven.into_iter().chain(judged).flatten().map(Block::Text).collect();
     if !blocks.is_empty() {

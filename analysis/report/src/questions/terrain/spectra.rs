@@ -43,10 +43,11 @@ pub fn spectra(data: &Data, groups: &[Group<TerrainRow>]) -> Vec<Figure> {
             (true, true) => format!("; dashed, the median of their slopes, fitted from {ends}."),
             (true, false) => ".".to_owned(),
             (false, _) => format!(
-                ". Where the lines end, the rest is rounding noise, so that the slope fitted from {ends} describes no ground and is not drawn."
+                ". The spectrum does not cover the band in which its slope is fitted, {ends}, so the slope is not drawn."
             ),
         };
-        let caption = format!("Radially averaged two-dimensional power spectral density, one line per terrain{of_slope}");
+        let caption =
+            format!("Radially averaged two-dimensional power spectral density, one line per terrain{of_slope}");
         let description = format!(
             "Log-log spectra of {}; median slope {}.",
             set::counted(curves.len(), "terrain"),

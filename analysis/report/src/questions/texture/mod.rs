@@ -20,6 +20,7 @@ use crate::render::{number as set, thin};
 use sastrugi_imaging::hillshade::exaggeration;
 use sastrugi_numeric::Grid;
 use sastrugi_schemas::tables::TerrainRow;
+use verdict::Answer;
 
 /// Registry entry.
 pub const QUESTION: Question = Question {
@@ -69,17 +70,27 @@ fn standing_alone(data: &Data) -> impl Iterator<Item = (&TerrainRow, String)> {
     data.of_stage("texture").filter_map(|texture| Some((texture, alone(texture)?)))
 }
 
-/// Whether the textures are like the measured surfaces, by id; `None` where none can be compared.
+/// Whether the textures match the measured surfaces: how many, and the sentence on the first that does not, or else the first; `None` where
+/// none can be compared.
 pub(super) fn in_words(data: &Data) -> Option<String> {
-    let answers: Vec<(&TerrainRow, String)> = standing_alone(data)
-        .filter_map(|(texture, fit)| Some((texture, verdict::of_texture(data, texture, &fit)?.1)))
+    let answers: Vec<(&TerrainRow, Answer, String)> = standing_alone(data)
+        .filter_map(|(texture, fit)| {
+            verdict::of_texture(data, texture, &fit).map(|(answer, sentence)| (texture, answer, sentence))
+        })
         .collect();
-    let (first, rest) = answers.split_first()?;
-    let more = match rest.len() {
-        0 => String::new(),
-        n => format!(" {} more are judged below.", set::count(n)),
-    };
-    Some(format!("Is texture {} like the surface it was fitted to? {}{more}", first.0.terrain_id, first.1))
+    let worst = answers.iter().find(|a| a.1 == Answer::No).or(answers.first())?;
+    let quoted = format!("Does texture {} match the surface it was fitted to? {}", worst.0.terrain_id, worst.2);
+    let of = |answer: Answer| set::count(answers.iter().filter(|a| a.1 == answer).count());
+    Some(match answers.len() {
+        1 => quoted,
+        n => format!(
+            "Of {} textures {} match the surface they were fitted to, {} do not, and for {} the data cannot tell. {quoted}",
+            set::count(n),
+            of(Answer::Yes),
+            of(Answer::No),
+            of(Answer::CannotTell)
+        ),
+    })
 }
 
 /// The first texture that stands alone, beside the residual of its fit; none where the release has none.
@@ -154,7 +165,10 @@ fn patches(data: &Data, texture: &TerrainRow, fit: &str) -> Result<Vec<Figure>, 
             words("measured", "Measured.", caption),
         )?);
     }
-    let caption = format!("{}, {ground}; same scale, same colours.", texture.terrain_id);
+    let caption = format!(
+        "{}, {ground}; same scale, same colours. As made: the moving average has not taken its long waves.",
+        texture.terrain_id
+    );
     figures.extend(deviations(&synthetic, &texture.path, limit, "no data", words("synthetic", "Synthetic.", caption))?);
     Ok(figures)
 }

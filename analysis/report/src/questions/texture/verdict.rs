@@ -1,27 +1,27 @@
 //! Whether a texture is like the measured surface: yes, no, or cannot tell.
 //!
 //! The residual of the DEM is compared with that of the texture, which went through the same detrending and trimming. Each figure has a
-//! margin within which two surfaces count as alike. The scatter of a figure over ground of that size comes from the covariance of the
-//! residual, as for a normal field: var(ln Sq) = I2 / 2 A, var(Ssk) = 6 I3 / A, var(Sku) = 24 I4 / A, where A is the area and Ik the
-//! integral of the k-th power of the correlation over all lags (Lomnicki, 1961). Slopes and increments are correlated over less ground
-//! than heights are, so that they scatter less than the scatter taken here, that of Sq.
+//! margin within which two surfaces count as alike. How much a figure scatters over ground of that size follows from the covariance of the
+//! residual, as for a stationary normal field that is not trimmed: var(ln Sq) = I2 / 2 A, var(Ssk) = 6 I3 / A, var(Sku) = 24 I4 / A, where A
+//! is the area and Ik the integral of the k-th power of the correlation over all lags (Lomnicki, 1961). Trimming lessens the scatter of
+//! skewness and kurtosis. Slopes, and increments up to 0.4 of the window, are correlated over less ground than heights are: the scatter of
+//! Sq, which is taken for them, is more than theirs. Both lead to "cannot tell" rather than to a wrong answer.
 //!
 //! * Yes: every difference lies within its margin with its interval of 90 % (two one-sided tests at 5 %; a wrong yes has a probability
 //!   of at most 5 %, since all must pass; Berger, 1982).
-//! * No: a difference lies beyond its margin with an interval that leaves 5 % over all figures together (Bonferroni).
-//! * Cannot tell: neither.
-//!
-//! Sigma and range were given to the texture; heights, slopes and increments below the scale of the fit were not, or not exactly. What
-//! was fitted is judged on ground that was not by `sastrugi compare DEM --split-half`.
+//! * No: a difference lies beyond its margin with an interval that leaves 5 % over all figures and lags together (Bonferroni).
+//! * Cannot tell: neither; or the fit found that the surface is not stationary, so that its scatter is not the one above.
 
 use super::figures::residual_id;
 use crate::data::Data;
 use crate::render::number as set;
-use sastrugi_schemas::tables::{CovarianceRow, SurfaceRow, TerrainRow};
+use sastrugi_numeric::sums;
+use sastrugi_schemas::tables::{CovarianceRow, FitRow, SurfaceRow, TerrainRow};
 use sastrugi_statistics::normal;
+use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
-/// Largest ratio, as its logarithm, of figures of length that are alike: about 10 %.
+/// Largest ratio, as its logarithm, of figures of length that are alike.
 const RATIO_MARGIN: f64 = 0.1;
 /// Largest difference of skewnesses that are alike.
 const SKEWNESS_MARGIN: f64 = 0.25;
@@ -30,11 +30,11 @@ const KURTOSIS_MARGIN: f64 = 0.5;
 /// Level of a yes, and of a no over all figures.
 const ALPHA: f64 = 0.05;
 /// Longest lag of the increments that are compared, over the window of the fit.
-const LAG_MAX: f64 = 0.5;
+const LAG_MAX: f64 = 0.4;
 
 /// A figure of both surfaces.
 struct Compared {
-    name: &'static str,
+    name: String,
     /// In words: of the measured surface, then of the texture.
     values: [String; 2],
     /// Texture less measured.
@@ -51,99 +51,151 @@ pub enum Answer {
     Yes,
     /// Unlike in one at least.
     No,
-    /// The ground is too small to tell.
+    /// The data cannot tell.
     CannotTell,
 }
 
 /// Answer and sentence for a texture of a fit; `None` where the release does not describe both surfaces.
 pub fn of_texture(data: &Data, texture: &TerrainRow, fit: &str) -> Option<(Answer, String)> {
+    let fit = data.fits.iter().find(|f| f.fit_id == fit)?;
     let compared = compared(data, texture, fit)?;
+    if fit.stationarity_p < ALPHA {
+        let sentence = format!(
+            "Cannot tell: the measured surface is not stationary (the standard deviation of its blocks differs by a factor of {}), so its scatter \
+             is unknown. Side by side: {}.",
+            set::significant(fit.block_sigma_max_over_min, 3),
+            listed(compared.iter())
+        );
+        return Some((Answer::CannotTell, sentence));
+    }
+    Some(judged(&compared))
+}
+
+fn judged(compared: &[Compared]) -> (Answer, String) {
     let (yes, no) = (normal::quantile(1.0 - ALPHA), normal::quantile(1.0 - 0.5 * ALPHA / compared.len() as f64));
-    let beyond: Vec<&Compared> = compared.iter().filter(|c| c.difference.abs() - no * c.scatter > c.margin).collect();
-    let open: Vec<&Compared> = compared.iter().filter(|c| c.difference.abs() + yes * c.scatter > c.margin).collect();
-    let values = |c: &&Compared| format!("{} {} measured, {} of the texture", c.name, c.values[0], c.values[1]);
-    let list = |all: &[&Compared]| all.iter().map(values).collect::<Vec<_>>().join("; ");
-    Some(if !beyond.is_empty() {
-        (Answer::No, format!("No: {}.", list(&beyond)))
-    } else if open.is_empty() {
-        let names: Vec<&str> = compared.iter().map(|c| c.name).collect();
-        (Answer::Yes, format!("Yes, within the margins: {}.", names.join(", ")))
+    let beyond = || compared.iter().filter(|c| c.difference.abs() - no * c.scatter > c.margin);
+    let open = || compared.iter().filter(|c| c.difference.abs() + yes * c.scatter > c.margin);
+    if beyond().next().is_some() {
+        (Answer::No, format!("No: {}.", listed(beyond())))
+    } else if open().next().is_none() {
+        (Answer::Yes, format!("Yes: {}.", listed(compared.iter())))
     } else {
-        (Answer::CannotTell, format!("Cannot tell, on so little ground: {}.", list(&open)))
-    })
+        (Answer::CannotTell, format!("Cannot tell, the area is too small: {}.", listed(open())))
+    }
+}
+
+/// Figures with both values; of the increments the lag where they differ most.
+fn listed<'a>(all: impl Iterator<Item = &'a Compared>) -> String {
+    let mut shown: Vec<&Compared> = Vec::new();
+    for one in all {
+        let is_increment = |c: &Compared| c.name.starts_with(INCREMENT);
+        match shown.iter_mut().find(|other| is_increment(one) && is_increment(other)) {
+            Some(other) if one.difference.abs() > other.difference.abs() => *other = one,
+            Some(_) => {}
+            None => shown.push(one),
+        }
+    }
+    let words = |c: &&Compared| format!("{} {} measured, {} of the texture", c.name, c.values[0], c.values[1]);
+    shown.iter().map(words).collect::<Vec<_>>().join("; ")
 }
 
 /// What the sentence rests on.
 pub fn method() -> String {
+    let ends = [-RATIO_MARGIN, RATIO_MARGIN].map(|end| set::fixed(libm::exp(end), 2)).join(" to ");
     format!(
-        "Compared are the residual of the DEM and that of the texture after the same detrending and trimming: RMS height, RMS slope and \
-         increments are alike within {}, skewness within {}, kurtosis within {}. The scatter of each over ground of this size follows from the \
-         covariance, as for a normal field (Lomnicki, 1961). A yes is wrong with a probability of at most {}, and so is a no, over all figures \
-         together. The texture was given sigma and range: `sastrugi compare DEM --split-half` judges it by ground that was not fitted.",
-        set::percent(libm::exp(RATIO_MARGIN) - 1.0, 0),
+        "The residual of the DEM is compared with that of the texture after the same detrending and trimming. RMS height, RMS slope and \
+         increments up to {} of the window match within a ratio of {ends}, skewness within {}, kurtosis within {}. Their scatter over an area of \
+         this size follows from the covariance, as for a stationary normal field (Lomnicki, 1961). A wrong yes has a probability of at most {}, \
+         and so has a wrong no over all figures. The texture was made with the covariance of the fit, so RMS height and increments tell \
+         whether the synthesis is right; skewness and kurtosis tell whether a normal field can stand for the surface. `sastrugi compare DEM --split-half` \
+         judges a texture on ground that was not fitted.",
+        set::plain(LAG_MAX, 2),
         set::plain(SKEWNESS_MARGIN, 2),
         set::plain(KURTOSIS_MARGIN, 2),
         set::percent(ALPHA, 0)
     )
 }
 
-fn compared(data: &Data, texture: &TerrainRow, fit: &str) -> Option<Vec<Compared>> {
+/// How the names of increments begin.
+const INCREMENT: &str = "RMS increment";
+
+fn compared(data: &Data, texture: &TerrainRow, fit: &FitRow) -> Option<Vec<Compared>> {
     let residual = residual_id(texture);
-    let surfaces = [data.surface(fit)?, data.surface(&residual)?];
-    let rings: Vec<&CovarianceRow> =
-        data.covariance.iter().filter(|r| r.fit_id == fit && r.azimuth_deg.is_none()).collect();
+    let surfaces = [data.surface(&fit.fit_id)?, data.surface(&residual)?];
+    let bins: Vec<&CovarianceRow> = data.covariance.iter().filter(|r| r.fit_id == fit.fit_id).collect();
     let per_area: f64 = surfaces.iter().map(|s| 1.0 / area_m2(s)).sum();
-    let scatter = |factor: f64, power: i32| (factor * correlated_m2(&rings, power) * per_area).sqrt();
+    let scatter = |factor: f64, power: i32| (factor * correlated_m2(&bins, power) * per_area).sqrt();
     let (of_ratios, of_skewness, of_kurtosis) = (scatter(0.5, 2), scatter(6.0, 3), scatter(24.0, 4));
-    let ratio = |name: &'static str, values: [f64; 2], unit: &str| Compared {
+    let ratio = |name: String, values: [f64; 2], unit: &str| Compared {
         name,
         values: values.map(|v| set::with_unit(v, 3, unit)),
         difference: libm::log(values[1] / values[0]),
         scatter: of_ratios,
         margin: RATIO_MARGIN,
     };
-    let shape = |name: &'static str, values: [f64; 2], scatter: f64, margin: f64| Compared {
-        name,
+    let shape = |name: &str, values: [f64; 2], scatter: f64, margin: f64| Compared {
+        name: name.to_owned(),
         values: values.map(|v| set::fixed(v, 2)),
         difference: values[1] - values[0],
         scatter,
         margin,
     };
-    let window_m = data.fits.iter().find(|f| f.fit_id == fit).map(|f| f.window_x_m.min(f.window_y_m))?;
     let mut all = vec![
-        ratio("RMS height", surfaces.map(|s| s.sq_m), "m"),
-        ratio("RMS slope", surfaces.map(|s| s.sdq), ""),
+        ratio("RMS height".to_owned(), surfaces.map(|s| s.sq_m), "m"),
         shape("skewness", surfaces.map(|s| s.ssk), of_skewness, SKEWNESS_MARGIN),
         shape("kurtosis", surfaces.map(|s| s.sku), of_kurtosis, KURTOSIS_MARGIN),
     ];
-    all.extend(increments(data, [fit, &residual], LAG_MAX * window_m).map(|v| ratio("RMS increment", v, "m")));
+    // Slopes are those between neighbouring cells: of other cells they are others.
+    let cells = surfaces.map(|s| [s.cell_x_m, s.cell_y_m]);
+    if [0, 1].into_iter().all(|axis| (cells[0][axis] / cells[1][axis] - 1.0).abs() < SAME) {
+        all.push(ratio("RMS slope".to_owned(), surfaces.map(|s| s.sdq), ""));
+    }
+    let lag_max_m = LAG_MAX * fit.window_x_m.min(fit.window_y_m);
+    let increments = increments(data, [&fit.fit_id, &residual], lag_max_m);
+    all.extend(
+        increments
+            .into_iter()
+            .map(|(lag_m, values)| ratio(format!("{INCREMENT} over {}", set::with_unit(lag_m, 2, "m")), values, "m")),
+    );
     all.iter().all(|c| c.difference.is_finite() && c.scatter.is_finite()).then_some(all)
 }
 
+/// Relative difference below which lengths are the same.
+const SAME: f64 = 1e-6;
+
 /// Ground with data, m².
 fn area_m2(surface: &SurfaceRow) -> f64 {
-    surface.cells as f64 * surface.valid_share * surface.cell_x_m * surface.cell_y_m
+    surface.cells as f64 * surface.cell_x_m * surface.cell_y_m
 }
 
-/// Integral of a power of the correlation over the plane, m², by trapezoids over rings; what lies beyond the last bin is uncorrelated.
-fn correlated_m2(rings: &[&CovarianceRow], power: i32) -> f64 {
-    let Some(variance_m2) = rings.first().map(|r| r.covariance_m2).filter(|v| *v > 0.0) else { return f64::NAN };
-    let value = |r: &CovarianceRow| 2.0 * PI * r.lag_m * (r.covariance_m2 / variance_m2).powi(power);
-    rings.windows(2).map(|w| 0.5 * (value(w[0]) + value(w[1])) * (w[1].lag_m - w[0].lag_m)).sum::<f64>().abs()
-}
-
-/// Root mean square increments at the shared lag where they differ most, up to a lag, m.
-fn increments(data: &Data, surfaces: [&str; 2], lag_max_m: f64) -> Option<[f64; 2]> {
-    let [measured, texture] = surfaces.map(|id| data.structure_of(id, "all"));
-    let near = |lag_m: f64| {
-        texture.iter().min_by(|a, b| (a.lag_m - lag_m).abs().total_cmp(&(b.lag_m - lag_m).abs())).filter(|r| {
-            let apart = (r.lag_m - lag_m).abs();
-            apart <= 1e-6 * lag_m
-        })
+/// Integral of a power of the correlation over the plane, m², by trapezoids along lags: the mean over sectors of azimuth where the fit has
+/// them, since rings smooth an axis away, else over rings. What lies beyond the last bin is uncorrelated.
+fn correlated_m2(bins: &[&CovarianceRow], power: i32) -> f64 {
+    let rings = || bins.iter().filter(|r| r.azimuth_deg.is_none());
+    let variance_m2 = rings().find(|r| r.lag_m == 0.0).map_or(f64::NAN, |r| r.covariance_m2);
+    let along = |curve: &[(f64, f64)]| {
+        let value = |&(lag_m, covariance_m2): &(f64, f64)| 2.0 * PI * lag_m * (covariance_m2 / variance_m2).powi(power);
+        curve.windows(2).map(|w| 0.5 * (value(&w[0]) + value(&w[1])) * (w[1].0 - w[0].0)).sum::<f64>()
     };
-    let pairs = measured.iter().filter(|r| r.lag_m <= lag_max_m).filter_map(|r| Some([r.value_m2, near(r.lag_m)?.value_m2]));
-    let far = |pair: &[f64; 2]| libm::log(pair[1] / pair[0]).abs();
-    pairs.max_by(|a, b| far(a).total_cmp(&far(b))).map(|pair| pair.map(f64::sqrt))
+    let mut sectors: BTreeMap<u64, Vec<(f64, f64)>> = BTreeMap::new();
+    for (azimuth_deg, row) in bins.iter().filter_map(|r| Some((r.azimuth_deg?, r))) {
+        let curve = sectors.entry(azimuth_deg.to_bits()).or_insert_with(|| vec![(0.0, variance_m2)]);
+        curve.push((row.lag_m, row.covariance_m2));
+    }
+    let integrals: Vec<f64> = match sectors.is_empty() {
+        true => vec![along(&rings().map(|r| (r.lag_m, r.covariance_m2)).collect::<Vec<_>>())],
+        false => sectors.values().map(|curve| along(curve)).collect(),
+    };
+    // Odd powers of a correlation that swings below zero may have any sign.
+    sums::mean(&integrals).abs()
+}
+
+/// Root mean square increments of both surfaces at the lags that they share, up to one, m.
+fn increments(data: &Data, surfaces: [&str; 2], lag_max_m: f64) -> Vec<(f64, [f64; 2])> {
+    let [measured, texture] = surfaces.map(|id| data.structure_of(id, "all"));
+    let at = |lag_m: f64| texture.iter().find(|r| (r.lag_m / lag_m - 1.0).abs() < SAME);
+    let near = measured.iter().filter(|r| r.lag_m <= lag_max_m);
+    near.filter_map(|r| Some((r.lag_m, [r.value_m2, at(r.lag_m)?.value_m2].map(f64::sqrt)))).collect()
 }
 
 #[cfg(test)]
@@ -165,15 +217,48 @@ mod tests {
         }
     }
 
-    /// Of exp(-h / b), the integral of the k-th power is 2 pi (b / k)².
+    /// Of exp(-h / b), the integral of the k-th power is 2 pi (b / k)²; of an axis twice as long as the other, half of that in the mean
+    /// over sectors where rings would smooth it.
     #[test]
     fn val_integrals_of_an_exponential_correlation() {
-        let rows: Vec<CovarianceRow> = (0..2000).map(|k| ring(k, 0.01 * k as f64, 4.0 * (-0.01 * k as f64).exp())).collect();
+        let lags = || (0..4000).map(|k| 0.01 * f64::from(k));
+        let rows: Vec<CovarianceRow> =
+            lags().enumerate().map(|(k, h)| ring(k as i64, h, 4.0 * libm::exp(-h))).collect();
         let rings: Vec<&CovarianceRow> = rows.iter().collect();
         for power in [2, 3, 4] {
             let exact = 2.0 * PI / f64::from(power * power);
             let found = correlated_m2(&rings, power);
             assert!((found / exact - 1.0).abs() < 1e-3, "{power}: {found} for {exact}");
         }
+        // Ranges of 1 and 2 m in two sectors.
+        let sector = |azimuth_deg: f64, b_m: f64| {
+            lags().enumerate().skip(1).map(move |(k, h)| CovarianceRow {
+                azimuth_deg: Some(azimuth_deg),
+                ..ring(k as i64, h, 4.0 * libm::exp(-h / b_m))
+            })
+        };
+        let sectors: Vec<CovarianceRow> = sector(0.0, 1.0).chain(sector(90.0, 2.0)).collect();
+        let all: Vec<&CovarianceRow> = rows.iter().chain(&sectors).collect();
+        let exact = 0.5 * (2.0 * PI / 4.0 + 2.0 * PI);
+        assert!((correlated_m2(&all, 2) / exact - 1.0).abs() < 1e-3);
+    }
+
+    fn figure(name: &str, difference: f64, scatter: f64) -> Compared {
+        Compared { name: name.into(), values: ["1".into(), "2".into()], difference, scatter, margin: 0.1 }
+    }
+
+    #[test]
+    fn val_three_answers() {
+        let answer = |difference: f64, scatter: f64| {
+            judged(&[figure("RMS height", difference, scatter), figure("kurtosis", 0.0, 0.001)])
+        };
+        assert_eq!(answer(0.05, 0.02).0, Answer::Yes);
+        assert_eq!(answer(-0.05, 0.04).0, Answer::CannotTell);
+        // Two figures: 2.24 standard deviations beyond the margin.
+        assert_eq!(answer(0.1 + 2.2 * 0.05, 0.05).0, Answer::CannotTell);
+        let (no, sentence) = answer(-0.1 - 2.3 * 0.05, 0.05);
+        assert_eq!((no, sentence.as_str()), (Answer::No, "No: RMS height 1 measured, 2 of the texture."));
+        let many = [figure("RMS increment over 1 m", 0.3, 0.01), figure("RMS increment over 2 m", 0.4, 0.01)];
+        assert_eq!(judged(&many).1, "No: RMS increment over 2 m 1 measured, 2 of the texture.");
     }
 }
