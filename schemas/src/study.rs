@@ -233,6 +233,9 @@ pub struct DemItem {
     /// Licence of the data as an SPDX identifier, or `public domain`.
     #[serde(default)]
     pub license: Option<String>,
+    /// File with the text of that licence, relative to the study file; it goes into the release beside the data.
+    #[serde(default)]
+    pub license_file: Option<String>,
     /// Whom to name as the source.
     #[serde(default)]
     pub attribution: Option<String>,

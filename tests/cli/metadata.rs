@@ -50,13 +50,15 @@ fn val_what_the_data_asks_for_goes_with_everything_made_from_it() {
     let head = "version = \"2.1\"\ndoi = \"10.5281/zenodo.1234567\"\nurl = \"https://example.org/rough\"\n\
         creators = [{ name = \"Person, A.\", orcid = \"0000-0002-1825-0097\", affiliation = \"A <lab>\" }, \"A group\"]\n\
         organizations = [\"A group\"]\nkeywords = [\"snow\"]\nfunding = [\"10.13039/501100000780::101122956\", \"A fund\"]\n";
-    let dem =
-        "license = \"Terms of the agency\"\nattribution = \"The agency\"\ncitation = \"Agency (2000), Heights\"\n";
+    write(folder.path(), "terms.txt", "The agency's terms, whole.\n");
+    let dem = "license = \"Terms of the agency\"\nlicense_file = \"terms.txt\"\nattribution = \"The agency\"\ncitation = \"Agency (2000), Heights\"\n";
     write(folder.path(), "study.toml", &study(head, dem));
     let call = sastrugi_in(folder.path(), &["run", "study.toml", "-o", "release"]);
     assert_eq!(call.code, 0, "{}", call.stderr);
     assert!(call.stderr.contains("is not known here"), "{}", call.stderr);
     let release = folder.path().join("release");
+    assert_eq!(read(&release, "dem/site.license.txt"), "The agency's terms, whole.\n");
+    assert!(read(&release, "study.toml").contains("license_file = \"dem/site.license.txt\""));
     for name in ["README.md", "CITATION.cff", "LICENSE"] {
         let text = read(&release, name);
         for words in ["Terms of the agency", "The agency", "Agency (2000), Heights"] {

@@ -1,7 +1,8 @@
 //! Examples for the page on study files.
 
 /// Examples of keys that have no default and stand in no study to start from, by name or the last word of it, after `section: ` where sections differ.
-pub const EXAMPLES: [(&str, &str); 145] = [
+pub const EXAMPLES: [(&str, &str); 146] = [
+    ("license_file", r#""site.license.txt""#),
     ("basic_spacing_m", "0.01"),
     ("pixel_m", "0.64"),
     ("elevation_deg", "45.0"),

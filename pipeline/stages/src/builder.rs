@@ -16,7 +16,8 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 /// Suffixes that files of the release add to an id.
-const RESERVED: [&str; 11] = [
+const RESERVED: [&str; 12] = [
+    "license",
     "raw",
     "metric",
     "background",

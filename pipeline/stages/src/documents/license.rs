@@ -25,7 +25,8 @@ pub fn text(described: &Described<'_>) -> String {
     }
     if !sources.is_empty() {
         text.push_str(
-            "\nMeasured inputs in dem/ keep their own licences, and what comes from them names its source:\n\n",
+            "\nMeasured inputs in dem/ keep their own licences, and what comes from them names its source. The text of a licence that came with its data \
+             is dem/<id>.license.txt.\n\n",
         );
         sources.iter().for_each(|source| text.push_str(&format!("- {}\n", source_line(source))));
     }

@@ -15,8 +15,6 @@ enum Terms {
     Free,
     /// To name the source.
     Attribution,
-    /// To keep the notice of a licence of software, which names the source.
-    Notice,
     /// To name the source and to share alike.
     ShareAlike,
     /// No commercial use.
@@ -28,7 +26,7 @@ enum Terms {
 }
 
 /// Families of licences: SPDX identifiers without their version, upper case.
-const FAMILIES: [(&str, Terms); 17] = [
+const FAMILIES: [(&str, Terms); 14] = [
     ("PUBLIC-DOMAIN", Terms::Free),
     ("CC-PDDC", Terms::Free),
     ("CC0", Terms::Free),
@@ -43,9 +41,6 @@ const FAMILIES: [(&str, Terms); 17] = [
     ("CC-BY-NC-ND", Terms::NoDerivatives),
     ("OGL-UK", Terms::Attribution),
     ("ETALAB", Terms::Attribution),
-    ("BSD-2-CLAUSE", Terms::Notice),
-    ("BSD-3-CLAUSE", Terms::Notice),
-    ("MIT", Terms::Notice),
 ];
 
 /// A licence that the table knows: its family and version, as `("CC-BY-SA", "4.0")`.
@@ -88,9 +83,7 @@ pub enum Objection {
 /// states no licence.
 pub fn objection(source: &DemItem, release: &str) -> Option<Objection> {
     let stated = source.license.as_deref()?;
-    // What a licence of software says of a release of data is not known.
-    let of_release = known(release).filter(|ours| ours.terms != Terms::Notice);
-    let (Some(theirs), Some(ours)) = (known(stated), of_release) else {
+    let (Some(theirs), Some(ours)) = (known(stated), known(release)) else {
         let sentence = format!(
             "whether data under \"{stated}\" may be released under \"{release}\" is not known here; check it yourself"
         );
@@ -108,10 +101,8 @@ fn refusal(theirs: &Known, ours: &Known, stated: &str) -> Option<String> {
         matches!(ours.terms, Terms::NonCommercial | Terms::NonCommercialShareAlike) || ours.family == "CC-BY-NC-ND";
     match theirs.terms {
         Terms::Free => None,
-        Terms::Attribution | Terms::Notice if ours.terms != Terms::Free => None,
-        Terms::Attribution | Terms::Notice => {
-            Some(format!("[study] license must ask for attribution too, as \"{stated}\" does"))
-        }
+        Terms::Attribution if ours.terms != Terms::Free => None,
+        Terms::Attribution => Some(format!("[study] license must ask for attribution too, as \"{stated}\" does")),
         Terms::ShareAlike | Terms::NonCommercialShareAlike if alike => None,
         Terms::ShareAlike | Terms::NonCommercialShareAlike => {
             Some(format!("[study] license must be \"{stated}\" as well, or a later version of it"))
@@ -141,7 +132,6 @@ mod tests {
             ("PDDL-1.0", [true; 6]),
             ("CC-BY-4.0", [false, true, true, true, true, true]),
             ("CC BY 3.0", [false, true, true, true, true, true]),
-            ("BSD-2-Clause", [false, true, true, true, true, true]),
             ("CC-BY-SA-4.0", [false, false, true, false, false, false]),
             ("cc-by-sa-3.0", [false, false, true, false, false, false]),
             ("CC-BY-NC-4.0", [false, false, false, true, true, true]),

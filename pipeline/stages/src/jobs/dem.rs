@@ -47,7 +47,12 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
         return Err(entry.error("license", format!("`license` {why}")).into());
     }
     let id = item.id.clone();
-    let original = Original::of(&format!("dem/{id}"), &builder.study.folder, &item.file)?;
+    let mut original = Original::of(&format!("dem/{id}"), &builder.study.folder, &item.file)?;
+    if let Some(text) = &item.license_file {
+        let release_path = format!("dem/{id}.license.txt");
+        original.add(builder.study.folder.join(text), release_path.clone())?;
+        builder.inputs.push(InputPlace { key: entry.path_of("license_file"), release_path });
+    }
     let claimed = dem::claimed(&builder.study.folder.join(&item.file), &ReadOptions { cell_m: item.cell_m });
     // Other formats have a byte or more for a cell.
     let claimed = claimed.unwrap_or_else(|| Claimed::size(original.bytes(), 0, None));

@@ -50,6 +50,15 @@ impl Original {
         Ok(Self { files })
     }
 
+    /// Takes another file that belongs to it, with its place in the release.
+    ///
+    /// # Errors
+    /// A file that is missing or cannot be read.
+    pub fn add(&mut self, path: PathBuf, release_path: String) -> Result<(), BuildError> {
+        self.files.push(Copied::of(path, release_path)?);
+        Ok(())
+    }
+
     /// Length of the measured file, bytes.
     pub fn bytes(&self) -> u64 {
         self.files[0].bytes
