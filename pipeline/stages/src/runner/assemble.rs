@@ -49,7 +49,6 @@ pub fn assemble(contents: &Contents<'_>, dest: &Path, progress: &dyn Progress) -
     let fragments = add_results(&mut builder, contents, &mut sources)?;
     builder.name_sources(sources.list.clone());
     for note in &sources.notes {
-        progress.phase(&format!("{}/{}: {}", note.stage, note.item, note.note));
         builder.note(note.clone());
     }
     if let Some(warning) = documents::license_warning(&contents.study.head.license) {
