@@ -95,7 +95,7 @@ fn listed<'a>(all: impl Iterator<Item = &'a Compared>) -> String {
             None => shown.push(one),
         }
     }
-    let words = |c: &&Compared| format!("{} {} measured, {} of the texture", c.name, c.values[0], c.values[1]);
+    let words = |c: &&Compared| format!("{} ({} measured, {} in the texture)", c.name, c.values[0], c.values[1]);
     shown.iter().map(words).collect::<Vec<_>>().join("; ")
 }
 
@@ -257,8 +257,8 @@ mod tests {
         // Two figures: 2.24 standard deviations beyond the margin.
         assert_eq!(answer(0.1 + 2.2 * 0.05, 0.05).0, Answer::CannotTell);
         let (no, sentence) = answer(-0.1 - 2.3 * 0.05, 0.05);
-        assert_eq!((no, sentence.as_str()), (Answer::No, "No: RMS height 1 measured, 2 of the texture."));
+        assert_eq!((no, sentence.as_str()), (Answer::No, "No: RMS height (1 measured, 2 in the texture)."));
         let many = [figure("RMS increment over 1 m", 0.3, 0.01), figure("RMS increment over 2 m", 0.4, 0.01)];
-        assert_eq!(judged(&many).1, "No: RMS increment over 2 m 1 measured, 2 of the texture.");
+        assert_eq!(judged(&many).1, "No: RMS increment over 2 m (1 measured, 2 in the texture).");
     }
 }
