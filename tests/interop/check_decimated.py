@@ -20,7 +20,8 @@ from pxr import Usd, UsdGeom
 def load(path, dem):
     """Vertices from the south-west corner, x east, y north, z up, and triangles."""
     if path.suffix == ".usda":
-        (prim,) = [prim for prim in Usd.Stage.Open(str(path)).Traverse() if prim.IsA(UsdGeom.Mesh)]
+        stage = Usd.Stage.Open(str(path))
+        (prim,) = [prim for prim in stage.Traverse() if prim.IsA(UsdGeom.Mesh)]
         mesh = UsdGeom.Mesh(prim)
         return np.array(mesh.GetPointsAttr().Get(), dtype=float), np.array(mesh.GetFaceVertexIndicesAttr().Get()).reshape(-1, 3)
     mesh = trimesh.load(path, process=False, maintain_order=True)

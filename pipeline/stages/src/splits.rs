@@ -253,7 +253,7 @@ mod tests {
 
     #[test]
     fn val_paired_terrains_and_textures_on_them_stay_together() {
-        let texture = "[[texture]]\nid = \"t\"\nfit = { model = \"exponential\", sigma_m = 0.01, range_m = 0.3 }\nonto = \"c\"\ngroup = \"a\"\nsize_m = [2.0, 2.0]\ncell_m = 0.1\n";
+        let texture = "[[texture]]\nid = \"t\"\nfit = { model = \"exponential\", sigma_m = 0.01, range_m = 0.3 }\nonto = \"c\"\ngroup = \"a\"\nsize_m = [3.2, 3.2]\ncell_m = 0.05\n";
         let own = "[[terrain]]\nid = \"c\"\nkind = \"multifractal\"\nsize_px = [64, 64]\n";
         let text = format!("{HEAD}split = [0.6, 0.2, 0.2]\n{}{own}{texture}", terrain("a", "a", 10));
         let drawn = splits(&text).unwrap();

@@ -250,7 +250,7 @@ fn check_before_run(
     }
     match base.and_then(|base| base.expected) {
         Some(place) => sastrugi_texture::check_cells(place.cell, synthesis.geometry().cell)
-            .map_err(|error| ParameterError::new("cell_m", format!("does not go with `onto`: {error}"))),
+            .map_err(|error| ParameterError::new("cell_m", format!("does not match `onto`: {error}"))),
         None => Ok(()),
     }
 }

@@ -47,7 +47,7 @@ mod tests {
             assert_eq!(check(right), Ok(()));
         }
         let wrong = check("0000-0002-1825-0079").unwrap_err();
-        assert!(wrong.contains("checksum is wrong") && wrong.contains("the last character is"), "{wrong}");
+        assert!(wrong.contains("checksum is wrong") && wrong.contains("the last character should be"), "{wrong}");
         for other in [
             "",
             "0000-0002-1825-009",

@@ -3,7 +3,7 @@
 use super::band::Values;
 use super::checks::{cell_count, unplaced_claim};
 use super::crs::Crs;
-use super::raster::{Claimed, Dem, DemInfo, Format, ReadOptions, Refusal, unplaced};
+use super::raster::{Claimed, Dem, DemInfo, Format, MAX_CELLS, ReadOptions, Refusal, unplaced};
 use sastrugi_numeric::Grid;
 use std::path::Path;
 
@@ -56,8 +56,8 @@ pub(super) fn claimed(path: &Path, options: &ReadOptions) -> Option<Claimed> {
     let (header, _) = split(&head)?;
     let (rows, cols) = shape(field(header, "shape")?).ok()?;
     let cell_m = options.cell_m.map(|[x, y]| x.min(y));
-    let geometry = unplaced_claim(rows, cols, options)?;
-    Some(Claimed { geometry: Some(geometry), ..Claimed::size(geometry.len() as u64, 0, cell_m) })
+    let size = Claimed::size(rows.saturating_mul(cols).min(MAX_CELLS), 0, cell_m);
+    Some(Claimed { geometry: unplaced_claim(rows, cols, options), ..size })
 }
 
 /// Header text and data.

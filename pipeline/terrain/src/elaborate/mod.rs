@@ -591,7 +591,7 @@ impl Generator for Elaborate {
                 continue;
             };
             self.check_place(name, &g).map_err(|error| {
-                let message = format!("does not go with \"{}\": it {error}", name.name);
+                let message = format!("does not fit \"{}\": it {error}", name.name);
                 ParameterError::new(error.key(&name.key), message)
             })?;
         }

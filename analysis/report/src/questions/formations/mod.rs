@@ -82,7 +82,7 @@ fn unfinished(data: &Data) -> Option<String> {
 }
 
 /// Whether errors are tolerable, in a sentence; `None` where no run has followers.
-pub(super) fn verdict(data: &Data) -> Option<String> {
+fn verdict(data: &Data) -> Option<String> {
     let known: Vec<&FormationRow> = data.formations.iter().filter(|f| f.tolerable.is_finite()).collect();
     let share = |of: fn(&FormationRow) -> f64| sums::mean(&known.iter().map(|f| of(f)).collect::<Vec<_>>());
     (!known.is_empty()).then(|| {
@@ -93,6 +93,12 @@ pub(super) fn verdict(data: &Data) -> Option<String> {
             set::counted(known.len(), "run")
         )
     })
+}
+
+/// How the teams fared; `None` without teams.
+pub(super) fn in_words(data: &Data) -> Option<String> {
+    let sentences: Vec<String> = [unfinished(data), verdict(data)].into_iter().flatten().collect();
+    (!sentences.is_empty()).then(|| sentences.join(" "))
 }
 
 /// Runs of one stage and variant in one formation.

@@ -12,7 +12,7 @@ use std::collections::BTreeSet;
 pub const QUESTION: Question = Question { id: "summary", name: "Summary", title: "What are the results?", answer };
 
 fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
-    let driven = [failures::in_words(data), missions(data), formations::verdict(data), rovers::in_words(data)];
+    let driven = [failures::in_words(data), missions(data), formations::in_words(data), rovers::in_words(data)];
     let judged = [comparison::claims(data), texture::in_words(data)];
     let mut blocks: Vec<Block> = driven.into_iter().chain(judged).flatten().map(Block::Text).collect();
     if !blocks.is_empty() {
