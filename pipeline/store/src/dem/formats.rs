@@ -151,7 +151,7 @@ pub(super) fn of_start(bytes: &[u8]) -> Option<&'static Codec> {
 /// The format of a file of which only the first bytes are known: by them, or by its name where that format has no such bytes, or longer
 /// ones.
 pub(super) fn of_header(path: &Path, bytes: &[u8]) -> Option<&'static Codec> {
-    let by_name = |codec: &&Codec| matches!(codec.format, Format::EsriAscii | Format::Hgt);
+    let by_name = |codec: &&Codec| matches!(codec.format, Format::EsriAscii | Format::Hgt | Format::Npy);
     of_start(bytes).or_else(|| of_name(path).filter(by_name))
 }
 
