@@ -203,7 +203,7 @@ const fn next(edge: u32) -> u32 {
 }
 
 const fn previous(edge: u32) -> u32 {
-    if edge % 3 == 0 { edge + 2 } else { edge - 1 }
+    if edge.is_multiple_of(3) { edge + 2 } else { edge - 1 }
 }
 
 /// Twice the area of a triangle; positive counter-clockwise.

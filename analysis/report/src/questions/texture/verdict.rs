@@ -174,7 +174,9 @@ fn correlated_m2(bins: &[&CovarianceRow], power: i32) -> f64 {
     let rings = || bins.iter().filter(|r| r.azimuth_deg.is_none());
     let variance_m2 = rings().find(|r| r.lag_m == 0.0).map_or(f64::NAN, |r| r.covariance_m2);
     let along = |curve: &[(f64, f64)]| {
-        let value = |&(lag_m, covariance_m2): &(f64, f64)| 2.0 * PI * lag_m * (covariance_m2 / variance_m2).powi(power);
+        let value = |&(lag_m, covariance_m2): &(f64, f64)| {
+            2.0 * PI * lag_m * libm::pow(covariance_m2 / variance_m2, f64::from(power))
+        };
         curve.windows(2).map(|w| 0.5 * (value(&w[0]) + value(&w[1])) * (w[1].0 - w[0].0)).sum::<f64>()
     };
     let mut sectors: BTreeMap<u64, Vec<(f64, f64)>> = BTreeMap::new();
