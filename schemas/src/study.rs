@@ -72,7 +72,7 @@ pub struct StudyHead {
 #[serde(
     untagged,
     deny_unknown_fields,
-    expecting = "a creator is a name, or a table `{ name = \"Family, Given\", orcid = \"...\", affiliation = \"...\" }`"
+    expecting = "must be a name, or a table `{ name = \"Family, Given\", orcid = \"...\", affiliation = \"...\" }`"
 )]
 pub enum Creator {
     /// A name and what identifies its bearer.

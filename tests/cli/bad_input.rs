@@ -186,6 +186,7 @@ fn val_vehicles_and_decimations_are_refused() {
     refused(path, &["convert", "a.asc", "b.obj", "--triangles", "1"], USAGE, &["take 2 triangles"]);
     refused(path, &["convert", "a.asc", "b.obj", "--surface", "ice"], USAGE, &["--surface is for vehicles"]);
     refused(path, &["convert", "husky", "b.xml"], USAGE, &["`husky`", "`husky_a200`"]);
+    refused(path, &["convert", "husky_a200", "b.obj"], USAGE, &["is a vehicle", ".urdf"]);
     refused(path, &["convert", "husky_a200", "b.urdf", "--surface", "mud"], USAGE, &["mud", "hard_soil"]);
     refused(path, &["convert", "husky_a200", "b.urdf", "--window", "0,0,1,1"], USAGE, &["takes --surface"]);
     refused(path, &["convert", "none.toml", "b.urdf"], INPUT, &["none.toml"]);

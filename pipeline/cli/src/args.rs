@@ -937,7 +937,7 @@ pub struct Writing {
 /// `convert`.
 #[derive(Debug, Args)]
 pub struct Convert {
-    /// DEM to read; for a vehicle file its name (see `kinds`) or a vehicle file of your own.
+    /// DEM to read; or the vehicle to write: its name (see `kinds vehicle`) or a vehicle file.
     pub input: PathBuf,
     /// DEM to write, or the file of a vehicle (.xml is MJCF, .urdf); a folder with --for.
     pub output: PathBuf,
@@ -947,10 +947,10 @@ pub struct Convert {
     /// Where the simulator takes certain sizes only, cut the largest one out of the middle instead of resampling.
     #[arg(long, requires = "simulator")]
     pub crop: bool,
-    /// Decimate a mesh: no cell centre is farther from it than this, vertically, m.
+    /// Decimate a mesh: no cell centre may lie farther from it than this, vertically, m.
     #[arg(long, value_name = "M", allow_hyphen_values = true)]
     pub max_error: Option<f64>,
-    /// Decimate a mesh to at most so many triangles.
+    /// Decimate a mesh to at most this many triangles.
     #[arg(long, value_name = "N")]
     pub triangles: Option<usize>,
     /// Ground whose friction the file of a vehicle states (`sastrugi kinds surface`); `study` when absent.

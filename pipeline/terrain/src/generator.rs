@@ -4,6 +4,11 @@ use sastrugi_numeric::{Geometry, Grid, Streams};
 use sastrugi_schemas::ParameterError;
 use serde_json::Value;
 
+/// A coordinate for a message, m: to the micrometre, since conversions leave digits that mean nothing.
+pub(crate) fn told(coordinate_m: f64) -> f64 {
+    (1e6 * coordinate_m).round() / 1e6
+}
+
 /// Rough time of a cell of most generators, s.
 const SECONDS_PER_CELL: f64 = 4e-7;
 

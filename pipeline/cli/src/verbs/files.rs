@@ -31,6 +31,11 @@ pub fn convert(args: &Convert, common: &Common) -> Verdict {
         return convert_vehicle(args, format, common);
     }
     let output = args.output.display();
+    let name = args.input.to_string_lossy();
+    if verbs::vehicle::is_known(&name) && !args.input.exists() {
+        let message = format!("{output}: {name} is a vehicle; vehicles are written as {}", mechanism::WRITTEN_ENDINGS);
+        return Err(Failure::usage(message));
+    }
     let mut options = options(&args.writing, &args.output)?;
     let format = dem::Format::of_name(&args.output);
     let limits = mesh_limits(args, format)?;

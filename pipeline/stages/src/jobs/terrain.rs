@@ -107,10 +107,8 @@ fn check_decimation(entry: &Entry<'_>, item: &TerrainItem) -> Result<(), StudyEr
     if item.exports.iter().any(|&simulator| has_mesh(simulator)) {
         return Ok(());
     }
-    Err(entry.error(
-        key,
-        "decimates meshes, and `exports` names no simulator with one; `gazebo` and `isaac` have one".to_owned(),
-    ))
+    let message = "decimates meshes, but `exports` names no simulator that takes one: `gazebo` or `isaac`";
+    Err(entry.refuse(ParameterError::new(key, message)))
 }
 
 /// An item's id stands for all that it expands to, and the id of each of its swept parts for the replicates.

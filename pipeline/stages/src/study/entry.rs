@@ -107,7 +107,7 @@ impl<'a> Entry<'a> {
         let total =
             sweep.values().fold(count.unwrap_or(1) as usize, |total, values| total.saturating_mul(values.len()));
         if total > ITEMS_MAX {
-            return Err(self.error("count", format!("this stands for {total} items; at most {ITEMS_MAX} are possible")));
+            return Err(self.error("count", format!("expands to {total} items; the limit is {ITEMS_MAX}")));
         }
         let plain =
             Expanded { id: id.to_owned(), part: id.to_owned(), replicate: 0, sweep: None, params: params.clone() };

@@ -2,11 +2,16 @@
 
 use super::parameters::assign_vehicle;
 use crate::error::Error;
-use sastrugi_mobility::registry::{doubts, vehicle};
+use sastrugi_mobility::registry::{doubts, kinds, vehicle};
 use sastrugi_mobility::vehicle::SurfaceParameters;
 use sastrugi_schemas::kind::read_parameters;
 use sastrugi_schemas::mechanism::Mechanism;
 use serde_json::json;
+
+/// True for the name of a known vehicle.
+pub fn is_known(name: &str) -> bool {
+    kinds().iter().any(|kind| kind.family == "vehicle" && kind.kind == name)
+}
 
 /// The vehicle of that name or file, with the friction of a surface preset, and doubts about it, a sentence each.
 ///

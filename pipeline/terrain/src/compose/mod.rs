@@ -37,7 +37,7 @@ pub mod trail;
 
 pub use params::{Compose, Operation, RawCompose, RawProcess, RawRegion};
 
-use crate::generator::{Generator, Input, Line, MAPS, Map, NamedInput, Terrain, TerrainError};
+use crate::generator::{Generator, Input, Line, MAPS, Map, NamedInput, Terrain, TerrainError, told};
 use params::{COMMON, Operand, Part, Process, Region, Step};
 use sastrugi_numeric::{Geometry, Grid, Streams, Surface, ops, sums};
 use sastrugi_schemas::ParameterError;
@@ -112,7 +112,8 @@ fn check_reach(surface: &Geometry, cells: &Geometry) -> Result<(), String> {
     if reaches(0) && reaches(1) {
         return Ok(());
     }
-    let ([[x0, x1], [y0, y1]], [[west, east], [south, north]]) = (has, needs);
+    let [[[x0, x1], [y0, y1]], [[west, east], [south, north]]] =
+        [has, needs].map(|ends| ends.map(|axis| axis.map(told)));
     Err(format!(
         "covers x {x0} to {x1}, y {y0} to {y1} m (centres of its outer cells), but the cells to be made reach from x {west} to {east}, y {south} to \
          {north} m: move `origin_m`, or make the surface smaller"

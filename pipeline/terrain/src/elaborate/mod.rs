@@ -52,7 +52,7 @@ pub use fit::{TextureFit, fit};
 pub use params::{Elaborate, RawElaborate};
 pub use windows::Elaborated;
 
-use crate::generator::{Generator, Input, Map, NamedInput, Terrain, TerrainError};
+use crate::generator::{Generator, Input, Map, NamedInput, Terrain, TerrainError, told};
 use crate::planetary::{self, Assembly, Patch, Potential, RawProcess, Request, Window, Work, World};
 use altimetry::{AltimetryError, Correction, Points, Posts};
 use background::Background;
@@ -215,7 +215,7 @@ impl Elaborate {
         let outer = [[g.x(0), g.x(g.cols - 1)], [g.y(g.rows - 1), g.y(0)]];
         if (0..2).any(|a| ends[a].iter().any(|at| !background::lies_between(g, a, *at))) {
             let four = |p: [[f64; 2]; 2]| [p[0][0], p[0][1], p[1][0], p[1][1]];
-            return Err(DemError::Outside { dem: four(outer), window: four(ends) });
+            return Err(DemError::Outside { dem: four(outer).map(told), window: four(ends).map(told) });
         }
         // The places of the outer samples to the last bit: `Background::at` looks at the posts around these.
         let w = &self.window;
