@@ -268,7 +268,7 @@ mod tests {
         assert!(message("[[terrain]]\nid = \"a\"\nkind = \"k\"\nd = 1\nsweep.d = [1]\n").contains("set as well"));
         assert!(message("[[terrain]]\nkind = \"k\"\n").contains("missing field `id`"));
         assert!(
-            message("[[terrain]]\nid = \"a\"\nkind = \"k\"\ncount = 4000000000\nsweep.d = [1,2]\n").contains("at most")
+            message("[[terrain]]\nid = \"a\"\nkind = \"k\"\ncount = 4000000000\nsweep.d = [1,2]\n").contains("the limit is")
         );
     }
 }
